@@ -1,0 +1,104 @@
+"""What is run, and the words that all other parts speak.
+
+A case is one module here with three public names:
+
+    PARAMETERS   a mapping from name to `Parameter`
+    VARIANTS     a mapping from variant to the parameters it changes; the first is the default
+    build        a function (variant, parameters) -> `Case`
+
+    load("bouncing_ball", variant="listing", a1=0.0)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from crossbody.cases import _registry
+from crossbody.cases._errors import (
+    CaseUnsupported,
+    CrossbodyError,
+    EngineUnavailable,
+    InvalidValue,
+    OutputError,
+    SceneError,
+    UnknownName,
+)
+from crossbody.cases._outcome import Outcome
+
+if TYPE_CHECKING:
+    from crossbody.cases._case import Case, Claim, Coordinate, Law, Limit, Parameter, Tier, Value
+    from crossbody.cases._trajectory import Event, Ledger, Mode, Trajectory
+
+_LAZY = {
+    **dict.fromkeys(("Case", "Claim", "Coordinate", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"),
+    **dict.fromkeys(("Event", "Ledger", "Mode", "Trajectory"), "_trajectory"),
+}
+
+__all__ = [
+    "Case",
+    "CaseUnsupported",
+    "Claim",
+    "Coordinate",
+    "CrossbodyError",
+    "EngineUnavailable",
+    "Event",
+    "InvalidValue",
+    "Law",
+    "Ledger",
+    "Limit",
+    "Mode",
+    "Outcome",
+    "OutputError",
+    "Parameter",
+    "SceneError",
+    "Tier",
+    "Trajectory",
+    "UnknownName",
+    "Value",
+    "load",
+    "names",
+    "summary",
+    "variants",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the types that need numpy only when one is asked for."""
+    if name in _LAZY:
+        return getattr(import_module(f"crossbody.cases.{_LAZY[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def names() -> tuple[str, ...]:
+    """Names of all cases; imports none of them."""
+    return _registry.plugin_names(__name__, list(__path__))
+
+
+def summary(name: str) -> str:
+    """What a case is, in one line; imports nothing."""
+    return _registry.summary(__name__, list(__path__), name)
+
+
+def variants(name: str) -> tuple[str, ...]:
+    """The variants of a case, the default first."""
+    from crossbody.cases._load import module
+
+    return tuple(module(name).VARIANTS)
+
+
+def load(name: str, variant: str | None = None, **overrides: Value) -> Case:
+    """Build a case.
+
+    Args:
+        name: a name of `names()`, or the path of a case file of one's own (ends in .py).
+        variant: one of the case's variants; its first if not given.
+        overrides: parameters to change.
+
+    Raises:
+        UnknownName: if there is no such case, variant or parameter; the valid ones are listed.
+        InvalidValue: if a parameter lies outside what it admits.
+    """
+    from crossbody.cases._load import build
+
+    return build(name, variant, overrides)

@@ -1,0 +1,216 @@
+"""A case: one scene with its numbers, what is true about it, and how far an engine may be from that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases._arrays import Floats, frozen
+from crossbody.cases._errors import InvalidValue, SceneError
+from crossbody.cases._trajectory import Trajectory
+
+Value = float | int | str | bool
+
+
+class Tier(StrEnum):
+    """How a truth is known (spec 5.2)."""
+
+    A = "A closed form"
+    B = "B published digits"
+    C = "C two independent integrators that agree"
+    D = "D self-consistency"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """One number or word of a case that a user may change.
+
+    Attributes:
+        default: value when nothing is said.
+        unit: SI unit, empty for a word or a count.
+        doc: what it is.
+        low, high: bounds of a number.
+        open_low: whether `low` itself is excluded.
+        choices: the words admitted, for a word.
+    """
+
+    default: Value
+    unit: str = ""
+    doc: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+    open_low: bool = False
+    choices: tuple[str, ...] = ()
+
+    def checked(self, where: str, value: Value) -> Value:
+        """Return `value` in the type of the default.
+
+        Raises:
+            InvalidValue: if it has another type, is not finite or lies outside the bounds.
+        """
+        if isinstance(self.default, str):
+            if value not in self.choices:
+                raise InvalidValue(f"{where} is {value!r}; valid: {', '.join(self.choices)}.")
+            return value
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            raise InvalidValue(f"{where} is {value!r}; it must be a number [{self.unit or '-'}].") from None
+        if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
+            bracket = "(" if self.open_low or math.isinf(self.low) else "["
+            close = ")" if math.isinf(self.high) else "]"
+            raise InvalidValue(f"{where} is {number:g}; valid: {bracket}{self.low:g}, {self.high:g}{close} {self.unit}.")
+        if isinstance(self.default, int) and not isinstance(self.default, bool):
+            if number != int(number):
+                raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")
+            return int(number)
+        return number
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coordinate:
+    """Name and unit of one generalised coordinate; its velocity has the unit per second."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law:
+    """Constants of h'' + a1 h' + a0 h + a2 h^3 = 0, one row a constraint (spec 1.1).
+
+    Attributes:
+        a0 (nc,): 1/s^2.
+        a1 (nc,): 1/s.
+        a2 (nc,): 1/(m^2 s^2).
+        unilateral (nc,): False for a constraint that is always on.
+    """
+
+    a0: Floats
+    a1: Floats
+    a2: Floats
+    unilateral: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        """Check shapes and signs."""
+        nc = len(np.atleast_1d(self.a0))
+        for name in ("a0", "a1", "a2"):
+            array = frozen("Law", name, getattr(self, name), (nc,))
+            if not np.all(np.isfinite(array)) or np.any(array < 0):
+                raise SceneError(f"Law.{name} is {array.tolist()}; it must be finite and at least 0.")
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "unilateral", frozen("Law", "unilateral", self.unilateral, (nc,), np.bool_))
+
+    @property
+    def linear(self) -> bool:
+        """Whether every row is linear (a2 = 0)."""
+        return not self.a2.any()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """How large one metric may be for one engine and profile, and why.
+
+    Attributes:
+        metric: name of a metric in reports/metrics.
+        value: the largest absolute value that is still within, in the metric's unit.
+        engine, profile: which runs it judges; "*" is any.
+        why: the reason for the number.
+        known: a known property of the engine that takes it outside; empty if it should be within.
+    """
+
+    metric: str
+    value: float
+    engine: str = "*"
+    profile: str = "*"
+    why: str = ""
+    known: str = ""
+
+    def covers(self, engine: str, profile: str) -> bool:
+        """Whether this limit judges that run."""
+        return self.engine in ("*", engine) and self.profile in ("*", profile)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """One number that must come out, for example 7 transitions.
+
+    Attributes:
+        metric: the metric that counts or measures it.
+        expected: the number, in the metric's unit.
+        tier: how it is known.
+        source: where it comes from.
+    """
+
+    metric: str
+    expected: float
+    tier: Tier
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A scene, complete: any engine can build its own model from it.
+
+    Attributes:
+        name, variant: which case; `title` says it in words.
+        mechanism: name of the equations in crossbody.reference.systems.
+        parameters: every parameter of the case, resolved, SI.
+        coordinates: names and units of q.
+        contacts: names of the constraint rows.
+        q0, v0 (n,): start.
+        t_end: horizon, s.
+        law: constants of every row.
+        fsm: machine that switches the rows: "level", "edge" or "memoryless".
+        collisions: rule for several contacts: "sequential", "simultaneous" or "resolved".
+        closed_form: the exact motion at given times, where one exists (tier A).
+        claims: numbers that must come out.
+        limits: how far engines may be from the truth.
+    """
+
+    name: str
+    variant: str
+    title: str
+    mechanism: str
+    parameters: Mapping[str, Value]
+    coordinates: tuple[Coordinate, ...]
+    contacts: tuple[str, ...]
+    q0: Floats
+    v0: Floats
+    t_end: float
+    law: Law
+    fsm: str = "level"
+    collisions: str = "sequential"
+    closed_form: Callable[[Floats], Trajectory] | None = None
+    claims: tuple[Claim, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        """Check shapes against each other and freeze the mappings."""
+        n = len(self.coordinates)
+        for name in ("q0", "v0"):
+            object.__setattr__(self, name, frozen(f"Case {self.name}", name, getattr(self, name), (n,)))
+        if len(self.law.a0) != len(self.contacts):
+            raise SceneError(
+                f"Case {self.name} names {len(self.contacts)} contacts but its law has {len(self.law.a0)} rows."
+            )
+        if not (math.isfinite(self.t_end) and self.t_end > 0):
+            raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+
+    @property
+    def label(self) -> str:
+        """Name and variant in one word."""
+        return f"{self.name}:{self.variant}"
+
+    def number(self, parameter: str) -> float:
+        """One parameter as a float."""
+        return float(self.parameters[parameter])

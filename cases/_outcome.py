@@ -1,0 +1,42 @@
+"""How a run ended: every end is a value, with a sentence of advice."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Outcome(StrEnum):
+    """How a run ended. Only `FINISHED` reached its horizon."""
+
+    FINISHED = "finished"
+    STEP_LIMIT = "step_limit"
+    TIME_LIMIT = "time_limit"
+    STEP_TOO_SMALL = "step_too_small"
+    DIVERGED = "diverged"
+    NOT_FINITE = "not_finite"
+    ILL_POSED = "ill_posed"
+    MODE_CYCLE = "mode_cycle"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def advice(self) -> str:
+        """What the user can do about it, in one sentence."""
+        return _ADVICE[self]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached its horizon."""
+        return self is Outcome.FINISHED
+
+
+_ADVICE = {
+    Outcome.FINISHED: "The run reached its horizon.",
+    Outcome.STEP_LIMIT: "Raise max_steps, loosen the tolerance, or ask whether events accumulate (Zeno).",
+    Outcome.TIME_LIMIT: "Raise the time limit, or loosen the tolerance.",
+    Outcome.STEP_TOO_SMALL: "The step fell below the resolution of time: loosen the tolerance or lower the stiffness.",
+    Outcome.DIVERGED: "The motion left every sensible bound: take a smaller step, or check signs and constants.",
+    Outcome.NOT_FINITE: "A kernel returned NaN or infinity: look at the state named beside this outcome.",
+    Outcome.ILL_POSED: "The active rows or the mass matrix lost rank: the multipliers are not unique here.",
+    Outcome.MODE_CYCLE: "The contacts named beside this outcome switch for ever at one instant: their laws contradict.",
+    Outcome.INTERRUPTED: "The run was interrupted; what was computed until then is kept.",
+}

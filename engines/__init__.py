@@ -1,0 +1,42 @@
+"""How a case is run: one module or folder an engine, found by its name, imported only when asked for.
+
+An engine is a module here with one public name, `ENGINE`, an object that follows the protocol `Engine`.
+"""
+
+from __future__ import annotations
+
+from crossbody.cases import EngineUnavailable, _registry
+from crossbody.engines._contract import Engine, Run
+
+__all__ = ["Engine", "Run", "load", "names", "summary"]
+
+
+def names() -> tuple[str, ...]:
+    """Names of all engines, installed or not; imports none of them."""
+    return _registry.plugin_names(__name__, list(__path__))
+
+
+def summary(name: str) -> str:
+    """What an engine is, in one line; imports nothing."""
+    return _registry.summary(__name__, list(__path__), name)
+
+
+def load(name: str) -> Engine:
+    """Import an engine.
+
+    Raises:
+        UnknownName: if there is no such engine; the message lists the names.
+        EngineUnavailable: if its third-party package is not installed. A broken import of our own stays loud.
+    """
+    try:
+        module = _registry.load_plugin("engine", __name__, list(__path__), name)
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package in ("", "crossbody"):
+            raise
+        raise EngineUnavailable(
+            f"Engine {name!r} needs the package {package!r}, which is not installed: "
+            f"pip install 'crossbody[{name}]' brings it."
+        ) from None
+    engine: Engine = module.ENGINE
+    return engine

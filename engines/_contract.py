@@ -1,0 +1,62 @@
+"""What every engine offers. Structural: an engine inherits from nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+
+
+class Run(Protocol):
+    """One prepared run: the model is built, what the scene does not need is left out.
+
+    Attributes:
+        engine, profile: who runs it.
+        settings: what was really used, for provenance (tolerance, step, solver, ...).
+    """
+
+    engine: str
+    profile: str
+    settings: Mapping[str, Any]
+
+    def run(self) -> Trajectory:
+        """Integrate from the start; the same result every time. Numerical failure is an Outcome."""
+        ...
+
+    def audit(self) -> Mapping[str, Any]:
+        """The physics as it reached the engine, for the parity audit (spec 5.3).
+
+        Keys: masses, gravity, constants, q0, v0; and where the engine exposes them the functions
+        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates.
+        """
+        ...
+
+
+class Engine(Protocol):
+    """An engine under named profiles.
+
+    Attributes:
+        name: as in engines.names().
+        profiles: profile -> one sentence; the first is the default one.
+        versions: package -> version, for provenance.
+    """
+
+    name: str
+    profiles: Mapping[str, str]
+    versions: Mapping[str, str]
+
+    def why_not(self, case: Case, profile: str) -> str | None:
+        """Why this engine cannot do that case, in one sentence; None if it can."""
+        ...
+
+    def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> Run:
+        """Build the engine's own model once, untimed.
+
+        Raises:
+            UnknownName: for a profile or setting that it does not have (the valid ones are listed).
+            CaseUnsupported: with the sentence of `why_not`.
+            InvalidValue: for a setting outside its range.
+        """
+        ...

@@ -1,0 +1,1 @@
+"""Hardware logs: formats, column maps, checks, replay and identification."""

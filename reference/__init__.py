@@ -1,0 +1,1 @@
+"""The reference model: constrained dynamics with contact as a hybrid penalty DAE."""

@@ -1,0 +1,66 @@
+"""Where compiled code is kept between processes.
+
+numba notices a change of the compiled function's own file only, so a stale helper would go unnoticed. Each folder of
+compiled sources therefore keeps its code in a place named by a hash of all its files, of numba's version and of the
+processor. Compiled functions call only compiled functions of their own folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+import numba.core.config as numba_config
+
+
+@cache
+def folder(sources: tuple[Path, ...]) -> Path:
+    """The place for code compiled from these sources on this machine, created if it is not there.
+
+    `CROSSBODY_CACHE` names another base than the user's cache folder. Where neither can be written, a fresh
+    temporary folder serves this process alone.
+    """
+    base = os.environ.get("CROSSBODY_CACHE") or Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "crossbody"
+    chosen = Path(base).expanduser() / _fingerprint(sources)
+    try:
+        chosen.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=chosen):
+            return chosen
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="crossbody-cache-"))
+
+
+def _fingerprint(sources: tuple[Path, ...]) -> str:
+    digest = hashlib.sha256(f"{numba.__version__} {llvm.get_host_cpu_name()}".encode())
+    for source in sources:
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _sources(function: Callable[..., Any]) -> tuple[Path, ...]:
+    """The files whose change makes a function's compiled code stale; of a user's own folder, its own file alone."""
+    own = Path(function.__code__.co_filename)
+    if Path(__file__).parent in own.parents:
+        return tuple(sorted(own.parent.glob("*.py")))
+    return (own,) if own.is_file() else ()
+
+
+def compiled(function: Callable[..., Any], signatures: Any = None) -> Any:
+    """Compile a function and keep the code on disk; other users' numba functions keep their own places.
+
+    A function typed at a prompt has no file to stand beside: it is compiled for this process alone.
+    """
+    sources = _sources(function)
+    before = numba_config.CACHE_DIR
+    numba_config.CACHE_DIR = str(folder(sources)) if sources else before
+    try:
+        return numba.njit(signatures, cache=bool(sources), error_model="numpy")(function)
+    finally:
+        numba_config.CACHE_DIR = before

@@ -1,0 +1,88 @@
+"""The functions that make up a mechanism, each with one fixed signature.
+
+n coordinates, nc constraint rows, nu inputs, k the size of the blocks on the mass matrix's diagonal
+(n dense, 1 diagonal), na active rows. Every array is filled by the kernel, none is allocated.
+
+    dynamics(t, q, v, u, p, M, f, w)     M (n, k) mass blocks: row i holds row i of its own block
+                                         f (n,) = B u + tau_ext - c - d - g;  w scratch that `rows` may read
+    gaps(t, q, v, p, h, hd)              h, hd (nc,): gap and rate of EVERY row
+    rows(t, q, v, p, w, idx, na, H, h, Hdv)
+                                         for j < na and i = idx[j]: H[j] = dh_i/dq (n,), h[j], Hdv[j] = H_i' v
+    energy(q, v, p, e)                   e (2,) = kinetic, potential
+    power(t, q, v, u, p, e)              e (2,) = power of the inputs, power dissipated (optional)
+    solve(t, q, v, u, p, w, law, idx, na, vd, lam, hd)
+                                         optional, instead of the general algebra: acceleration vd (n,), multipliers
+                                         lam[j] and rates hd[j]; law (nc, 3) = a0, a1, a2; returns 0, or 1 if ill posed
+    control(t, q, v, u, s, p)            optional, called at sampling instants: fills u (nu,), may keep its state in s
+
+Each is compiled for float64 and complex128, so that derivatives can be checked by complex step: use np functions
+only, and neither abs, hypot, atan2 nor a branch on a complex value. `control` and `solve` are float64 alone.
+
+Gaps must not depend on time (scleronomic): h' = H v.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+from numba.core import types as core_types
+
+from crossbody.reference._cache import compiled
+
+_T = types.float64
+_IDX = types.int64[::1]
+
+
+def _vectors(scalar: Any) -> tuple[Any, Any]:
+    return scalar[::1], scalar[:, ::1]
+
+
+def _signatures(scalar: Any) -> dict[str, Any]:
+    a, m = _vectors(scalar)
+    return {
+        "dynamics": types.void(_T, a, a, a, a, m, a, a),
+        "gaps": types.void(_T, a, a, a, a, a),
+        "rows": types.void(_T, a, a, a, a, _IDX, types.int64, m, a, a),
+        "energy": types.void(a, a, a, a),
+        "power": types.void(_T, a, a, a, a, a),
+    }
+
+
+_f, _fm = _vectors(types.float64)
+REAL = {
+    **_signatures(types.float64),
+    "solve": types.int64(_T, _f, _f, _f, _f, _f, _fm, _IDX, types.int64, _f, _f, _f),
+    "control": types.void(_T, _f, _f, _f, _f, _f),
+}
+COMPLEX = _signatures(types.complex128)
+NAMES = tuple(REAL)
+
+
+def function_type(name: str) -> core_types.FunctionType:
+    """The numba type of a kernel as an argument of compiled code."""
+    return core_types.FunctionType(REAL[name])
+
+
+def _declare(name: str) -> Callable[[Callable[..., Any]], Any]:
+    signatures = [REAL[name]] + ([COMPLEX[name]] if name in COMPLEX else [])
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        return compiled(function, signatures)
+
+    return decorate
+
+
+dynamics = _declare("dynamics")
+gaps = _declare("gaps")
+rows = _declare("rows")
+energy = _declare("energy")
+power = _declare("power")
+solve = _declare("solve")
+control = _declare("control")
+
+
+def helper(function: Callable[..., Any]) -> Any:
+    """Compile a function that kernels of one folder share; it is typed where it is used."""
+    return compiled(function)

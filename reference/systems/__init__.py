@@ -1,0 +1,1 @@
+"""The mechanisms: each module holds the kernels of one, as `KERNELS`."""
