@@ -1,0 +1,78 @@
+"""The record of a run, from which its `Trajectory` is made when the clock has stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Event, Mode, Outcome, Trajectory
+from crossbody.cases._arrays import Floats
+
+Observe = Callable[[Floats, Floats], tuple[Floats, Floats]]
+"""(q (n, nq), v (n, nv)) -> gap (n, nc), energy (n, 2), in the case's coordinates."""
+Modes = tuple[int, ...]
+
+
+class Log:
+    """One entry an instant.
+
+    Attributes:
+        motion: t, q, v of every instant.
+        lam: multipliers, N: a number, or one a row.
+        mode: modes of the rows.
+        events: transitions, in order.
+    """
+
+    def __init__(self) -> None:
+        self.motion: list[tuple[float, Floats, Floats]] = []
+        self.lam: list[Any] = []
+        self.mode: list[Modes] = []
+        self.events: list[Event] = []
+
+    def add(self, t: float, q: Floats, v: Floats, lam: Any, mode: Modes) -> None:
+        """Append one instant; q and v are kept, not copied."""
+        self.motion.append((t, q, v))
+        self.lam.append(lam)
+        self.mode.append(mode)
+
+    def switch(self, t: float, before: Modes, after: Modes) -> None:
+        """Append an event for every row whose mode changed."""
+        for i, (b, a) in enumerate(zip(before, after, strict=True)):
+            if a != b:
+                self.events.append(Event(t=t, contact=i, before=Mode(b), after=Mode(a)))
+
+    def columns(self) -> tuple[Floats, Floats, Floats]:
+        """Times (n,), q (n, nq), v (n, nv)."""
+        t, q, v = zip(*self.motion, strict=True)
+        return np.array(t), np.array(q), np.array(v)
+
+    def trajectory(
+        self,
+        observe: Observe,
+        outcome: Outcome,
+        message: str = "",
+        steps: int = 0,
+        wall_s: float = 0.0,
+        counts: Mapping[str, int] | None = None,
+    ) -> Trajectory:
+        """The run; gaps and energies are evaluated here."""
+        t, q, v = self.columns()
+        with np.errstate(all="ignore"):  # a run that failed may end where squares overflow
+            gap, energy = observe(q, v)
+        return Trajectory(
+            t=t,
+            q=q,
+            v=v,
+            gap=gap,
+            lam=np.reshape(np.array(self.lam), gap.shape),
+            energy=energy,
+            mode=np.reshape(np.array(self.mode, np.int8), gap.shape),
+            events=tuple(self.events),
+            outcome=outcome,
+            message=message,
+            steps=steps,
+            wall_s=wall_s,
+            counts=counts or {},
+        )

@@ -1,0 +1,39 @@
+"""Settings of a run: named, checked, and kept for provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from crossbody.cases import Parameter, UnknownName, Value
+
+
+def chosen(engine: str, profile: str, known: Mapping[str, Parameter], given: Mapping[str, Any]) -> dict[str, Value]:
+    """Every setting's value: the user's where given, else the default.
+
+    Args:
+        engine: whose settings, for the messages.
+        profile: likewise.
+        known: the settings that the profile has.
+        given: what the user asked for.
+
+    Raises:
+        UnknownName: for a setting that the profile does not have; the valid ones are listed.
+        InvalidValue: for a value outside what the setting admits.
+    """
+    where = f"{engine}:{profile}"
+    for name in given:
+        if name not in known:
+            raise UnknownName(f"setting of {where}", name, known)
+    return {name: p.checked(f"{where}: {name}", given.get(name, p.default)) for name, p in known.items()}
+
+
+def profile_of(engine: str, profiles: Mapping[str, str], profile: str) -> str:
+    """The profile, if the engine has it.
+
+    Raises:
+        UnknownName: listing the profiles.
+    """
+    if profile not in profiles:
+        raise UnknownName(f"profile of {engine}", profile, profiles)
+    return profile

@@ -1,0 +1,32 @@
+"""The deck's linear law in MuJoCo's direct format, without the regularisation.
+
+aref = -B h' - K d h with the impedance d = dmin = dmax at its largest, solref = (-K dmax^2, -B dmax) (spec 4.1, 4.2).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.cases import Law
+
+MAX_IMPEDANCE = 0.9999
+"""MuJoCo clamps d there; it leaves R = (1 - d)/d diagA, a bias of 1e-4 in lam."""
+REMAINING = 1e-7
+"""Factor on R. With PGS on one row the error of lam falls with it: 2e-8, 2e-11, 6e-13 at 1e-4, 1e-7, 1e-9."""
+
+
+def direct_solref(law: Law, row: int) -> tuple[float, float]:
+    """The pair solref that gives aref = -a1 h' - a0 h; both negative or zero, or MuJoCo replaces them."""
+    return -MAX_IMPEDANCE * float(law.a0[row]), -MAX_IMPEDANCE * float(law.a1[row])
+
+
+def law_of(solref: Any) -> tuple[float, float]:
+    """(a0, a1) back from a direct solref."""
+    return -float(solref[0]) / MAX_IMPEDANCE, -float(solref[1]) / MAX_IMPEDANCE
+
+
+def without_regularisation(model: Any) -> None:
+    """Scale what R is made from: inverse weights of bodies (contacts), joints (joint rows) and tendons."""
+    model.body_invweight0[:] *= REMAINING
+    model.dof_invweight0[:] *= REMAINING
+    model.tendon_invweight0[:] *= REMAINING

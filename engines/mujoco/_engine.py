@@ -1,0 +1,124 @@
+"""MuJoCo as an engine: profiles, settings, and one prepared run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from types import ModuleType
+from typing import Any
+
+import mujoco
+
+from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory, _registry
+from crossbody.engines import _settings
+from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._march import March
+from crossbody.engines.mujoco._scene import Scene
+from crossbody.engines.mujoco._tape import Tape
+
+PACKAGE = "crossbody.engines.mujoco"
+
+
+@dataclass(slots=True, kw_only=True)
+class MujocoRun:
+    """One prepared run; see `crossbody.engines.Run`."""
+
+    case: Case
+    scene: Scene
+    profile: str
+    settings: Mapping[str, Any]
+    said: tuple[str, ...]
+    engine: str = "mujoco"
+
+    def run(self) -> Trajectory:
+        """Integrate from the start. Forces are memoryless: lam = max(0, law) wherever a gap is closed (spec 4.1)."""
+        case, scene = self.case, self.scene
+        dt, limit = float(self.settings["dt"]), int(self.settings["max_steps"])
+        tape = Tape(scene.model, scene.data, min(limit, int(1.1 * case.t_end / dt) + 64, 1_000_000))
+        march = March(scene, tape, dt, limit)
+        with captured() as warned, hooked(scene.hook):
+            start = perf_counter()
+            march.run(case.t_end)
+            wall = perf_counter() - start
+        words = [march.message, *(f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys((*self.said, *warned)))]
+        message = " ".join(w for w in words if w)
+        return tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, {"located": march.trials})
+
+    def audit(self) -> Mapping[str, Any]:
+        """The physics read back from the compiled model."""
+        return self.scene.audit
+
+
+class Mujoco:
+    """MuJoCo 4; see `crossbody.engines.Engine`."""
+
+    name = "mujoco"
+    profiles: Mapping[str, str] = {
+        "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events; memoryless",
+        "default": "the obvious model: contact constants, integrator (Euler) and step (2 ms) as MuJoCo sets them",
+    }
+    versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
+
+    def why_not(self, case: Case, profile: str) -> str | None:
+        """Mechanisms without a model here cannot be run."""
+        _settings.profile_of(self.name, self.profiles, profile)
+        known = _mechanisms()
+        if case.mechanism in known:
+            return None
+        return f"MuJoCo has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
+
+    def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> MujocoRun:
+        """Compile the model of a case.
+
+        Args:
+            case: the scene.
+            profile: one of `profiles`.
+            settings: dt, time step, s; max_steps, bound on their number.
+
+        Raises:
+            UnknownName: for a profile or setting that does not exist.
+            CaseUnsupported: for a mechanism without a model, or a model that MuJoCo refuses, in its words.
+            InvalidValue: for a setting outside its range.
+        """
+        reason = self.why_not(case, profile)
+        if reason is not None:
+            raise CaseUnsupported(reason)
+        mechanism = _mechanism(case.mechanism)
+        used = _settings.chosen(self.name, profile, _known(case, mechanism.default_step(case, profile)), settings)
+        with captured() as said:
+            try:
+                scene: Scene = mechanism.build(case, profile, float(used["dt"]))
+            except ValueError as error:
+                raise CaseUnsupported(f"MuJoCo refuses the model of {case.label}: {error}.") from None
+        return MujocoRun(case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said))
+
+
+def _known(case: Case, step: float) -> dict[str, Parameter]:
+    return {
+        "dt": Parameter(default=min(step, case.t_end), unit="s", doc="time step", low=0.0, open_low=True),
+        "max_steps": Parameter(default=2_000_000, doc="bound on the number of steps", low=1, high=1e9),
+    }
+
+
+def _options(scene: Scene) -> dict[str, Any]:
+    """What the model says about how it is solved, for provenance."""
+    opt = scene.model.opt
+    return {
+        "integrator": mujoco.mjtIntegrator(opt.integrator).name.removeprefix("mjINT_"),
+        "solver": mujoco.mjtSolver(opt.solver).name.removeprefix("mjSOL_"),
+        "located_events": scene.arm is not None,
+        "law": "memoryless",
+    }
+
+
+def _mechanisms() -> tuple[str, ...]:
+    from crossbody.engines import mujoco as package
+
+    return _registry.plugin_names(PACKAGE, list(package.__path__))
+
+
+def _mechanism(name: str) -> ModuleType:
+    from crossbody.engines import mujoco as package
+
+    return _registry.load_plugin("mechanism of MuJoCo", PACKAGE, list(package.__path__), name)

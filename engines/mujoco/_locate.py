@@ -1,0 +1,87 @@
+"""Cut a step at the first event of its rows: retry from the saved state with a smaller time step (spec 4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+from scipy.optimize import brentq
+
+from crossbody.cases import Mode
+from crossbody.engines._log import Modes
+from crossbody.engines.mujoco._scene import Scene
+
+FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
+Sign = tuple[int, int, float]
+"""(row, 0 for its gap or 1 for its multiplier, sign that it has in its present mode)."""
+WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
+    FREE: ((0, 1.0),),
+    CONTACT: ((0, -1.0), (1, 1.0)),
+    BALLISTIC: ((0, -1.0), (1, -1.0)),
+}
+
+
+def signs(modes: Modes) -> list[Sign]:
+    """What must keep its sign while the modes last."""
+    return [(i, which, sign) for i, mode in enumerate(modes) for which, sign in WATCHED.get(mode, ())]
+
+
+class Locator:
+    """Finds and lands on the first instant of a step at which a row leaves its mode.
+
+    The rows keep the equations of their modes in every trial (a closed one outlives its gap), so that the end of a
+    trial is a smooth function of its length and the order of the integrator survives the event.
+    """
+
+    def __init__(self, scene: Scene, advance: Callable[[], None], rewind: Callable[[], None]) -> None:
+        assert scene.margins is not None
+        self.model, self.data, self.margins = scene.model, scene.data, scene.margins
+        self.advance, self.rewind = advance, rewind
+
+    def beyond(self, modes: Modes) -> Modes:
+        """The modes just behind the event: those rows that crossed are taken by their gap and multiplier."""
+        return tuple(
+            mode if mode not in WATCHED else FREE if h > 0.0 else CONTACT if lam > 0.0 else BALLISTIC
+            for mode, (h, lam) in zip(modes, self.margins(), strict=True)
+        )
+
+    def land(self, modes: Modes) -> int:
+        """Redo the step so that it ends just behind its first event; returns the trials that it took."""
+        full, trials = self.model.opt.timestep, 0
+
+        def value(tau: float, row: int, which: int) -> float:
+            nonlocal trials
+            trials += 1
+            self._redo(tau)
+            return self.margins()[row][which]
+
+        roots = []
+        for row, which, sign in self._crossed(modes):
+            start = value(0.0, row, which)
+            bracketed = sign * start > 0.0
+            roots.append(brentq(value, 0.0, full, args=(row, which), xtol=1e-15 * full) if bracketed else 0.0)
+        tau, nudge = min(roots), 1e-16 * full
+        self._redo(tau)
+        while not self._crossed(modes) and tau < full:
+            tau, nudge = min(tau + nudge, full), 2.0 * nudge
+            self._redo(tau)
+            trials += 1
+        return trials
+
+    def _crossed(self, modes: Modes) -> list[Sign]:
+        now = self.margins()
+        return [s for s in signs(modes) if _gone(now[s[0]][s[1]], s)]
+
+    def _redo(self, tau: float) -> None:
+        self.rewind()
+        self.model.opt.timestep = tau
+        mujoco.mj_forward(self.model, self.data)
+        if tau > 0.0:
+            self.advance()
+            mujoco.mj_forward(self.model, self.data)
+
+
+def _gone(value: float, watched: Sign) -> bool:
+    """Whether a watched value lost its sign: a gap of exactly 0 is closed, a multiplier of exactly 0 does not push."""
+    positive = value > 0.0
+    return positive if watched[2] < 0.0 else not positive

@@ -1,0 +1,117 @@
+"""Stepping: fixed steps, or the same steps cut at the events of the rows.
+
+One evaluation at the start of every step serves the record (lam belongs to that instant), the test for events and
+the integrator's first stage: mj_forward, then the integrator alone, instead of mj_step, which would evaluate twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from crossbody.cases import Outcome
+from crossbody.engines._log import Modes
+from crossbody.engines.mujoco._locate import Locator
+from crossbody.engines.mujoco._scene import Scene
+from crossbody.engines.mujoco._tape import Tape
+
+SAME_INSTANT = 100
+"""Events in a row without the time moving on that make a cycle."""
+
+
+def integrator(model: Any, data: Any) -> Callable[[], None]:
+    """What mj_step does after its forward pass, for the integrator that the model names (RK4 or Euler)."""
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        return lambda: mujoco.mj_RungeKutta(model, data, 4)
+    return lambda: mujoco.mj_Euler(model, data)
+
+
+class March:
+    """One run from the start of the scene.
+
+    Attributes:
+        steps: steps accepted.
+        trials: steps tried to locate events.
+        outcome: how it ended, with a message if not at its horizon.
+        now: modes of the rows.
+        still: events in a row at one instant.
+    """
+
+    def __init__(self, scene: Scene, tape: Tape, dt: float, max_steps: int) -> None:
+        self.scene, self.tape, self.dt, self.max_steps = scene, tape, dt, max_steps
+        self.advance = integrator(scene.model, scene.data)
+        self.locator = Locator(scene, self.advance, tape.rewind) if scene.arm is not None else None
+        self.steps = self.trials = self.still = 0
+        self.outcome, self.message = Outcome.FINISHED, ""
+        self.now: Modes = ()
+
+    def run(self, t_end: float) -> None:
+        """Step to t_end, s, the last step cut to end there."""
+        scene, data, opt, dt = self.scene, self.scene.data, self.scene.model.opt, self.dt
+        model, forward, advance, record = scene.model, mujoco.mj_forward, self.advance, self.tape.record
+        modes, safe, lam = scene.modes, scene.safe, scene.lam
+        scene.start()
+        now = self.now = self._settled(modes())
+        record(lam(), now)
+        t, last = 0.0, t_end - dt * (1 + 1e-9)
+        opt.timestep = dt
+        while t < t_end:
+            if t > last:
+                opt.timestep = t_end - t
+            if self.steps == self.max_steps:
+                return self._end(Outcome.STEP_LIMIT, f"{self.max_steps} steps of {dt:g} s were not enough")
+            advance()
+            forward(model, data)
+            self.steps += 1
+            before, t = t, data.time
+            if not safe() or not t > before:
+                return self._broken()
+            if modes() != now:
+                t = self._event(before)
+                if self.still > SAME_INSTANT:
+                    return self._end(Outcome.MODE_CYCLE, f"rows {now} and {self.now} switch for ever")
+                now, opt.timestep = self.now, dt
+            record(lam(), now)
+            if t_end - t < 1e-9 * dt:
+                return None
+        return None
+
+    def _event(self, before: float) -> float:
+        """Pass to the modes behind an event: located in the step, or taken as seen at its end. Returns the time."""
+        scene, tape = self.scene, self.tape
+        if self.locator is None:
+            after = scene.modes()
+        else:
+            self.trials += self.locator.land(self.now)
+            tape.record(scene.lam(), self.now)
+            after = self._settled(self.locator.beyond(self.now))
+        t: float = scene.data.time
+        self.still = self.still + 1 if t - before < 1e-9 * self.dt else 0
+        tape.switch(t, self.now, after)
+        self.now = after
+        return t
+
+    def _settled(self, guess: Modes) -> Modes:
+        """Open and close the rows, evaluate, and read the modes that this gives."""
+        scene = self.scene
+        if scene.arm is not None:
+            scene.arm(guess)
+            if scene.hook is not None:  # called even when no row is there: a third of the cost of a free step
+                mujoco.set_mjcb_control(scene.hook if any(guess) else None)
+        mujoco.mj_forward(scene.model, scene.data)
+        return scene.modes()
+
+    def _broken(self) -> None:
+        data = self.scene.data
+        finite = all(bool(np.isfinite(x).all()) for x in (data.qpos, data.qvel, data.qacc))
+        if finite:
+            self.tape.record(self.scene.lam(), self.now)
+        self._end(Outcome.DIVERGED if finite else Outcome.NOT_FINITE, "the state left what the scene can reach")
+
+    def _end(self, outcome: Outcome, what: str) -> None:
+        data = self.scene.data
+        self.outcome = outcome
+        self.message = f"t = {data.time:g} s, q = {data.qpos.tolist()}, v = {data.qvel.tolist()}: {what}."

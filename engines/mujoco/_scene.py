@@ -1,0 +1,45 @@
+"""What a mechanism's file gives to the stepping loops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from crossbody.engines._log import Modes, Observe
+from crossbody.engines.mujoco._globals import Hook
+
+
+@dataclass(slots=True, kw_only=True)
+class Scene:
+    """A compiled model with views and closures on it; the engine's coordinates are the case's.
+
+    The closures read `data` after mj_forward and are called every step: they touch only views made beforehand.
+
+    Attributes:
+        model, data: MjModel, MjData.
+        nc: constraint rows of the case.
+        start: puts data at the start of the case (state, rows open or closed).
+        modes: -> mode of every row.
+        lam: -> multiplier of every row, N (one number for one row).
+        safe: -> whether the state is finite and within what the scene can reach.
+        observe: gaps and energies of many states.
+        hook: adds to efc_aref what solref cannot say; None if nothing.
+        arm: opens and closes rows to suit their modes (matched profile only).
+        margins: -> for every row its gap, m, and the sign of the multiplier that it would have without the bound
+            lam >= 0 (matched profile only).
+        audit: the physics read back from the compiled model.
+    """
+
+    model: Any
+    data: Any
+    nc: int
+    start: Callable[[], None]
+    modes: Callable[[], Modes]
+    lam: Callable[[], Any]
+    safe: Callable[[], bool]
+    observe: Observe
+    hook: Hook | None = None
+    arm: Callable[[Modes], None] | None = None
+    margins: Callable[[], list[tuple[float, float]]] | None = None
+    audit: Mapping[str, Any] = field(default_factory=dict)
