@@ -1,1 +1,29 @@
-"""The reference model: constrained dynamics with contact as a hybrid penalty DAE."""
+"""The reference model: constrained dynamics with contact as a hybrid penalty DAE.
+
+    System      a mechanism: kernels, parameters, the law of every row
+    simulate    one motion of it
+    kernels     decorators that declare the functions of a mechanism
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from crossbody.reference import kernels
+    from crossbody.reference._options import Options
+    from crossbody.reference._simulate import prepare, simulate
+    from crossbody.reference._system import System
+
+__all__ = ["Options", "System", "kernels", "prepare", "simulate"]
+_LAZY = {"Options": "_options", "System": "_system", "simulate": "_simulate", "prepare": "_simulate"}
+
+
+def __getattr__(name: str) -> Any:
+    """Import numba only when something of it is asked for."""
+    if name == "kernels":
+        return import_module("crossbody.reference.kernels")
+    if name in _LAZY:
+        return getattr(import_module(f"crossbody.reference.{_LAZY[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

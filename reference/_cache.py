@@ -64,3 +64,12 @@ def compiled(function: Callable[..., Any], signatures: Any = None) -> Any:
         return numba.njit(signatures, cache=bool(sources), error_model="numpy")(function)
     finally:
         numba_config.CACHE_DIR = before
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Make a function part of whatever compiled function calls it.
+
+    A compiled function carries all that it calls, optimised anew: what is called from one place, or is short, is
+    therefore written out there, and only the few parts that many places share are compiled on their own.
+    """
+    return numba.njit(inline="always", error_model="numpy")(function)

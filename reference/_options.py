@@ -1,0 +1,118 @@
+"""What may be asked of a run, checked once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from crossbody.cases import InvalidValue, UnknownName
+from crossbody.cases._arrays import frozen
+from crossbody.reference._kinds import Floats
+from crossbody.reference._system import System
+
+FSMS = ("level", "edge", "memoryless")
+COLLISIONS = ("resolved",)
+SOLVERS = ("compiled", "ida", "cvode")
+TOLERANCES = (1e-14, 1e-1)
+ATOL_PART = 1e-3  # default absolute tolerance in units of rtol: gaps are small against heights
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """Everything of a run that is not the mechanism or its start.
+
+    Attributes:
+        t_end: horizon, s.
+        rtol: relative tolerance in [1e-14, 0.1].
+        atol: absolute tolerance; rtol/1000 if not given.
+        fsm: "level", "edge" or "memoryless" (spec 1.2).
+        collisions: rule for several contacts at once.
+        solver: "compiled", "ida" or "cvode".
+        samples: times of the rows; None for every step and both sides of every event.
+        inputs: (times, values) held from each time on; None for zero.
+        ledger: keep the energy account.
+        shortcuts: closed-form arcs where the scene is affine.
+        implicit: the implicit method where the explicit one is bound by stability.
+        index: 1, or 3 for bilateral rows under "ida".
+        max_step: longest step, s.
+        max_steps: bound on steps.
+        time_limit: bound on wall time, s.
+    """
+
+    t_end: float
+    rtol: float = 1e-9
+    atol: float | None = None
+    fsm: str = "level"
+    collisions: str = "resolved"
+    solver: str = "compiled"
+    samples: ArrayLike | None = None
+    inputs: tuple[ArrayLike, ArrayLike] | None = None
+    ledger: bool = False
+    shortcuts: bool = True
+    implicit: bool = True
+    index: int = 1
+    max_step: float = math.inf
+    max_steps: int = 1_000_000
+    time_limit: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check every option.
+
+        Raises:
+            UnknownName: for a word that is not among the valid ones.
+            InvalidValue: for a number outside its range.
+        """
+        known("machine (fsm)", self.fsm, FSMS)
+        known("collision rule", self.collisions, COLLISIONS)
+        known("solver", self.solver, SOLVERS)
+        within("rtol", self.rtol, *TOLERANCES)
+        if self.atol is not None:
+            within("atol", self.atol, 0.0, math.inf, open_low=True)
+        within("t_end", self.t_end, 0.0, math.inf, open_low=True)
+        within("max_step", self.max_step, 0.0, math.inf, open_low=True, infinite=True)
+        within("max_steps", self.max_steps, 1, math.inf, infinite=True)
+        within("time_limit", self.time_limit, 0.0, math.inf, open_low=True, infinite=True)
+        if self.index not in (1, 3) or (self.index == 3 and self.solver != "ida"):
+            raise InvalidValue(f"index is {self.index} with solver {self.solver!r}; valid: 1, or 3 with 'ida'.")
+
+    @property
+    def tolerance(self) -> float:
+        """The absolute tolerance in force."""
+        return ATOL_PART * self.rtol if self.atol is None else self.atol
+
+    def grid(self) -> Floats:
+        """The sample times, checked: increasing, inside [0, t_end]."""
+        times: Floats = frozen("simulate", "samples", () if self.samples is None else self.samples, (None,))
+        if len(times) and not (np.all(np.diff(times) >= 0) and times[0] >= 0 and times[-1] <= self.t_end):
+            raise InvalidValue(f"samples must increase inside [0, {self.t_end:g}] s.")
+        return times
+
+    def schedule(self, system: System) -> tuple[Floats, Floats]:
+        """Times (m,) and values (m, nu) of the inputs, checked."""
+        if self.inputs is None:
+            return np.zeros(0), np.zeros((0, system.inputs))
+        times: Floats = frozen("inputs", "times", self.inputs[0], (None,))
+        values: Floats = frozen("inputs", "values", self.inputs[1], (len(times), system.inputs))
+        if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0) and np.all(np.isfinite(values))):
+            raise InvalidValue("inputs must be finite and their times strictly increasing.")
+        return times, values
+
+
+def known(kind: str, name: str, names: Iterable[str]) -> None:
+    """Raise UnknownName unless `name` is among `names`."""
+    if name not in names:
+        raise UnknownName(kind, name, names)
+
+
+def within(
+    name: str, value: float, low: float, high: float, *, open_low: bool = False, infinite: bool = False
+) -> None:
+    """Raise InvalidValue unless low <= value <= high (low itself excluded if open) and value is finite."""
+    good = isinstance(value, (int, float, np.integer, np.floating)) and low <= value <= high
+    good = good and not (open_low and value == low) and (infinite or math.isfinite(value))
+    if not good:
+        raise InvalidValue(f"{name} is {value!r}; valid: {'(' if open_low else '['}{low:g}, {high:g}].")

@@ -1,0 +1,171 @@
+"""Driving the compiled loop: slices, growing buffers, bounds, and the result as a Trajectory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Event, Ledger, Mode, Outcome, Trajectory
+from crossbody.reference._kinds import Bytes, Floats, Index
+from crossbody.reference._options import FSMS, Options
+from crossbody.reference._program import entry, program
+from crossbody.reference._system import System, initial_modes
+from crossbody.reference.core import layout
+
+SLICE = 2000  # steps between two looks at the clock: well below 0.1 s
+ROWS, EVENTS, HISTORY = 256, 256, 64
+_OUTCOMES = {
+    layout.STEP_TOO_SMALL: Outcome.STEP_TOO_SMALL,
+    layout.NOT_FINITE: Outcome.NOT_FINITE,
+    layout.ILL_POSED: Outcome.ILL_POSED,
+    layout.MODE_CYCLE: Outcome.MODE_CYCLE,
+    layout.DIVERGED: Outcome.DIVERGED,
+}
+_COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations")
+
+
+class CompiledRun:
+    """One prepared run of the compiled loop; `start` and `go` may be repeated, with the same result.
+
+    Args:
+        system: the mechanism.
+        q0, v0 (n,): start.
+        options: what is asked.
+    """
+
+    def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
+        self.system, self.options = system, options
+        self.start_state = np.concatenate([q0, v0])
+        self.samples = options.grid()
+        self.inputs_t, self.inputs_u = options.schedule(system)
+        n, nc = system.n, system.nc
+        self.nz = nc + 2 if options.ledger else 0
+        self.W, self.I = layout.workspace(
+            n, nc, system.inputs, system.mass_block, self.nz, system.memory, system.scratch
+        )
+        self.width = 1 + 2 * n + 2 * nc + 2 + self.nz
+        self.history = np.zeros((max(HISTORY, 4 * nc) + 1, nc), dtype=np.int8)
+        natural = options.samples is None
+        self.out = np.zeros((ROWS if natural else len(self.samples) + 1, self.width))
+        self.modes = np.zeros((len(self.out), nc), dtype=np.int8)
+        self.events_t = np.zeros(EVENTS + 16 * nc)
+        self.events = np.zeros((len(self.events_t), 3), dtype=np.int64)
+        self.template = self._state_template(natural)
+        self.fixed = (
+            np.array(system.p), np.array(system.alpha), np.array(system.beta),
+            np.array(system.unilateral), np.array(system.follows), np.array(self.inputs_t), np.array(self.inputs_u),
+            np.array(self.samples), self.W, self.I,
+        )  # fmt: skip
+        self.call: Callable[..., int] = partial(program(), *system.kernels.values())
+
+    def _state_template(self, natural: bool) -> Any:
+        system, options = self.system, self.options
+        state = np.zeros(1, layout.STATE)
+        values = {
+            "n": system.n, "nc": system.nc, "nu": system.inputs, "k": system.mass_block, "nz": self.nz,
+            "ns": system.memory, "nw": system.scratch, "fsm": FSMS.index(options.fsm),
+            "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
+            "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
+            "ledger": options.ledger, "has_control": system.control is not None, "rtol": options.rtol,
+            "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step, "tick": system.tick,
+        }  # fmt: skip
+        for name, value in values.items():
+            state[name] = value
+        return state
+
+    def start(self) -> None:
+        """Back to the beginning."""
+        self.state = self.template.copy()
+        self.mode = initial_modes(self.system)
+        self.W[:] = 0.0
+        self.W[: 2 * self.system.n] = self.start_state
+
+    def slice(self, budget: int) -> int:
+        """Advance by at most `budget` steps; the loop's return code."""
+        return int(
+            self.call(
+                self.state, *self.fixed, self.mode, self.history,
+                self.out, self.modes, self.events_t, self.events, budget,
+            )
+        )  # fmt: skip
+
+    def warm(self) -> None:
+        """Prepare for many repetitions: build the kernels into the program and run once."""
+        self.call = entry(tuple(self.system.kernels.values()))
+        self.go()
+
+    def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
+        """Run to the end; how it ended, and the wall time in s."""
+        began = time.perf_counter()
+        self.start()
+        outcome = self._slices(began, progress)
+        return outcome, time.perf_counter() - began
+
+    def _slices(self, began: float, progress: Callable[[float], None] | None) -> Outcome:
+        limit = self.options.max_steps
+        try:
+            while True:
+                steps = int(self.state["steps"][0])
+                if steps >= limit:
+                    return Outcome.STEP_LIMIT
+                code = self.slice(min(SLICE, limit - steps))
+                if code == layout.DONE:
+                    return Outcome.FINISHED
+                if code < 0:
+                    return _OUTCOMES[code]
+                self._grow(code)
+                if time.perf_counter() - began > self.options.time_limit:
+                    return Outcome.TIME_LIMIT
+                if progress is not None:
+                    progress(float(self.state["t"][0]) / self.options.t_end)
+        except KeyboardInterrupt:
+            return Outcome.INTERRUPTED
+
+    def _grow(self, code: int) -> None:
+        if code == layout.ROWS_FULL:
+            self.out = np.concatenate([self.out, np.zeros_like(self.out)])
+            self.modes = np.concatenate([self.modes, np.zeros_like(self.modes)])
+        elif code == layout.EVENTS_FULL:
+            self.events_t = np.concatenate([self.events_t, np.zeros_like(self.events_t)])
+            self.events = np.concatenate([self.events, np.zeros_like(self.events)])
+
+    def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
+        """What was recorded, as a Trajectory."""
+        n, nc = self.system.n, self.system.nc
+        state = self.state[0]
+        rows = self.out[: int(state["rows"])]
+        cuts = np.cumsum([1, n, n, nc, nc, 2])
+        t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
+        return Trajectory(
+            t=t[:, 0], q=q, v=v, gap=gap, lam=lam, energy=energy, mode=self.modes[: len(rows)],
+            events=self._event_list(), outcome=outcome, message=self._message(outcome),
+            steps=int(state["steps"]), wall_s=wall_s,
+            counts=MappingProxyType({name: int(state[name]) for name in _COUNTERS}),
+            ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
+            if self.nz
+            else None,
+        )  # fmt: skip
+
+    def _event_list(self) -> tuple[Event, ...]:
+        count = int(self.state["events"][0])
+        return tuple(
+            Event(t=t, contact=i, before=Mode(before), after=Mode(after))
+            for t, (i, before, after) in zip(
+                self.events_t[:count].tolist(), self.events[:count].tolist(), strict=True
+            )
+        )
+
+    def _message(self, outcome: Outcome) -> str:
+        if outcome is Outcome.FINISHED:
+            return ""
+        n = self.system.n
+        where = f"t = {float(self.state['t'][0]):.12g} s, q = {self.W[:n].tolist()}, v = {self.W[n : 2 * n].tolist()}"
+        if outcome is Outcome.MODE_CYCLE:
+            rows = np.flatnonzero(self.history[-1]).tolist()
+            return f"{outcome.advice} Rows {rows} at {where}."
+        return f"{outcome.advice} {where}."

@@ -1,0 +1,43 @@
+"""`simulate`: one motion of one mechanism."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from crossbody.cases import Trajectory
+from crossbody.reference._options import Options
+from crossbody.reference._system import System
+
+
+def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **options: Any) -> Trajectory:
+    """Integrate the hybrid penalty DAE of spec 1.1 from (q0, v0) at t = 0 to t_end.
+
+    Args:
+        system: the mechanism.
+        q0, v0 (n,): start, finite.
+        t_end: horizon, s, above 0.
+        options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples, ledger, ...
+
+    Returns:
+        The motion. Numerical failure is its `outcome`, with place and state in `message`.
+
+    Raises:
+        SceneError: if q0 or v0 has another shape or is not finite.
+        InvalidValue, UnknownName: for an option outside what it admits.
+    """
+    run = prepare(system, q0, v0, Options(t_end=t_end, **options))
+    return run.trajectory(*run.go())
+
+
+def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> Any:
+    """A run that can be repeated: everything that does not depend on time is decided here."""
+    start = [system.checked_state(name, value) for name, value in (("q0", q0), ("v0", v0))]
+    if options.solver == "compiled":
+        from crossbody.reference._run import CompiledRun
+
+        return CompiledRun(system, *start, options)
+    from crossbody.reference._sundials import SundialsRun
+
+    return SundialsRun(system, *start, options)

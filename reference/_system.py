@@ -1,0 +1,184 @@
+"""A mechanism: its kernels, its parameters, and the law of each of its constraint rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from crossbody.cases import SceneError
+from crossbody.cases._arrays import frozen
+from crossbody.reference import kernels as kernel_types
+from crossbody.reference._kinds import Bytes, Floats, Index
+from crossbody.reference.systems import _none
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class System:
+    """The equations of one mechanism, ready for `simulate`.
+
+    Attributes:
+        n: number of coordinates.
+        dynamics, gaps, rows, energy, power, solve, control: kernels as in `crossbody.reference.kernels`.
+        parameters: p of the kernels: an array, or names with values in the kernels' order.
+        a0, a1, a2 (nc,): slow constants of every row; a number serves all rows (spec 1.1).
+        b0, b1, b2 (nc,): fast constants of COLLISION; b0 = 0 where a row has one set only.
+        unilateral (nc,): False for a row that is always on.
+        follows (nc,): index of the row whose activity this one shares (a slip row follows its normal row); -1 none.
+        mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
+        inputs: nu, length of u.
+        scratch: length of w.
+        memory: length of the controller's state s.
+        tick: sampling period of `control`, s.
+        constant_mass: M does not depend on q: it is factored once.
+        affine: M and H are constant, f depends on u alone: arcs in closed form are admitted.
+
+    Raises:
+        SceneError: naming the field, its shape and the shape wanted; or the kernel that does not fill what it must.
+    """
+
+    n: int
+    dynamics: Any
+    gaps: Any = _none.gaps
+    rows: Any = _none.rows
+    energy: Any = _none.energy
+    power: Any = _none.power
+    solve: Any = None
+    control: Any = None
+    parameters: ArrayLike | Mapping[str, float] = ()
+    a0: ArrayLike = ()
+    a1: ArrayLike = ()
+    a2: ArrayLike = 0.0
+    b0: ArrayLike = 0.0
+    b1: ArrayLike = 0.0
+    b2: ArrayLike = 0.0
+    unilateral: ArrayLike = True
+    follows: ArrayLike = -1
+    mass_block: int = 0
+    inputs: int = 0
+    scratch: int = 0
+    memory: int = 0
+    tick: float = 0.0
+    constant_mass: bool = False
+    affine: bool = False
+    p: Floats = field(init=False)
+    alpha: Floats = field(init=False)
+    beta: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Bring every field to its shape and check it once."""
+        put = object.__setattr__
+        nc = np.size(self.a0)
+        self._check_sizes()
+        for name in ("a0", "a1", "a2", "b0", "b1", "b2"):
+            put(self, name, self._row_field(name, nc, np.float64))
+        put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
+        put(self, "follows", self._row_field("follows", nc, np.int64))
+        values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
+        put(self, "p", frozen("System", "parameters", values, (None,)))
+        put(self, "mass_block", self.mass_block or self.n)
+        put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
+        put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
+        self._check_values()
+        self._check_kernels()
+
+    @property
+    def nc(self) -> int:
+        """Number of constraint rows."""
+        return len(self.alpha)
+
+    @property
+    def kernels(self) -> dict[str, Any]:
+        """The seven functions in the order of `kernels.NAMES`; what is absent is a stand-in."""
+        return {name: getattr(self, name) or getattr(_none, name) for name in kernel_types.NAMES}
+
+    def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
+        value = getattr(self, name)
+        full = np.full(nc, value) if np.ndim(value) == 0 else value
+        return frozen("System", name, full, (nc,), dtype)
+
+    def _check_sizes(self) -> None:
+        for name, low in (("n", 1), ("mass_block", 0), ("inputs", 0), ("scratch", 0), ("memory", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, (int, np.integer)) or value < low:
+                raise SceneError(f"System.{name} is {value!r}; it must be a whole number of at least {low}.")
+        if self.mass_block and self.n % self.mass_block:
+            raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")
+
+    def _check_values(self) -> None:
+        for name in ("alpha", "beta", "p"):
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise SceneError(f"System.{name} holds a value that is not finite.")
+        for name in ("alpha", "beta"):
+            if np.any(getattr(self, name) < 0.0):
+                letter = name[0]
+                raise SceneError(f"System.{letter}0, {letter}1, {letter}2 must be at least 0.")
+        follows: Index = np.asarray(self.follows)
+        if np.any(follows >= self.nc) or np.any(follows[follows >= 0] == np.flatnonzero(follows >= 0)):
+            raise SceneError(f"System.follows is {follows.tolist()}; it must name other rows, below {self.nc}.")
+        if self.control is not None and not self.tick > 0.0:
+            raise SceneError(f"System.tick is {self.tick}; a system with a controller needs a period above 0 s.")
+
+    def _check_kernels(self) -> None:
+        for name, kernel in self.kernels.items():
+            wanted = kernel_types.REAL[name]
+            if wanted.args not in getattr(kernel, "signatures", ()):
+                raise SceneError(
+                    f"System.{name} is not a kernel of the right signature; "
+                    f"declare it with @crossbody.reference.kernels.{name}."
+                )
+
+    def mass_matrix(self, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None) -> Floats:
+        """M(q) as a dense (n, n) matrix."""
+        return self.terms(q, v, u)[0]
+
+    def terms(self, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None) -> tuple[Floats, Floats]:
+        """M(q) dense (n, n) and f(q, v, u) (n,) at t = 0."""
+        n, k = self.n, self.mass_block
+        blocks, f = np.zeros((n, k)), np.zeros(n)
+        self.dynamics(0.0, *self._state(q, v), self._input(u), self.p, blocks, f, np.zeros(self.scratch))
+        M = np.zeros((n, n))
+        for b in range(0, n, k):
+            M[b : b + k, b : b + k] = blocks[b : b + k]
+        return M, f
+
+    def constraint(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
+        """All rows at (q, v): H (nc, n), h (nc,) and H' v (nc,)."""
+        H, h, Hdv = np.zeros((self.nc, self.n)), np.zeros(self.nc), np.zeros(self.nc)
+        q_, v_ = self._state(q, v)
+        w = np.zeros(self.scratch)
+        blocks, f = np.zeros((self.n, self.mass_block)), np.zeros(self.n)
+        self.dynamics(0.0, q_, v_, self._input(None), self.p, blocks, f, w)
+        self.rows(0.0, q_, v_, self.p, w, np.arange(self.nc), self.nc, H, h, Hdv)
+        return H, h, Hdv
+
+    def gap(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats]:
+        """Gaps and their rates (nc,) at (q, v)."""
+        h, hd = np.zeros(self.nc), np.zeros(self.nc)
+        self.gaps(0.0, *self._state(q, v), self.p, h, hd)
+        return h, hd
+
+    def checked_state(self, name: str, value: ArrayLike) -> Floats:
+        """A copy of q0 or v0.
+
+        Raises:
+            SceneError: if it has another shape than (n,) or is not finite.
+        """
+        array: Floats = np.array(frozen("simulate", name, value, (self.n,)))
+        if not np.all(np.isfinite(array)):
+            raise SceneError(f"simulate.{name} is {array.tolist()}; it must be finite.")
+        return array
+
+    def _state(self, q: ArrayLike, v: ArrayLike | None) -> tuple[Floats, Floats]:
+        return self.checked_state("q", q), self.checked_state("v", np.zeros(self.n) if v is None else v)
+
+    def _input(self, u: ArrayLike | None) -> Floats:
+        return np.array(frozen("simulate", "u", np.zeros(self.inputs) if u is None else u, (self.inputs,)))
+
+
+def initial_modes(system: System) -> Bytes:
+    """FREE for every unilateral row, BILATERAL for every other; settling does the rest."""
+    return np.where(np.asarray(system.unilateral, dtype=bool), 0, 5).astype(np.int8)

@@ -1,0 +1,158 @@
+"""Acceleration and multipliers: the right-hand side of the reduced model (spec 1.1).
+
+    (H_A M^-1 H_A^T) lam_A = -( H_A M^-1 f + H_A' v + a1 h' + a0 h + a2 h^3 )_A
+    v' = M^-1 ( f + H_A^T lam_A )
+
+Only active rows are evaluated and solved.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Array, Bytes, Floats
+from crossbody.reference.core.algebra import factor_mass, factor_schur, solve_mass, solve_schur, span
+from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
+
+
+# numba compiles a function anew for every literal that it is called with; numpy's integers are values, not literals.
+OWN, GENERAL = np.arange(2)
+
+
+@inlined
+def is_active(mode: int) -> bool:
+    """CONTACT, COLLISION and BILATERAL rows carry a multiplier."""
+    return bool(mode == CONTACT or mode == COLLISION or mode == BILATERAL)
+
+
+@inlined
+def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
+    """The fast constants for a row in COLLISION, the slow ones for every other."""
+    for i in range(s.nc):
+        for j in range(3):
+            w.law[i, j] = m.beta[i, j] if mode[i] == COLLISION else m.alpha[i, j]
+
+
+@compiled
+def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
+    """List the active rows and put their constants in force; a row that follows another shares its mode."""
+    na = 0
+    for i in range(s.nc):
+        if m.follows[i] >= 0:
+            mode[i] = mode[m.follows[i]]
+        if is_active(mode[i]):
+            w.idx[na] = i
+            na += 1
+    laws_in_force(s, m, w, mode)
+    w.H[:na] = 0.0  # so that kernels need not write the zeros of H
+    s.na = na
+
+
+@inlined
+def scatter(s: Any, w: Work, lam: Array) -> None:
+    """lam of all rows from lam of the active ones."""
+    for i in range(s.nc):
+        lam[i] = 0.0
+    for j in range(s.na):
+        lam[w.idx[j]] = w.la[j]
+
+
+@inlined
+def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+    """vd = M^-1 f; leaves the factor of M."""
+    dynamics(t, q, v, w.u, p, w.M, w.f, w.w)
+    if not (s.constant_mass and s.have_mass):
+        if factor_mass(w.M, w.L, s.n, s.k) != 0:
+            return 1
+        s.have_mass = 1
+    for i in range(s.n):
+        w.vd[i] = w.f[i]
+    solve_mass(w.L, w.vd, s.k, 0, s.n)
+    return 0
+
+
+@inlined
+def _rate_and_drive(s: Any, w: Work, j: int, v: Array, first: int, last: int) -> None:
+    """Rate h' of active row j, and the right-hand side of its multiplier with the size of its terms."""
+    i = w.idx[j]
+    rate, push = 0.0, 0.0
+    for c in range(first, last):
+        rate += w.H[j, c] * v[c]
+        push += w.H[j, c] * w.vd[c]
+    h = w.ha[j]
+    spring = (w.law[i, 0] + w.law[i, 2] * h * h) * h
+    w.hda[j] = rate
+    w.r[j] = -(push + w.Hdv[j] + w.law[i, 1] * rate + spring)
+    w.scale[j] = abs(push) + abs(w.Hdv[j]) + w.law[i, 1] * abs(rate) + abs(spring)
+
+
+@inlined
+def assemble(rows: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+    """Evaluate the active rows and factor their Schur complement G = H M^-1 H^T."""
+    na = s.na
+    rows(t, q, v, p, w.w, w.idx, na, w.H, w.ha, w.Hdv)
+    for j in range(na):
+        first, last = span(w.H[j], s.n, s.k)
+        _rate_and_drive(s, w, j, v, first, last)
+        for c in range(s.n):
+            w.X[j, c] = w.H[j, c]
+        solve_mass(w.L, w.X[j], s.k, first, last)
+        for b in range(j + 1):
+            total = 0.0
+            for c in range(first, last):
+                total += w.X[j, c] * w.H[b, c]
+            w.G[j, b] = total
+    return factor_schur(w.G, na)
+
+
+@inlined
+def _one_row(rows: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+    """One coordinate, one active row: everything is scalar."""
+    rows(t, q, v, p, w.w, w.idx, 1, w.H, w.ha, w.Hdv)
+    H, h, i = w.H[0, 0], w.ha[0], w.idx[0]
+    push, rate = H * w.vd[0], H * v[0]
+    damping, spring = w.law[i, 1] * rate, (w.law[i, 0] + w.law[i, 2] * h * h) * h
+    X = H / (w.L[0, 0] * w.L[0, 0])
+    w.X[0, 0], w.hda[0] = X, rate
+    w.r[0] = -(push + w.Hdv[0] + damping + spring)
+    w.scale[0] = abs(push) + abs(w.Hdv[0]) + abs(damping) + abs(spring)
+    G = H * X
+    if not G > 0.0:
+        return 1
+    w.G[0, 0] = G**0.5
+    w.la[0] = w.r[0] / G
+    w.vd[0] += X * w.la[0]
+    return 0
+
+
+@compiled
+def accelerate(
+    dynamics: Any, rows: Any, solve: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array, general: int
+) -> int:
+    """Fill w.vd, and w.la, w.hda of the active rows; 1 if ill posed.
+
+    Args:
+        general: GENERAL to leave H, X and the factor of G even if the system brings its own algebra, else OWN.
+    """
+    s.rhs += 1
+    na = s.na
+    if s.has_solve and not general:
+        dynamics(t, q, v, w.u, m.p, w.M, w.f, w.w)
+        return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
+    if _free(dynamics, s, m.p, w, t, q, v) != 0:
+        return 1
+    if na == 0:
+        return 0
+    if s.n == 1:
+        return _one_row(rows, s, m.p, w, t, q, v)
+    if assemble(rows, s, m.p, w, t, q, v) != 0:
+        return 1
+    solve_schur(w.G, na, w.r, w.la)
+    for j in range(na):
+        lam = w.la[j]
+        for c in range(s.n):
+            w.vd[c] += w.X[j, c] * lam
+    return 0

@@ -1,0 +1,138 @@
+"""Linear algebra of the constrained step: block-diagonal mass matrix, Schur complement of the active rows.
+
+The mass matrix is stored as M (n, k): row i holds row i of its own k x k block on the diagonal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Array, Floats, Index
+
+RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
+
+
+@compiled
+def factor_mass(M: Floats, L: Floats, n: int, k: int) -> int:
+    """Cholesky factor of every block; 1 if one is not positive definite."""
+    for b in range(0, n, k):
+        for i in range(k):
+            for j in range(i + 1):
+                total = M[b + i, j]
+                for m in range(j):
+                    total -= L[b + i, m] * L[b + j, m]
+                if i == j:
+                    if not total > RANK * M[b + i, i]:  # so that NaN fails too
+                        return 1
+                    L[b + i, i] = np.sqrt(total)
+                else:
+                    L[b + i, j] = total / L[b + j, j]
+    return 0
+
+
+@compiled
+def solve_mass(L: Floats, x: Array, k: int, first: int, last: int) -> None:
+    """x := M^-1 x, in place, for the blocks from coordinate `first` up to `last`."""
+    for b in range(first, last, k):
+        for i in range(k):
+            total = x[b + i]
+            for m in range(i):
+                total -= L[b + i, m] * x[b + m]
+            x[b + i] = total / L[b + i, i]
+        for i in range(k - 1, -1, -1):
+            total = x[b + i]
+            for m in range(i + 1, k):
+                total -= L[b + m, i] * x[b + m]
+            x[b + i] = total / L[b + i, i]
+
+
+@inlined
+def span(H: Array, n: int, k: int) -> tuple[int, int]:
+    """First coordinate of the first block and end of the last block in which a row of H is not zero."""
+    first = 0
+    while first < n and H[first] == 0.0:
+        first += 1
+    last = n
+    while last > first and H[last - 1] == 0.0:
+        last -= 1
+    return first - first % k, (last + k - 1) // k * k
+
+
+@compiled
+def factor_schur(G: Floats, na: int) -> int:
+    """Cholesky factor of the Schur complement in its lower triangle; 1 if it lost rank."""
+    for i in range(na):
+        for j in range(i + 1):
+            total = G[i, j]
+            for m in range(j):
+                total -= G[i, m] * G[j, m]
+            if i == j:
+                if not total > RANK * G[i, i]:
+                    return 1
+                G[i, i] = np.sqrt(total)
+            else:
+                G[i, j] = total / G[j, j]
+    return 0
+
+
+@compiled
+def solve_schur(G: Floats, na: int, r: Array, x: Array) -> None:
+    """x = G^-1 r from the factor of `factor_schur`."""
+    for i in range(na):
+        total = r[i]
+        for m in range(i):
+            total -= G[i, m] * x[m]
+        x[i] = total / G[i, i]
+    for i in range(na - 1, -1, -1):
+        total = x[i]
+        for m in range(i + 1, na):
+            total -= G[m, i] * x[m]
+        x[i] = total / G[i, i]
+
+
+@compiled
+def inverse_diagonal(G: Floats, na: int, i: int, x: Array) -> float:
+    """(G^-1)_ii from the factor of `factor_schur`; x is scratch."""
+    total = 0.0
+    for j in range(i, na):
+        part = 1.0 if j == i else 0.0
+        for m in range(i, j):
+            part -= G[j, m] * x[m]
+        x[j] = part / G[j, j]
+        total += x[j] * x[j]
+    return total
+
+
+@compiled
+def factor_lu(A: Floats, n: int, pivot: Index) -> int:
+    """LU factors with partial pivoting, in place; 1 if singular."""
+    for c in range(n):
+        best = c
+        for i in range(c + 1, n):
+            if abs(A[i, c]) > abs(A[best, c]):
+                best = i
+        pivot[c] = best
+        if not abs(A[best, c]) > 0.0:
+            return 1
+        if best != c:
+            for j in range(n):
+                A[c, j], A[best, j] = A[best, j], A[c, j]
+        for i in range(c + 1, n):
+            A[i, c] /= A[c, c]
+            for j in range(c + 1, n):
+                A[i, j] -= A[i, c] * A[c, j]
+    return 0
+
+
+@compiled
+def solve_lu(A: Floats, n: int, pivot: Index, x: Array) -> None:
+    """x := A^-1 x, in place."""
+    for c in range(n):
+        x[c], x[pivot[c]] = x[pivot[c]], x[c]
+        for i in range(c + 1, n):
+            x[i] -= A[i, c] * x[c]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= A[i, j] * x[j]
+        x[i] /= A[i, i]

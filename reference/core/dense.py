@@ -1,0 +1,65 @@
+"""The state anywhere inside the step just taken, whatever method took it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Array
+from crossbody.reference.core import dop853, esdirk, exact
+from crossbody.reference.core.layout import EXACT, EXPLICIT, Model, Work
+
+_END = esdirk.STAGES - 1  # the stage whose derivative is that of the step's end
+
+
+@compiled
+def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
+    """Make the dense output of the step, once; 1 if a stage of it is ill posed."""
+    if s.have_dense or s.method != EXPLICIT:
+        return 0
+    s.have_dense = 1
+    return dop853.make_dense(K, s, m, w)
+
+
+@inlined
+def _quintic(n: int, w: Work, theta: float, h: float, out: Array) -> None:
+    """Hermite interpolant of q, v and v' at both ends; its derivative is v."""
+    x, x2 = theta, theta * theta
+    x3 = x2 * x
+    end = x3 * (10.0 - 15.0 * x + 6.0 * x2)
+    v0, v1 = x * (1.0 - x2 * (6.0 - 8.0 * x + 3.0 * x2)), x3 * (-4.0 + 7.0 * x - 3.0 * x2)
+    a0, a1 = x2 * (0.5 - 1.5 * x + 1.5 * x2 - 0.5 * x3), x3 * (0.5 - x + 0.5 * x2)
+    end_d = 30.0 * x2 * (1.0 - x) ** 2
+    v0_d, v1_d = 1.0 - x2 * (18.0 - 32.0 * x + 15.0 * x2), x2 * (-12.0 + 28.0 * x - 15.0 * x2)
+    a0_d, a1_d = x * (1.0 - 4.5 * x + 6.0 * x2 - 2.5 * x3), x2 * (1.5 - 4.0 * x + 2.5 * x2)
+    for i in range(n):
+        dq, v, ve = w.y1[i] - w.y[i], h * w.y[n + i], h * w.y1[n + i]
+        a, ae = h * h * w.k[0, n + i], h * h * w.k[_END, n + i]
+        out[i] = w.y[i] + dq * end + v * v0 + ve * v1 + a * a0 + ae * a1
+        out[n + i] = (dq * end_d + v * v0_d + ve * v1_d + a * a0_d + ae * a1_d) / h
+
+
+@compiled
+def state(s: Any, w: Work, theta: float, out: Array) -> None:
+    """out = (q, v) at the part theta of the step."""
+    if s.method == EXACT:
+        exact.evaluate(s, w, theta * s.hs, out)
+    elif theta == 1.0:
+        for i in range(2 * s.n):
+            out[i] = w.y1[i]
+    elif s.method == EXPLICIT:
+        dop853.evaluate(w.y, w.F, theta, out)
+    else:
+        _quintic(s.n, w, theta, s.hs, out)
+
+
+@inlined
+def ledger(s: Any, w: Work, theta: float, out: Array) -> None:
+    """out = the ledger at the part theta of the step."""
+    if s.method == EXPLICIT:
+        dop853.evaluate(w.z, w.Fz, theta, out)
+        return
+    x, h = theta, s.hs
+    for i in range(s.nz):
+        dz, p0, p1 = w.z1[i] - w.z[i], h * w.kz[0, i], h * w.kz[_END, i]
+        out[i] = w.z[i] + x * (p0 + x * (3.0 * dz - 2.0 * p0 - p1 + x * (p0 + p1 - 2.0 * dz)))

@@ -1,0 +1,142 @@
+"""One explicit step of DOP853 and the coefficients of its dense output (see dop853_table)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Array, Floats
+from crossbody.reference.core.acceleration import OWN, accelerate
+from crossbody.reference.core.dop853_table import DENSE_STAGES, E3, E5, STAGES, A, C, D
+from crossbody.reference.core.layout import Model, Work
+
+# The columns that are not zero, row by row: most of A is.
+_COUNT = np.array([np.count_nonzero(row) for row in A])
+_COLUMN = np.array([np.r_[np.flatnonzero(row), np.zeros(16 - np.count_nonzero(row))] for row in A], dtype=np.int64)
+_WEIGHT = np.array([np.r_[row[row != 0], np.zeros(16 - np.count_nonzero(row))] for row in A])
+
+
+START, SECOND = np.arange(2)  # stages, as values
+
+
+@compiled
+def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> int:
+    """k[stage] = (v, v'), and the powers of the ledger if it is kept."""
+    n = s.n
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[:n], y[n:], OWN) != 0:
+        return 1
+    for i in range(n):
+        w.k[stage, i] = y[n + i]
+        w.k[stage, n + i] = w.vd[i]
+    if s.ledger:
+        powers(K, s, m, w, t, y, stage)
+    return 0
+
+
+@inlined
+def powers(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> None:
+    """kz[stage] = power of every row's multiplier, of the inputs, of the damping."""
+    nc = s.nc
+    for i in range(nc):
+        w.kz[stage, i] = 0.0
+    for j in range(s.na):
+        w.kz[stage, w.idx[j]] = w.la[j] * w.hda[j]
+    K.power(t, y[: s.n], y[s.n :], w.u, m.p, w.e)
+    w.kz[stage, nc] = w.e[0]
+    w.kz[stage, nc + 1] = w.e[1]
+
+
+@compiled
+def _combine(base: Array, k: Floats, stage: int, h: float, out: Array) -> None:
+    """out = base + h sum_j A[stage, j] k[j]."""
+    for i in range(len(base)):
+        total = 0.0
+        for c in range(_COUNT[stage]):
+            total += _WEIGHT[stage, c] * k[_COLUMN[stage, c], i]
+        out[i] = base[i] + h * total
+
+
+@inlined
+def _error(s: Any, w: Work, h: float) -> float:
+    """Hairer's norm of the two embedded estimates; 1 is the tolerance. NaN where a stage was NaN."""
+    sum5, sum3 = 0.0, 0.0
+    size = 2 * s.n
+    for i in range(size):
+        e5, e3 = 0.0, 0.0
+        for j in range(STAGES):
+            e5 += E5[j] * w.k[j, i]
+            e3 += E3[j] * w.k[j, i]
+        scale = s.atol + s.rtol * max(abs(w.y[i]), abs(w.y1[i]))
+        sum5 += (e5 / scale) ** 2
+        sum3 += (e3 / scale) ** 2
+    if sum5 == 0.0 and sum3 == 0.0:
+        return 0.0
+    return float(abs(h) * sum5 / np.sqrt((sum5 + 0.01 * sum3) * size))
+
+
+@inlined
+def _watch(s: Any, w: Work) -> None:
+    """Remember the least and the largest multiplier at the stages: a free filter for events."""
+    for j in range(s.na):
+        i = w.idx[j]
+        w.lo[i] = min(w.lo[i], w.la[j])
+        w.hi[i] = max(w.hi[i], w.la[j])
+
+
+@compiled
+def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
+    """From y and k[0] to y1; returns the error in units of the tolerance, -1 if a stage is ill posed."""
+    for i in range(s.nc):
+        w.lo[i] = w.hi[i] = w.lam0[i]
+    for stage in range(1, STAGES):
+        _combine(w.y, w.k, stage, h, w.ys)
+        if derivative(K, s, m, w, s.t + C[stage] * h, w.ys, stage) != 0:
+            return -1.0
+        _watch(s, w)
+    _combine(w.y, w.k, STAGES, h, w.y1)
+    if s.ledger:
+        _combine(w.z, w.kz, STAGES, h, w.z1)
+    return _error(s, w, h)
+
+
+@compiled
+def make_dense(K: Any, s: Any, m: Model, w: Work) -> int:
+    """Coefficients of the dense output over the step just taken; k[12] = f(y1) must be there."""
+    h, t = s.hs, s.t_old
+    for stage in range(STAGES + 1, DENSE_STAGES):
+        _combine(w.y, w.k, stage, h, w.ys)
+        if derivative(K, s, m, w, t + C[stage] * h, w.ys, stage) != 0:
+            return 1
+    _polynomial(w.y, w.y1, w.k, h, w.F)
+    if s.ledger:
+        _polynomial(w.z, w.z1, w.kz, h, w.Fz)
+    return 0
+
+
+@inlined
+def _polynomial(y: Array, y1: Array, k: Floats, h: float, F: Floats) -> None:
+    for i in range(len(y)):
+        delta = y1[i] - y[i]
+        F[0, i] = delta
+        F[1, i] = h * k[0, i] - delta
+        F[2, i] = 2.0 * delta - h * (k[STAGES, i] + k[0, i])
+        for r in range(4):
+            total = 0.0
+            for j in range(DENSE_STAGES):
+                total += D[r, j] * k[j, i]
+            F[3 + r, i] = h * total
+
+
+@compiled
+def evaluate(y: Array, F: Floats, theta: float, out: Array) -> None:
+    """out = the dense output at theta in [0, 1]."""
+    for i in range(len(y)):
+        value = F[6, i] * theta
+        value = (value + F[5, i]) * (1.0 - theta)
+        value = (value + F[4, i]) * theta
+        value = (value + F[3, i]) * (1.0 - theta)
+        value = (value + F[2, i]) * theta
+        value = (value + F[1, i]) * (1.0 - theta)
+        out[i] = y[i] + (value + F[0, i]) * theta

@@ -1,0 +1,226 @@
+"""One step of an L-stable, stiffly accurate ESDIRK pair of order 4(3) with six stages.
+
+The implicit half of ARK4(3)6L[2]SA: Kennedy and Carpenter, Applied Numerical Mathematics 44 (2003). Each stage solves
+for its velocity V alone, since Q = Q* + h g V:
+
+    V - V* - h g a(Q, V) = 0,    Newton matrix  I - h g da/dv - (h g)^2 da/dq
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Bytes
+from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, laws_in_force
+from crossbody.reference.core.algebra import factor_lu, solve_lu, solve_schur
+from crossbody.reference.core.dop853 import powers
+from crossbody.reference.core.layout import Model, Work
+
+GAMMA = 0.25
+STAGES = 6
+C = np.array([0.0, 1 / 2, 83 / 250, 31 / 50, 17 / 20, 1.0])
+A = np.zeros((6, 6))
+A[1, :1] = [1 / 4]
+A[2, :2] = [8611 / 62500, -1743 / 31250]
+A[3, :3] = [5012029 / 34652500, -2922 / 441125, 174375 / 388108]
+A[4, :4] = [15267082809 / 155376265600, -71443401 / 120774400, 730878875 / 902184768, 2285395 / 8070912]
+A[5, :5] = [82889 / 524892, 0.0, 15625 / 83664, 69875 / 102672, -2260 / 8211]
+B = np.array([*A[5, :5], GAMMA])
+E = B - np.array(
+    [4586570599 / 29645900160, 0.0, 178811875 / 945068544, 814220225 / 1159782912, -3700637 / 11593932, 61727 / 225920]
+)
+NEWTON_STEPS = 8
+
+
+@compiled
+def jacobian(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> int:
+    """Stiff part of da/dq and da/dv from the rows: -M^-1 H^T G^-1 (a0 + 3 a2 h^2, a1) H; the rest by differences."""
+    n = s.n
+    q, v = w.y[:n], w.y[n:]
+    w.Jq[:] = 0.0
+    w.Jv[:] = 0.0
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, q, v, GENERAL) != 0:
+        return 1
+    if s.full_jacobian and _smooth_part(K, s, m, w, mode) != 0:
+        return 1
+    for j in range(s.na):
+        _row_part(s, w, j)
+    s.have_jacobian = 1
+    return _newton_matrix(s, w, h)
+
+
+@inlined
+def _row_part(s: Any, w: Work, j: int) -> None:
+    """Subtract M^-1 H^T (G^-1)_.j (a0_j + 3 a2_j h_j^2, a1_j) H_j."""
+    i = w.idx[j]
+    w.r[: s.na] = 0.0
+    w.r[j] = 1.0
+    if s.n == 1:
+        w.la[0] = 1.0 / (w.G[0, 0] * w.G[0, 0])
+    else:
+        solve_schur(w.G, s.na, w.r, w.la)
+    spring = w.law[i, 0] + 3.0 * w.law[i, 2] * w.ha[j] ** 2
+    for a in range(s.n):
+        push = 0.0
+        for b in range(s.na):
+            push += w.X[b, a] * w.la[b]
+        for c in range(s.n):
+            w.Jq[a, c] -= push * spring * w.H[j, c]
+            w.Jv[a, c] -= push * w.law[i, 1] * w.H[j, c]
+
+
+@inlined
+def _smooth_part(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
+    """Central differences of the acceleration with the law switched off, so that no stiff term is differenced."""
+    n = s.n
+    w.law[:] = 0.0
+    failed = 0
+    for c in range(2 * n):
+        step = 1e-6 * max(1.0, abs(w.y[c]))
+        w.ys[:] = w.y
+        w.ys[c] = w.y[c] + step
+        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], GENERAL)
+        w.d[:] = w.vd
+        w.ys[c] = w.y[c] - step
+        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], GENERAL)
+        for a in range(n):
+            slope = (w.d[a] - w.vd[a]) / (2.0 * step)
+            if c < n:
+                w.Jq[a, c] = slope
+            else:
+                w.Jv[a, c - n] = slope
+    laws_in_force(s, m, w, mode)
+    failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:n], w.y[n:], GENERAL)
+    return failed
+
+
+@inlined
+def _newton_matrix(s: Any, w: Work, h: float) -> int:
+    g = h * GAMMA
+    for a in range(s.n):
+        for c in range(s.n):
+            w.J[a, c] = -g * (w.Jv[a, c] + g * w.Jq[a, c])
+        w.J[a, a] += 1.0
+    s.jacobian_scale = h
+    s.factorisations += 1
+    return factor_lu(w.J, s.n, w.pivot)
+
+
+@inlined
+def _residual(s: Any, w: Work, g: float) -> None:
+    """d = -(V - V* - g a) with V* kept in w.g."""
+    n = s.n
+    for a in range(n):
+        w.d[a] = w.g[a] + g * w.vd[a] - w.ys[n + a]
+
+
+@inlined
+def _update(s: Any, w: Work, g: float) -> float:
+    """Solve for the correction, apply it to V and Q; returns its size in units of the tolerance."""
+    n = s.n
+    solve_lu(w.J, n, w.pivot, w.d)
+    size = 0.0
+    for a in range(n):
+        w.ys[n + a] += w.d[a]
+        w.ys[a] += g * w.d[a]
+        size = max(size, abs(w.d[a]) / _scale(s, w, n + a), g * abs(w.d[a]) / _scale(s, w, a))
+    return size
+
+
+@inlined
+def _scale(s: Any, w: Work, i: int) -> float:
+    """Tolerance of component i, floored where rounding of a stiff row's gap would drown it."""
+    return float(max(s.atol + s.rtol * abs(w.y[i]), 1e-15 * (1.0 + abs(w.y[i]))))
+
+
+@inlined
+def _predict(s: Any, w: Work, stage: int, h: float) -> None:
+    """Q*, V* of the stage in ys and g, and a first V that continues the last acceleration."""
+    n, g = s.n, h * GAMMA
+    for a in range(n):
+        q, v = w.y[a], w.y[n + a]
+        for j in range(stage):
+            q += h * A[stage, j] * w.k[j, a]
+            v += h * A[stage, j] * w.k[j, n + a]
+        w.g[a] = v
+        w.ys[n + a] = v + g * w.k[stage - 1, n + a]
+        w.ys[a] = q + g * w.ys[n + a]
+
+
+@inlined
+def _stage(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> int:
+    """Newton for one stage; 0 done, 1 ill posed, 2 no convergence."""
+    n, g = s.n, h * GAMMA
+    _predict(s, w, stage, h)
+    before = np.inf
+    for _ in range(NEWTON_STEPS):
+        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t + C[stage] * h, w.ys[:n], w.ys[n:], OWN) != 0:
+            return 1
+        _residual(s, w, g)
+        size = _update(s, w, g)
+        if not size < 2.0 * before:  # NaN and divergence
+            return 2
+        if size < 0.01:
+            for a in range(n):
+                w.k[stage, a] = w.ys[n + a]
+                w.k[stage, n + a] = (w.ys[n + a] - w.g[a]) / g
+            if s.ledger:
+                powers(K, s, m, w, s.t + C[stage] * h, w.ys, stage)
+            return 0
+        before = size
+    return 2
+
+
+@inlined
+def _error(s: Any, w: Work, h: float) -> float:
+    """Embedded estimate, filtered by the Newton matrix so that decayed stiff modes do not count."""
+    n, g = s.n, h * GAMMA
+    for a in range(2 * n):
+        total = 0.0
+        for j in range(STAGES):
+            total += E[j] * w.k[j, a]
+        w.ys[a] = h * total
+    for a in range(n):
+        w.d[a] = w.ys[n + a]
+        for c in range(n):
+            w.d[a] += g * w.Jq[a, c] * w.ys[c]
+    solve_lu(w.J, n, w.pivot, w.d)
+    total = 0.0
+    for a in range(n):
+        e = (w.ys[a] + g * w.d[a]) / _scale(s, w, a)
+        ed = w.d[a] / _scale(s, w, n + a)
+        total += e * e + ed * ed
+    return float(np.sqrt(total / (2 * n)))
+
+
+@compiled
+def step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> float:
+    """From y and k[0] to y1; the error in units of the tolerance, -1 if ill posed, inf if Newton failed."""
+    if not s.have_jacobian:
+        if jacobian(K, s, m, w, mode, h) != 0:
+            return -1.0
+    elif s.jacobian_scale != h and _newton_matrix(s, w, h) != 0:
+        return -1.0
+    for i in range(s.nc):
+        w.lo[i] = w.hi[i] = w.lam0[i]
+    for stage in range(1, STAGES):
+        code = _stage(K, s, m, w, stage, h)
+        if code == 1:
+            return -1.0
+        if code == 2:
+            s.full_jacobian = 1
+            s.have_jacobian = 0
+            return np.inf
+        for j in range(s.na):
+            i = w.idx[j]
+            w.lo[i] = min(w.lo[i], w.la[j])
+            w.hi[i] = max(w.hi[i], w.la[j])
+    w.y1[:] = w.ys
+    for i in range(s.nz):
+        w.z1[i] = w.z[i]
+        for j in range(STAGES):
+            w.z1[i] += h * B[j] * w.kz[j, i]
+    return _error(s, w, h)

@@ -1,0 +1,369 @@
+"""Where inside the step just taken a machine must switch first.
+
+Every step is watched on its dense output at its ends and three points between. A gap is searched by the sign of its rate
+as well: where the rate changes sign the gap has its extremum, and it is the extremum that decides, so that a contact
+entirely inside one step is found. A fired transition is applied as such, never decided again from a value at round-off.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Bytes
+from crossbody.reference.core import dense
+from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, is_active, scatter
+from crossbody.reference.core.layout import (
+    BALLISTIC,
+    COLLISION,
+    CONTACT,
+    EDGE,
+    EXACT,
+    FREE,
+    LEVEL,
+    NEVER,
+    NODES,
+    Model,
+    Work,
+)
+from crossbody.reference.core.machine import ULP, active_mode, multiplier_if_active, released_mode, slow
+
+# Guards: each is positive until it fires.
+NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, RATE, RATE_DOWN = np.arange(10)
+HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT (spec 1.2)
+
+
+
+@inlined
+def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
+    """lam of the active row i at the state in ys."""
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
+        return np.nan
+    for j in range(s.na):
+        if w.idx[j] == i:
+            return float(w.la[j])
+    return np.nan
+
+
+@inlined
+def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
+    """b1 |h'| + b0 |h| - eps lam_i / (G^-1)_ii, positive while the elastic part of lam still counts."""
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], GENERAL) != 0:
+        return np.nan
+    for j in range(s.na):
+        if w.idx[j] == i:
+            elastic = w.law[i, 1] * abs(w.hda[j]) + w.law[i, 0] * abs(w.ha[j])
+            total = 0.0
+            for c in range(s.n):
+                total += w.H[j, c] * w.X[j, c]
+            return float(elastic - HANDOVER_PART * w.la[j] * total)
+    return np.nan
+
+
+@compiled
+def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> float:
+    """Value of one guard at the part theta of the step."""
+    dense.state(s, w, theta, w.ys)
+    t = s.t_old + theta * s.hs
+    q, v = w.ys[: s.n], w.ys[s.n :]
+    if kind == RELEASE:
+        return _multiplier(K, s, m, w, i, t)
+    if kind == HANDOVER:
+        return _handover(K, s, m, w, i, t)
+    if kind == PRESS:
+        return -multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+    K.gaps(t, q, v, m.p, w.gap, w.rate)
+    h, rate = w.gap[i], w.rate[i]
+    if kind == TOUCH:
+        return float(h)
+    if kind == LEAVE:
+        return float(-h)
+    if kind == RATE:
+        return float(-rate)
+    if kind == RATE_DOWN:
+        return float(rate)
+    closing = rate + slow(s)
+    if kind == TOUCH_INSIDE:
+        return float(max(h, closing))
+    return float(max(closing, -multiplier_if_active(K, s, m, w, mode, i, t, q, v)))
+
+
+@compiled
+def root(
+    K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, a: float, ga: float, b: float, gb: float
+) -> float:  # fmt: skip
+    """Where the guard fires between a (positive) and b (not positive): Chandrupatla's method, from the fired side.
+
+    Values are carried along with their places, so that rounding cannot change a bracket's sign.
+    """
+    resolution = max(ULP, ULP * abs(s.t_old) / s.hs)
+    x1, f1, x2, f2, x3, f3 = b, gb, a, ga, a, ga  # the latest point, the other end, the point before
+    part = 0.5
+    while abs(x2 - x1) > resolution and f1 != 0.0 and f2 != 0.0:
+        edge = min(0.5, 0.5 * resolution / abs(x2 - x1))
+        x = x1 + min(max(part, edge), 1.0 - edge) * (x2 - x1)
+        if x in (x1, x2):
+            break
+        f = guard(K, s, m, w, mode, kind, i, x)
+        if (f > 0.0) == (f1 > 0.0):
+            x3, f3 = x1, f1
+        else:
+            x3, f3, x2, f2 = x2, f2, x1, f1
+        x1, f1 = x, f
+        part = _next_part(x1, f1, x2, f2, x3, f3)
+    return x2 if f1 > 0.0 else x1
+
+
+@inlined
+def _next_part(x1: float, f1: float, x2: float, f2: float, x3: float, f3: float) -> float:
+    """Part of the way from x1 to x2: inverse quadratic interpolation where it is safe, bisection where not."""
+    if x3 in (x1, x2) or f3 in (f1, f2):
+        return 0.5
+    xi, phi = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
+    if not (0.0 < xi < 1.0 and 1.0 - np.sqrt(1.0 - xi) < phi < np.sqrt(xi)):
+        return 0.5
+    return float(f1 / (f1 - f2) * f3 / (f3 - f2) - (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f2 - f3))
+
+
+@inlined
+def _extremum(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, node: int, lowest: bool) -> float:
+    """Where the gap of row i has its minimum (or maximum) between a node and the next."""
+    a, b = _place(node), _place(node + 1)
+    ra, rb = w.rates[node, i], w.rates[node + 1, i]
+    if lowest:
+        return root(K, s, m, w, mode, RATE, i, a, -ra, b, -rb)
+    return root(K, s, m, w, mode, RATE_DOWN, i, a, ra, b, rb)
+
+
+@inlined
+def _place(node: int) -> float:
+    return node / (NODES - 1.0)
+
+
+@inlined
+def _touch(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """First contact of a FREE row that starts above the surface."""
+    for node in range(NODES - 1):
+        a, b = _place(node), _place(node + 1)
+        ha, hb = w.gaps[node, i], w.gaps[node + 1, i]
+        if not hb > 0.0:
+            return root(K, s, m, w, mode, TOUCH, i, a, ha, b, hb)
+        if w.rates[node, i] < 0.0 < w.rates[node + 1, i]:
+            low = _extremum(K, s, m, w, mode, i, node, True)
+            h = guard(K, s, m, w, mode, TOUCH, i, low)
+            if not h > 0.0:
+                return root(K, s, m, w, mode, TOUCH, i, a, ha, low, h)
+    return NEVER
+
+
+@inlined
+def _touch_inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """First closing of a FREE row that starts on the surface."""
+    closing = w.rates[0, i] + slow(s)
+    before = max(w.gaps[0, i], closing)
+    for node in range(1, NODES):
+        value = max(w.gaps[node, i], w.rates[node, i] + slow(s))
+        if value < 0.0:
+            return root(K, s, m, w, mode, TOUCH_INSIDE, i, _place(node - 1), max(before, 1e-300), _place(node), value)
+        before = value
+    return NEVER
+
+
+@inlined
+def _leave(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """First rise above the surface."""
+    for node in range(NODES - 1):
+        a, b = _place(node), _place(node + 1)
+        ha, hb = w.gaps[node, i], w.gaps[node + 1, i]
+        start = max(-ha, 1e-300)
+        if hb > 0.0:
+            return root(K, s, m, w, mode, LEAVE, i, a, start, b, -hb)
+        if w.rates[node, i] > 0.0 > w.rates[node + 1, i]:
+            high = _extremum(K, s, m, w, mode, i, node, False)
+            h = guard(K, s, m, w, mode, LEAVE, i, high)
+            if h < 0.0:
+                return root(K, s, m, w, mode, LEAVE, i, a, start, high, h)
+    return NEVER
+
+
+@inlined
+def _by_nodes(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int) -> float:
+    """First firing of a guard that is known at the nodes only where it is evaluated (CATCH, PRESS)."""
+    before = 1e-300
+    for node in range(1, NODES):
+        if kind == CATCH and not w.rates[node, i] < -slow(s):
+            before = 1e-300
+            continue
+        value = guard(K, s, m, w, mode, kind, i, _place(node))
+        if value < 0.0:
+            return root(K, s, m, w, mode, kind, i, _place(node - 1), before, _place(node), value)
+        before = max(value, 1e-300)
+    return NEVER
+
+
+@inlined
+def _release(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """First loss of pressure of an active row; a dip between nodes is looked for at its parabola's vertex."""
+    for node in range(NODES - 1):
+        a, b = _place(node), _place(node + 1)
+        la, lb = max(w.lams[node, i], 1e-300), w.lams[node + 1, i]
+        if not lb >= 0.0:
+            return root(K, s, m, w, mode, RELEASE, i, a, la, b, lb)
+        if node + 2 < NODES and lb < la and lb < w.lams[node + 2, i]:
+            dip = _vertex(b, b - a, la, lb, w.lams[node + 2, i])
+            value = guard(K, s, m, w, mode, RELEASE, i, dip)
+            if value < 0.0:
+                left, g_left = (a, la) if dip <= b else (b, max(lb, 1e-300))
+                return root(K, s, m, w, mode, RELEASE, i, left, g_left, dip, value)
+    return NEVER
+
+
+@inlined
+def _vertex(x: float, step: float, left: float, middle: float, right: float) -> float:
+    """Lowest point of the parabola through three equidistant values of which the middle one is least."""
+    return x + 0.5 * step * (left - right) / (left - 2.0 * middle + right)
+
+
+@inlined
+def _handed_over(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """First instant at which the elastic part of a COLLISION's multiplier is spent."""
+    before = guard(K, s, m, w, mode, HANDOVER, i, 0.0)
+    for node in range(1, NODES):
+        value = guard(K, s, m, w, mode, HANDOVER, i, _place(node))
+        if value <= 0.0:
+            return root(K, s, m, w, mode, HANDOVER, i, _place(node - 1), max(before, 1e-300), _place(node), value)
+        before = value
+    return NEVER
+
+
+@inlined
+def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """Earliest switching of row i under the level and the memoryless machine; its guard in kind[i]."""
+    if mode[i] == FREE:
+        inside = w.gaps[0, i] <= 0.0
+        w.kind[i] = TOUCH_INSIDE if inside else TOUCH
+        return _touch_inside(K, s, m, w, mode, i) if inside else _touch(K, s, m, w, mode, i)
+    if is_active(mode[i]):
+        w.kind[i] = RELEASE
+        place = _release(K, s, m, w, mode, i)
+        other = NEVER
+        if s.fsm != LEVEL:
+            other = _leave(K, s, m, w, mode, i)
+        elif mode[i] == COLLISION:
+            other = _handed_over(K, s, m, w, mode, i)
+        if other < place:
+            w.kind[i] = LEAVE if s.fsm != LEVEL else HANDOVER
+            return other
+        return place
+    w.kind[i] = LEAVE
+    place = _leave(K, s, m, w, mode, i)
+    kind = CATCH if s.fsm == LEVEL else PRESS
+    other = _by_nodes(K, s, m, w, mode, kind, i)
+    if other < place:
+        w.kind[i] = kind
+        return other
+    return place
+
+
+@inlined
+def _first_edge(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """The edge machine looks at the step's ends only, and only for what becomes true."""
+    last = NODES - 1
+    h0, h1, r0, r1 = w.gaps[0, i], w.gaps[last, i], w.rates[0, i], w.rates[last, i]
+    if mode[i] == FREE and h0 > 0.0 >= h1:
+        w.kind[i] = TOUCH
+        return root(K, s, m, w, mode, TOUCH, i, 0.0, h0, 1.0, h1)
+    if mode[i] == CONTACT and w.lams[0, i] >= 0.0 > w.lams[last, i]:
+        w.kind[i] = RELEASE
+        return root(K, s, m, w, mode, RELEASE, i, 0.0, max(w.lams[0, i], 1e-300), 1.0, w.lams[last, i])
+    if mode[i] == BALLISTIC and h0 <= 0.0 < h1:
+        w.kind[i] = LEAVE
+        return root(K, s, m, w, mode, LEAVE, i, 0.0, max(-h0, 1e-300), 1.0, -h1)
+    if mode[i] == BALLISTIC and max(h1, r1) < 0.0 and not (h0 <= 0.0 and r0 < 0.0):
+        w.kind[i] = TOUCH_INSIDE
+        return root(K, s, m, w, mode, TOUCH_INSIDE, i, 0.0, max(h0, r0, 1e-300), 1.0, max(h1, r1))
+    return NEVER
+
+
+@inlined
+def _watched(s: Any, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether a row can switch in this step: its gap, or its multiplier, came near zero against what it varied.
+
+    lo and hi hold the extremes at the stages: of the multiplier where the row is active, of the gap where it is not.
+    """
+    if s.method == EXACT:
+        return True
+    if s.fsm != LEVEL or (mode[i] != FREE and mode[i] != CONTACT):
+        return True
+    last = NODES - 1
+    ends = w.gaps if mode[i] == FREE else w.lams
+    low = min(w.lo[i], ends[0, i], ends[last, i])
+    high = max(w.hi[i], ends[0, i], ends[last, i])
+    return not low > high - low
+
+
+@inlined
+def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
+    """Gaps and rates, and the multipliers if asked, at the inner nodes."""
+    for node in range(1, NODES - 1):
+        dense.state(s, w, _place(node), w.ys)
+        t = s.t_old + _place(node) * s.hs
+        q, v = w.ys[: s.n], w.ys[s.n :]
+        K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])
+        if multipliers:
+            if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
+                return 1
+            scatter(s, w, w.lams[node])
+    return 0
+
+
+@inlined
+def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
+    """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 1 if ill posed."""
+    s.theta = NEVER
+    any_gap, any_multiplier = False, False
+    for i in range(s.nc):
+        w.hit[i] = NEVER
+        w.kind[i] = NONE
+        if m.unilateral[i] and m.follows[i] < 0 and _watched(s, w, mode, i):
+            w.hit[i] = 1.0
+            any_gap = True
+            any_multiplier = any_multiplier or is_active(mode[i])
+    if not any_gap:
+        return 0
+    if dense.prepare(K, s, m, w) != 0 or _fill_nodes(K, s, m, w, any_multiplier) != 0:
+        return 1
+    for i in range(s.nc):
+        if w.hit[i] == 1.0:
+            if s.fsm == EDGE:
+                w.hit[i] = _first_edge(K, s, m, w, mode, i)
+            else:
+                w.hit[i] = _first(K, s, m, w, mode, i)
+            s.theta = min(s.theta, w.hit[i])
+    if s.theta <= 1.0:
+        _tie(s, w)
+    return 0
+
+
+@inlined
+def _tie(s: Any, w: Work) -> None:
+    """Rows that switch within rounding of the first switch together, at the last of them."""
+    together = s.theta + 8.0 * ULP * max(abs(s.t_old) / s.hs, 1.0)
+    for i in range(s.nc):
+        if w.hit[i] <= together:
+            s.theta = max(s.theta, w.hit[i])
+
+
+@inlined
+def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
+    """The mode that the fired guard of row i leads to."""
+    kind = w.kind[i]
+    if kind == RELEASE:
+        return BALLISTIC if s.fsm != LEVEL else released_mode(mode[i], h)
+    if kind == LEAVE:
+        return FREE
+    if kind == HANDOVER:
+        return CONTACT
+    return active_mode(m, i)

@@ -1,0 +1,72 @@
+"""What is written down: one row of numbers a sample, t | q | v | gap | lam | energy | ledger."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Array, Bytes, Floats
+from crossbody.reference.core import dense
+from crossbody.reference.core.acceleration import OWN, accelerate, scatter
+from crossbody.reference.core.layout import EXACT, Model, Work
+
+ARC_POINTS = 16  # an arc in closed form is one step, however long: these points show its shape
+
+
+
+@compiled
+def write_row(
+    K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, y: Array, lam: Array, z: Array, out: Floats, modes: Bytes
+) -> None:  # fmt: skip
+    """Append one row."""
+    n, nc, r = s.n, s.nc, s.rows
+    out[r, 0] = t
+    out[r, 1 : 1 + 2 * n] = y
+    at = 1 + 2 * n
+    K.gaps(t, y[:n], y[n:], m.p, w.gap, w.rate)
+    out[r, at : at + nc] = w.gap
+    out[r, at + nc : at + 2 * nc] = lam
+    at += 2 * nc
+    K.energy(y[:n], y[n:], m.p, w.e)
+    out[r, at] = w.e[0]
+    out[r, at + 1] = w.e[1]
+    out[r, at + 2 : at + 2 + s.nz] = z
+    modes[r] = mode
+    s.rows = r + 1
+
+
+@inlined
+def here(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Bytes) -> None:
+    """Append the present state, with the multipliers that hold now."""
+    if s.natural:
+        write_row(K, s, m, w, mode, s.t, w.y, w.lam0, w.z, out, modes)
+
+
+@compiled
+def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Floats, modes: Bytes) -> None:
+    """Append the state at a time inside the step."""
+    theta = min(max((t - s.t_old) / s.hs, 0.0), 1.0)
+    dense.prepare(K, s, m, w)
+    dense.state(s, w, theta, w.ys)
+    accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN)
+    scatter(s, w, w.lam)
+    z = w.z
+    if s.ledger and s.method != EXACT:
+        z = w.kz[1]
+        dense.ledger(s, w, theta, z)
+    write_row(K, s, m, w, mode, t, w.ys, w.lam, z, out, modes)
+
+
+@inlined
+def within_step(
+    K: Any, s: Any, m: Model, w: Work, mode: Bytes, samples: Floats, until: float, out: Floats, modes: Bytes
+) -> None:  # fmt: skip
+    """Append the samples asked for up to `until`, before the step's end is taken over."""
+    if s.natural:
+        if s.method == EXACT:
+            for j in range(1, ARC_POINTS):
+                _inside(K, s, m, w, mode, s.t_old + (until - s.t_old) * j / ARC_POINTS, out, modes)
+        return
+    while s.next_sample < len(samples) and samples[s.next_sample] <= until:
+        _inside(K, s, m, w, mode, samples[s.next_sample], out, modes)
+        s.next_sample += 1
