@@ -1,0 +1,21 @@
+"""Comparison and what people see: metrics, truths, verdicts, tables, pages, the command line."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from crossbody.reports.compare import Entry, compare
+    from crossbody.reports.truth import Truth, truth_of
+
+_LAZY = {"compare": "compare", "Entry": "compare", "Truth": "truth", "truth_of": "truth"}
+
+__all__ = ["Entry", "Truth", "compare", "truth_of"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what needs pandas and numpy only when it is asked for."""
+    if name in _LAZY:
+        return getattr(import_module(f"crossbody.reports.{_LAZY[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

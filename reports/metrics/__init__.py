@@ -1,0 +1,48 @@
+"""One number for one run, judged against a truth: a module here is a metric, found by its name.
+
+A metric is a module with a docstring whose first line says what it measures, and the public names
+
+    UNIT                            SI unit, "1" for a ratio or a count
+    CLAIMED                         True: measured only where the case claims or limits it
+    measure(truth, run, case)       the number; None where the run cannot tell (no ledger, no contact, ...)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol, cast
+
+from crossbody.cases import _registry
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+
+class Metric(Protocol):
+    """What every metric module offers."""
+
+    UNIT: str
+    CLAIMED: bool
+
+    def measure(self, truth: Truth, run: Trajectory, case: Case) -> float | None:
+        """The number, or None where the run cannot tell."""
+        ...
+
+
+def names() -> tuple[str, ...]:
+    """Names of all metrics; imports none of them."""
+    return _registry.plugin_names(__name__, list(__path__))
+
+
+def summary(name: str) -> str:
+    """What a metric measures, in one line; imports nothing."""
+    return _registry.summary(__name__, list(__path__), name)
+
+
+def load(name: str) -> Metric:
+    """Import a metric.
+
+    Raises:
+        UnknownName: if there is no such metric; the message lists the names.
+    """
+    return cast("Metric", _registry.load_plugin("metric", __name__, list(__path__), name))

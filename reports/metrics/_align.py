@@ -1,0 +1,53 @@
+"""A run laid beside the truth: events are matched first, the arcs between them compared.
+
+A shift of an impact by 2 ms costs 2 v0 in a raw difference of velocities although nothing else is wrong. So the run's
+clock is stretched, linearly between matched touches, until they stand at the truth's instants; how far they were off
+is a number of its own (metric event_times).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases._trajectory import Trajectory
+from crossbody.reports.metrics._contacts import Contact, contacts
+
+if TYPE_CHECKING:
+    from crossbody.reports.truth import Truth
+
+_Pairs = list[tuple[Contact, Contact]]
+
+
+def matched(truth: Truth, run: Trajectory) -> _Pairs:
+    """Contacts of truth and run, paired in order up to the first that belongs to another row."""
+    pairs: _Pairs = []
+    for a, b in zip(contacts(truth.trajectory), contacts(run), strict=False):
+        if a.row != b.row:
+            break
+        pairs.append((a, b))
+    return pairs
+
+
+def clock(truth: Truth, run: Trajectory) -> Floats:
+    """The truth's time of every sample of the run (n,), s."""
+    start = float(truth.trajectory.t[0])
+    knots = [(start, start), *((b.touch, a.touch) for a, b in matched(truth, run))]
+    kept = [knots[0]]
+    for knot in knots[1:]:
+        if knot[0] > kept[-1][0] and knot[1] > kept[-1][1]:
+            kept.append(knot)
+    here, there = np.array(kept).T
+    late = np.maximum(run.t - here[-1], 0.0)
+    mapped: Floats = np.interp(run.t, here, there) + late
+    return mapped
+
+
+def aligned(truth: Truth, run: Trajectory) -> tuple[NDArray[np.bool_], Trajectory]:
+    """Which samples of the run (n,) have a counterpart, and the truth at them."""
+    t = clock(truth, run)
+    inside = t <= truth.trajectory.t[-1]
+    return inside, truth.at(t[inside])

@@ -1,0 +1,27 @@
+"""Energy that the integrator made or lost, over the largest kinetic energy.
+
+What is left of E(t) - E(0) after the work of the inputs, of every multiplier and of damping (spec 1.4).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max |E - E(0) - input + dissipated - work of all rows| / max T of the truth; None without a ledger."""
+    scale = float(truth.trajectory.energy[:, 0].max())
+    if run.ledger is None or scale == 0.0:
+        return None
+    book = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
+    change = run.total_energy - run.total_energy[0]
+    return float(np.max(np.abs(change - (book - book[0])))) / scale

@@ -1,0 +1,25 @@
+"""Net energy that the contact law has given at most, over the largest kinetic energy.
+
+From the run's own account of the work of every multiplier (spec 1.4): above zero, the law made energy.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """max(0, max over t of the work of all rows) / max T of the truth; None without a ledger."""
+    scale = float(truth.trajectory.energy[:, 0].max())
+    if run.ledger is None or scale == 0.0:
+        return None
+    return float(np.max(run.ledger.contact.sum(axis=1), initial=0.0)) / scale

@@ -1,0 +1,30 @@
+"""Total impulse of the multipliers against the truth's, over the truth's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.reports.metrics._align import aligned
+from crossbody.reports.metrics._impulse import cumulative
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max over rows of |INT lam dt - INT lam_truth dt| / INT |lam_truth| dt; None where lam is not known.
+
+    Both integrals take the same samples by the same rule, so that the error of the rule cancels.
+    """
+    inside, exact = aligned(truth, run)
+    if np.isnan(run.lam).any() or not inside.any():
+        return None
+    mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
+    scale = float(np.max(np.abs(theirs), initial=0.0))
+    return float(np.max(np.abs(mine - theirs))) / scale if scale else None

@@ -1,0 +1,19 @@
+"""Largest penetration."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "m"
+CLAIMED = False
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """max(0, -gap) over all rows and samples, m."""
+    return float(np.max(-run.gap, initial=0.0))

@@ -1,0 +1,25 @@
+"""Penetration against the truth's on matched arcs, over the largest penetration."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.reports.metrics._align import aligned
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max |min(gap, 0) - min(gap_truth, 0)| / max penetration of the truth; None where nothing penetrates."""
+    inside, exact = aligned(truth, run)
+    deepest = float(np.max(-truth.trajectory.gap, initial=0.0))
+    if deepest == 0.0 or not inside.any():
+        return None
+    return float(np.max(np.abs(np.minimum(run.gap[inside], 0.0) - np.minimum(exact.gap, 0.0)))) / deepest
