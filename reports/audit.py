@@ -1,0 +1,117 @@
+"""The parity audit of spec 5.3: whether the same physics reached every engine.
+
+Numbers are laid side by side; M, bias, H and lam are evaluated at the same random states where an engine shows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Case
+from crossbody.cases._arrays import Floats
+
+TOLERANCE = 1e-10
+LAM_TOLERANCE = 1e-8
+NUMBERS = ("masses", "gravity", "constants", "q0", "v0")
+FUNCTIONS = ("M", "bias", "H", "lam")
+STATES = 20
+SEED = 20240917
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AuditRow:
+    """One quantity of one engine beside the reference's.
+
+    Attributes:
+        quantity: what is compared.
+        mine, theirs: the values in words; "20 states" for a function.
+        difference: largest difference over the largest value; NaN if the engine does not show it.
+        tolerance: how much is the same physics.
+    """
+
+    quantity: str
+    mine: str
+    theirs: str
+    difference: float
+    tolerance: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether it is the same; what is not shown is not held against an engine."""
+        return np.isnan(self.difference) or self.difference <= self.tolerance
+
+
+def _flat(value: Any) -> Floats:
+    """Numbers of a value in a fixed order, named parts sorted by their names."""
+    if isinstance(value, Mapping):
+        return np.concatenate([_flat(value[k]) for k in sorted(value)]) if value else np.zeros(0)
+    return np.atleast_1d(np.asarray(value, dtype=np.float64)).ravel()
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{k} {_words(v)}" for k, v in sorted(value.items()))
+    return " ".join(f"{x:.6g}" for x in _flat(value))
+
+
+def difference(mine: Any, theirs: Any) -> float:
+    """Max |mine - theirs| / max |theirs|; infinite if names or sizes differ or a value is not finite."""
+    if isinstance(mine, Mapping) and isinstance(theirs, Mapping) and set(mine) != set(theirs):
+        return np.inf
+    a, b = _flat(mine), _flat(theirs)
+    if a.shape != b.shape:
+        return np.inf
+    worst = float(np.max(np.abs(a - b), initial=0.0))
+    scale = float(np.max(np.abs(b), initial=0.0))
+    if not np.isfinite(worst):
+        return np.inf
+    return worst / scale if scale else worst
+
+
+def states(case: Case) -> list[tuple[Floats, Floats]]:
+    """Random states in which every contact is entered, the same for all engines."""
+    draw = np.random.default_rng(SEED)
+    reach = 1e-2 * np.maximum(np.abs(case.q0), 1e-3)
+    return [
+        (-reach * draw.uniform(0.01, 1.0, len(case.q0)), -draw.uniform(0.0, 1.0, len(case.v0))) for _ in range(STATES)
+    ]
+
+
+def _numbers(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[AuditRow]:
+    return [
+        AuditRow(
+            quantity=key,
+            mine=_words(mine[key]) if key in mine else "not shown",
+            theirs=_words(theirs[key]),
+            difference=difference(mine[key], theirs[key]) if key in mine else np.nan,
+            tolerance=TOLERANCE,
+        )
+        for key in NUMBERS
+        if key in theirs
+    ]
+
+
+def _function(key: str, mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case) -> AuditRow:
+    worst = np.nan
+    if key in mine:
+        arguments = [(q,) if key in ("M", "H") else (q, v) for q, v in states(case)]
+        values = [(mine[key](*a), theirs[key](*a)) for a in arguments]
+        a, b = (np.concatenate([_flat(value[i]) for value in values]) for i in (0, 1))
+        worst = difference(a, b)
+    return AuditRow(
+        quantity=key,
+        mine=f"{STATES} states" if key in mine else "not shown",
+        theirs=f"{STATES} states",
+        difference=worst,
+        tolerance=LAM_TOLERANCE if key == "lam" else TOLERANCE,
+    )
+
+
+def audit(mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case) -> tuple[AuditRow, ...]:
+    """Compare what `Run.audit()` of an engine shows with the reference's."""
+    functions = (_function(key, mine, theirs, case) for key in FUNCTIONS if key in theirs)
+    return (*_numbers(mine, theirs), *functions)

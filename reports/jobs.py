@@ -1,0 +1,162 @@
+"""Which engine runs which case, and the running itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from crossbody import cases, engines
+from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName, Value
+from crossbody.reports.audit import AuditRow, audit
+from crossbody.reports.compare import Entry
+from crossbody.reports.truth import Truth, sample_times, truth_of
+
+DEFAULT_CASES = ("bouncing_ball",)
+DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
+FINER_STEP = 8.0
+FINEST_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pick:
+    """One engine under one profile, or the sentence that says why it cannot be had."""
+
+    engine: str
+    profile: str
+    skipped: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseResult:
+    """A case, its truth, and every run."""
+
+    case: Case
+    truth: Truth
+    entries: tuple[Entry, ...]
+
+
+def parse_engine(text: str) -> tuple[str, str | None]:
+    """E or E:PROFILE."""
+    engine, _, profile = text.partition(":")
+    return engine, profile or None
+
+
+def parse_settings(pairs: Sequence[str]) -> dict[str, Value]:
+    """Parameters from k=v; a number where it reads as one.
+
+    Raises:
+        InvalidValue: for a text without "=".
+    """
+    found: dict[str, Value] = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals or not name.strip() or not text.strip():
+            raise InvalidValue(f"--set {pair!r} is not name=value, for example --set a1=0.")
+        try:
+            found[name.strip()] = float(text)
+        except ValueError:
+            found[name.strip()] = text.strip()
+    return found
+
+
+def picks(wanted: Sequence[str]) -> tuple[Pick, ...]:
+    """Every engine and profile asked for; an engine that is not installed is a pick that says so.
+
+    Raises:
+        UnknownName: for an engine or profile that does not exist.
+    """
+    names = wanted or [name for name in DEFAULT_ENGINES if name in engines.names()]
+    return tuple(dict.fromkeys(pick for text in names for pick in _profiles(*parse_engine(text))))
+
+
+def _profiles(name: str, profile: str | None) -> Iterator[Pick]:
+    try:
+        engine = engines.load(name)
+    except EngineUnavailable as error:
+        yield Pick(engine=name, profile=profile or "*", skipped=str(error))
+        return
+    if profile is not None and profile not in engine.profiles:
+        raise UnknownName(f"profile of {name}", profile, engine.profiles)
+    for each in engine.profiles if profile is None else (profile,):
+        yield Pick(engine=name, profile=each)
+
+
+def load_cases(names: Sequence[str], variant: str | None, overrides: Mapping[str, Value]) -> tuple[Case, ...]:
+    """Every case asked for, in all its variants unless one is named."""
+    found = []
+    for name in names or DEFAULT_CASES:
+        chosen = (variant,) if variant is not None else cases.variants(name)
+        found += [cases.load(name, each, **overrides) for each in chosen]
+    return tuple(found)
+
+
+def run_case(
+    case: Case, wanted: Sequence[Pick], rtol: float | None = None, tell: Callable[[str], None] = lambda _: None
+) -> CaseResult:
+    """Run a case on every engine asked for.
+
+    Args:
+        case: what is run.
+        wanted: on which engines.
+        rtol: tolerance for the engines that have one.
+        tell: is told what is being done.
+    """
+    tell(f"{case.label}: truth")
+    truth = truth_of(case)
+    reference = _reference_audit(case)
+    entries = []
+    for pick in wanted:
+        tell(f"{case.label}: {pick.engine}:{pick.profile}")
+        entries.append(_entry(case, pick, rtol, reference, truth))
+    return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def _reference_audit(case: Case) -> Mapping[str, Any]:
+    if "reference" not in engines.names():
+        return {}
+    return engines.load("reference").prepare(case, "compiled").audit()
+
+
+def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, Any], truth: Truth) -> Entry:
+    if pick.skipped:
+        return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
+    try:
+        prepared = prepare(case, pick, rtol, truth)
+    except CaseUnsupported as error:
+        return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
+    rows: tuple[AuditRow, ...] = audit(prepared.audit(), reference, case) if reference else ()
+    return Entry(
+        engine=pick.engine,
+        profile=pick.profile,
+        settings=prepared.settings,
+        run=prepared.run(),
+        audit=rows,
+        refined=_refined(case, pick, prepared.settings),
+    )
+
+
+def prepare(case: Case, pick: Pick, rtol: float | None, truth: Truth | None = None) -> Any:
+    """A prepared run; the tolerance where the engine has one, samples of the truth where it can give them."""
+    engine = engines.load(pick.engine)
+    prepared = engine.prepare(case, pick.profile)
+    more: dict[str, Any] = {}
+    if rtol is not None and "rtol" in prepared.settings:
+        more["rtol"] = rtol
+    if truth is not None and "samples" in prepared.settings:
+        more["samples"] = sample_times(truth.trajectory, case.t_end)
+    return engine.prepare(case, pick.profile, **more) if more else prepared
+
+
+def _refined(case: Case, pick: Pick, settings: Mapping[str, Any]) -> Trajectory | None:
+    """The same engine with a step eight times finer or a tolerance of 1e-12; None if it has neither."""
+    if "dt" in settings:
+        finer = {"dt": float(settings["dt"]) / FINER_STEP}
+    elif "rtol" in settings:
+        finer = {"rtol": min(FINEST_TOLERANCE, float(settings["rtol"]))}
+    else:
+        return None
+    engine = engines.load(pick.engine)
+    run = engine.prepare(case, pick.profile, **finer).run()
+    return run if run.outcome.ok and math.isfinite(float(run.t[-1])) else None

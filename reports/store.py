@@ -1,0 +1,96 @@
+"""Motions on disk: one Parquet file each, with all that is not an array as JSON in its metadata."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from crossbody.cases import Event, Ledger, Mode, Outcome, Trajectory
+from crossbody.cases._arrays import Floats
+
+_KEY = b"crossbody"
+_ARRAYS = ("q", "v", "gap", "lam", "energy", "mode")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace:
+    """A stored motion.
+
+    Attributes:
+        about: case, variant, engine, profile, settings, names and units; plain values.
+        run: the motion.
+        truth: the truth's q, v, gap and lam at the same instants; None for the truth itself.
+    """
+
+    about: Mapping[str, Any]
+    run: Trajectory
+    truth: Trajectory | None = None
+
+
+def _columns(prefix: str, array: Floats) -> dict[str, Floats]:
+    return {f"{prefix}{i}": array[:, i] for i in range(array.shape[1])}
+
+
+def _arrays(run: Trajectory, prefix: str = "") -> dict[str, Floats]:
+    found: dict[str, Floats] = {}
+    for name in _ARRAYS:
+        found |= _columns(prefix + name, getattr(run, name))
+    return found
+
+
+def save(path: Path, trace: Trace) -> None:
+    """Write one motion."""
+    run = trace.run
+    data = {"t": run.t} | _arrays(run)
+    if trace.truth is not None:
+        data |= _arrays(trace.truth, "truth_")
+    if run.ledger is not None:
+        data |= _columns("work", run.ledger.contact) | {"input": run.ledger.input, "loss": run.ledger.dissipated}
+    about = {
+        "about": dict(trace.about),
+        "events": [[e.t, e.contact, int(e.before), int(e.after)] for e in run.events],
+        "outcome": run.outcome.value, "message": run.message, "steps": run.steps, "wall_s": run.wall_s,
+        "counts": dict(run.counts),
+    }  # fmt: skip
+    columns = pa.table(data).replace_schema_metadata({_KEY: json.dumps(about, default=_plain).encode()})
+    pq.write_table(columns, path, compression="zstd")
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
+
+
+def _block(data: pa.Table, name: str) -> Floats:
+    """Columns name0, name1, ... as one array (n, k)."""
+    columns = []
+    while f"{name}{len(columns)}" in data.column_names:
+        columns.append(data.column(f"{name}{len(columns)}").to_numpy())
+    return np.stack(columns, axis=1) if columns else np.zeros((len(data), 0))
+
+
+def load(path: Path) -> Trace:
+    """Read one motion back."""
+    data = pq.read_table(path)
+    about = json.loads(data.schema.metadata[_KEY])
+    t = data.column("t").to_numpy()
+    ledger = None
+    if "work0" in data.column_names:
+        flows = (data.column(name).to_numpy() for name in ("input", "loss"))
+        ledger = Ledger(contact=_block(data, "work"), **dict(zip(("input", "dissipated"), flows, strict=True)))
+    run = Trajectory(
+        t=t,
+        **{name: _block(data, name) for name in _ARRAYS},
+        events=tuple(Event(t=s, contact=i, before=Mode(b), after=Mode(a)) for s, i, b, a in about["events"]),
+        outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"], wall_s=about["wall_s"],
+        counts=about["counts"], ledger=ledger,
+    )  # fmt: skip
+    has_truth = "truth_q0" in data.column_names
+    truth = Trajectory(t=t, **{name: _block(data, f"truth_{name}") for name in _ARRAYS}) if has_truth else None
+    return Trace(about=about["about"], run=run, truth=truth)

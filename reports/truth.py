@@ -1,0 +1,104 @@
+"""What a run is judged against, and how that is known (spec 5.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from crossbody.cases import Case, Tier, Trajectory
+from crossbody.cases._arrays import Floats
+from crossbody.reports._between import between
+
+TIGHT = 1e-13
+"""Tolerance of the reference where it stands for the truth."""
+SECOND = 1e-12
+"""Tolerance of the independent integrator that it is held against."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """A motion that is taken to be right.
+
+    Attributes:
+        tier: how it is known.
+        source: in words, with the agreement of tier C.
+        trajectory: the motion, dense enough to plot, both sides of every event.
+        at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
+        agreement: metric -> how far the two sources of tier C are apart; empty for the others.
+    """
+
+    tier: Tier
+    source: str
+    trajectory: Trajectory
+    at: Callable[[Floats], Trajectory]
+    agreement: dict[str, float]
+
+
+def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
+    """Times that show a motion: a grid, more of them from each event to the next if that is short, events twice.
+
+    Args:
+        run: whose events.
+        t_end: horizon, s.
+        grid: points on the horizon.
+        inside: points on each interval between events that is shorter than a tenth of the horizon.
+    """
+    events = np.array([e.t for e in run.events if e.t <= t_end])
+    parts = [np.linspace(0.0, t_end, grid)]
+    edges = np.unique(np.concatenate([[0.0], events, [t_end]]))
+    parts += [np.linspace(a, b, inside)[1:-1] for a, b in pairwise(edges) if b - a < 0.1 * t_end]
+    times: Floats = np.sort(np.concatenate([np.unique(np.concatenate([*parts, events])), events]))
+    return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
+
+
+def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:
+    """A run as the truth for others: an engine refined against itself, or a measurement."""
+    return Truth(tier=tier, source=source, trajectory=run, at=between(run), agreement={})
+
+
+def truth_of(case: Case) -> Truth:
+    """The best truth that a case has: its closed form, else two independent integrators that agree.
+
+    Raises:
+        CrossbodyError: if the reference cannot run the case.
+    """
+    if case.closed_form is None:
+        return _integrated(case)
+    motion = case.closed_form
+    first = motion(np.zeros(1))
+    return Truth(
+        tier=Tier.A,
+        source="closed form of every arc",
+        trajectory=motion(sample_times(first, case.t_end)),
+        at=motion,
+        agreement={},
+    )
+
+
+def _integrated(case: Case) -> Truth:
+    """Tier C: the compiled integrator at 1e-13, held against CVODE."""
+    from crossbody.engines import load
+
+    reference = load("reference")
+    first = reference.prepare(case, "compiled", rtol=TIGHT).run()
+
+    def at(times: Floats) -> Trajectory:
+        return reference.prepare(case, "compiled", rtol=TIGHT, samples=np.array(times)).run()
+
+    dense = at(sample_times(first, case.t_end))
+    second = reference.prepare(case, "cvode", rtol=SECOND).run()
+    truth = Truth(tier=Tier.C, source="", trajectory=dense, at=at, agreement={})
+    found = _agreement(truth, second, case)
+    said = ", ".join(f"{name} {value:.1e}" for name, value in found.items())
+    source = f"compiled reference at rtol {TIGHT:g}, CVODE at {SECOND:g} agrees: {said}"
+    return Truth(tier=Tier.C, source=source, trajectory=dense, at=at, agreement=found)
+
+
+def _agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
+    from crossbody.reports import metrics
+
+    found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
+    return {name: value for name, value in found.items() if value is not None}
