@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from crossbody import cases, engines
-from crossbody.cases import Case, CaseUnsupported, Mode, Outcome
+from crossbody.cases import Case, Mode
 
 mujoco = pytest.importorskip("mujoco")
 FREE, CONTACT, BALLISTIC = Mode.FREE, Mode.CONTACT, Mode.BALLISTIC

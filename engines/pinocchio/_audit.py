@@ -1,0 +1,38 @@
+"""The physics as it reached Pinocchio's model, for the parity audit (spec 5.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from crossbody.cases import Case
+from crossbody.cases._arrays import Floats
+from crossbody.engines.pinocchio._rows import PinRows
+
+
+def audit(case: Case, rows: PinRows, constants: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Numbers read back from the model, and M(q), bias(q, v), H(q) and lam(q, v) of all rows together.
+
+    lam has no bound: it is what the law asks for, negative where the row would pull.
+    """
+    model, data = rows.model, rows.data
+
+    def M(q: Floats) -> Floats:
+        upper = np.triu(pin.crba(model, data, q))
+        full: Floats = upper + np.triu(upper, 1).T
+        return full
+
+    return {
+        "masses": np.array([inertia.mass for inertia in model.inertias[1:]]),
+        "gravity": float(np.linalg.norm(model.gravity.linear)),
+        "constants": constants,
+        "q0": case.q0,
+        "v0": case.v0,
+        "M": M,
+        "bias": lambda q, v: np.array(pin.nonLinearEffects(model, data, q, v)),
+        "H": rows.jacobian,
+        "lam": lambda q, v: rows.accelerate(q, v, range(rows.nc))[1],
+    }

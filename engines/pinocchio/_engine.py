@@ -1,0 +1,179 @@
+"""Pinocchio as an engine: profiles, settings, and prepared runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from types import ModuleType
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+import sksundae
+
+from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory, _registry
+from crossbody.cases._arrays import Floats
+from crossbody.engines import _scale, _settings
+from crossbody.engines._level_machine import LevelMachine
+from crossbody.engines._log import Log
+from crossbody.engines.pinocchio._admm import TimeStepper
+from crossbody.engines.pinocchio._audit import audit
+from crossbody.engines.pinocchio._flow import Flow
+from crossbody.engines.pinocchio._impulse import ImpulseMachine, restitution
+from crossbody.engines.pinocchio._rows import ALGEBRA
+from crossbody.engines.pinocchio._scene import Scene
+
+PACKAGE = "crossbody.engines.pinocchio"
+STEPS = Parameter(default=200_000, doc="bound on the number of steps", low=1, high=1e9)
+RTOL = Parameter(default=1e-10, doc="relative tolerance", low=1e-14, high=1e-1)
+METHOD = Parameter(default="Adams", doc="linear multistep method of CVODE", choices=("Adams", "BDF"))
+SOLVER = Parameter(default="forwardDynamics", doc="how v' and lam are solved for", choices=tuple(ALGEBRA))
+
+
+class Solver(Protocol):
+    """What integrates: it fills the log and says how it ended."""
+
+    steps: int
+    outcome: Outcome
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PinocchioRun:
+    """One prepared run; see `crossbody.engines.Run`."""
+
+    case: Case
+    scene: Scene
+    profile: str
+    settings: Mapping[str, Any]
+    constants: Mapping[str, Any]
+    integrate: Callable[[Log], tuple[Solver, Mapping[str, int]]]
+    engine: str = "pinocchio"
+
+    def run(self) -> Trajectory:
+        """Integrate from the start."""
+        log = Log()
+        start = perf_counter()
+        solver, counts = self.integrate(log)
+        wall = perf_counter() - start
+        return log.trajectory(self.scene.observe, solver.outcome, solver.message, solver.steps, wall, counts)
+
+    def audit(self) -> Mapping[str, Any]:
+        """The physics read back from the model."""
+        return audit(self.case, self.scene.rows, self.constants)
+
+
+class Pinocchio:
+    """Pinocchio 4; see `crossbody.engines.Engine`."""
+
+    name = "pinocchio"
+    profiles: Mapping[str, str] = {
+        "law": "the case's law solved for v' and lam by forwardDynamics, CVODE, the level machine",
+        "impulse": "impacts in no time with the restitution of the law's linear part, rigid contact once captured",
+        "admm": "time stepping with ADMM, the LCP baseline: first order, restitution of the law's linear part",
+    }
+    versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": sksundae.__version__}
+
+    def why_not(self, case: Case, profile: str) -> str | None:
+        """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""
+        _settings.profile_of(self.name, self.profiles, profile)
+        known = _registry.plugin_names(PACKAGE, _path())
+        if case.mechanism not in known:
+            return f"Pinocchio has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
+        if profile == "impulse" and not case.law.unilateral.all():
+            return "An impact needs a contact that opens: a row that is always on has none."
+        if profile == "law" and case.fsm != "level":
+            return f"The profile law switches by the machine 'level' and not by {case.fsm!r}."
+        return None
+
+    def prepare(self, case: Case, profile: str = "law", **settings: Any) -> PinocchioRun:
+        """Build the model of a case.
+
+        Args:
+            case: the scene.
+            profile: one of `profiles`; "matched" is another name for law.
+            settings: law: rtol, method, algebra, max_steps; impulse: rtol, restitution, max_steps;
+                admm: dt in s, tol in m/s and N s, restitution, max_steps.
+
+        Raises:
+            UnknownName: for a profile or setting that does not exist.
+            CaseUnsupported: with the sentence of `why_not`.
+            InvalidValue: for a setting outside its range.
+        """
+        reason = self.why_not(case, profile)
+        if reason is not None:
+            raise CaseUnsupported(reason)
+        used = _settings.chosen(self.name, profile, _known(case, profile), settings)
+        mechanism: ModuleType = _registry.load_plugin("mechanism of Pinocchio", PACKAGE, _path(), case.mechanism)
+        scene: Scene = mechanism.build(case, str(used.get("algebra", "forwardDynamics")))
+        constants: dict[str, Any] = {"a0": case.law.a0, "a1": case.law.a1, "a2": case.law.a2}
+        if profile != "law":
+            constants = {"restitution": used["restitution"]}
+        integrate = _PROFILES[profile](case, scene, used)
+        return PinocchioRun(
+            case=case, scene=scene, profile=profile, settings=used, constants=constants, integrate=integrate
+        )
+
+
+def _path() -> list[str]:
+    from crossbody.engines import pinocchio as package
+
+    return list(package.__path__)
+
+
+def _known(case: Case, profile: str) -> dict[str, Parameter]:
+    """The settings of a profile."""
+    if profile == "law":
+        return {"rtol": RTOL, "method": METHOD, "algebra": SOLVER, "max_steps": STEPS}
+    e = Parameter(default=restitution(case.law, 0), doc="restitution", low=0.0, high=1.0)
+    if profile == "impulse":
+        return {"rtol": RTOL, "restitution": e, "max_steps": STEPS}
+    return {
+        "dt": Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True),
+        "tol": Parameter(default=1e-12, doc="absolute tolerance of ADMM", low=1e-15, high=1e-1),
+        "restitution": e,
+        "max_steps": STEPS,
+    }
+
+
+def _absolute(case: Case, rtol: float) -> Floats:
+    """Absolute tolerances (2 n,): rtol of how far and how fast the scene moves, or how deep its contacts give."""
+    speed = np.sqrt(2 * _scale.energy_per_mass(case)) or 1.0
+    depth = _scale.deepest(case) or float(np.abs(case.q0).max()) or 1.0
+    n = len(case.q0)
+    return rtol * np.concatenate((np.full(n, depth), np.full(n, speed)))
+
+
+def _law(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
+    return _flowing(LevelMachine(scene.rows), case, used)
+
+
+def _impulse(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
+    e = [float(used["restitution"])] * scene.rows.nc
+    return _flowing(ImpulseMachine(scene.rows.rigid(), case.law.a0, e), case, used)
+
+
+def _flowing(machine: Any, case: Case, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
+    rtol, method, limit = float(used["rtol"]), str(used.get("method", "Adams")), int(used["max_steps"])
+
+    def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
+        flow = Flow(machine, log, rtol, _absolute(case, rtol), method, limit)
+        flow.run(case.q0, case.v0, case.t_end)
+        return flow, {"rhs": flow.rhs}
+
+    return integrate
+
+
+def _admm(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
+    e = [float(used["restitution"])] * scene.rows.nc
+
+    def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
+        stepper = TimeStepper(scene.rows, scene.points, e, float(used["tol"]), log, int(used["max_steps"]))
+        stepper.run(case.q0, case.v0, case.t_end, float(used["dt"]))
+        return stepper, {"iterations": stepper.iterations, "unsolved": stepper.unsolved}
+
+    return integrate
+
+
+_PROFILES = {"law": _law, "impulse": _impulse, "admm": _admm}

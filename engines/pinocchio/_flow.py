@@ -1,0 +1,127 @@
+"""Event-driven integration: CVODE between events, a state machine at them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sksundae.cvode import CVODE
+
+from crossbody.cases import Mode, Outcome
+from crossbody.cases._arrays import Floats
+from crossbody.engines._log import Log
+from crossbody.engines._machines import WATCHED, Fired, Machine, Settled, active, first_modes
+
+PER_SOLVE = 100_000
+"""Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""
+ROOT_FOUND = 2
+"""CVODE's word for a step that ended at a zero of a watched function; later steps still carry the old events."""
+SAME_INSTANT = 100
+"""Events in a row without the time moving on that make a cycle."""
+
+
+class Flow:
+    """One run.
+
+    Attributes:
+        modes: modes of the rows now.
+        steps, rhs: steps and right-hand sides so far.
+        outcome, message: how it ended.
+    """
+
+    def __init__(self, machine: Machine, log: Log, rtol: float, atol: Floats, method: str, max_steps: int) -> None:
+        self.machine, self.rows, self.log, self.max_steps = machine, machine.rows, log, max_steps
+        self.n = len(atol) // 2
+        self.q, self.v = np.empty(self.n), np.empty(self.n)  # Pinocchio and CVODE do not share memory
+        self.steps = self.rhs = self.still = 0
+        self.outcome, self.message = Outcome.FINISHED, ""
+        self.modes = first_modes(self.rows)
+        self.on = active(self.modes)
+        watched = WATCHED * self.rows.nc
+        options = {"rtol": rtol, "atol": atol, "method": method, "max_num_steps": PER_SOLVE}
+
+        def watch(t: float, y: NDArray[Any], out: NDArray[Any]) -> None:  # CVODE hangs attributes on it
+            self._watch(y, out)
+
+        self.solver = CVODE(self._rhs, eventsfn=watch, num_events=watched, **options)
+
+    def run(self, q0: Floats, v0: Floats, t_end: float) -> None:
+        """Integrate from (q0, v0) to t_end, s."""
+        t, y = 0.0, np.concatenate((q0, v0))
+        y = self._switch(t, y, frozenset(), first=True)
+        self.solver.init_step(t, y)
+        stop = t_end
+        while t < t_end and self.outcome.ok:
+            if self.steps >= self.max_steps:
+                return self._end(Outcome.STEP_LIMIT, t, y, f"{self.max_steps} steps were not enough")
+            step = self.solver.step(stop, method="onestep", tstop=stop)
+            self.steps += 1
+            if not step.success:
+                what = " ".join(str(step.message).split())
+                return self._end(Outcome.STEP_TOO_SMALL, t, y, f"CVODE: {what}")
+            if not np.isfinite(step.y).all():
+                return self._end(Outcome.NOT_FINITE, t, y, "the next state is not finite")
+            fired = _fired(step)
+            if self._overran(step.y, fired) and step.t > t and stop != step.t:
+                stop = float(step.t)  # a dip that began and turned inside one step: again, no further than its bottom
+                self.solver.init_step(t, y)
+                continue
+            before, t, stop = t, float(step.t), t_end
+            modes, y = self.modes, self._switch(t, np.array(step.y), fired)
+            self.still = self.still + 1 if t == before else 0
+            if self.still > SAME_INSTANT:
+                return self._end(Outcome.MODE_CYCLE, t, y, f"rows {modes} switch for ever")
+            if self.modes != modes or not np.array_equal(y, step.y):
+                self.solver.init_step(t, y)
+        return None
+
+    def _switch(self, t: float, y: Floats, fired: Fired, first: bool = False) -> Floats:
+        """Record an instant, let the machine look at it, and record it again if something switched."""
+        q, v = y[: self.n], y[self.n :]
+        lam = self.rows.accelerate(q, v, self.on)[1]
+        if not first:
+            self.log.add(t, q, v, lam, self.modes)
+            if not fired and not self._pulls(lam):
+                return y
+        settled: Settled = self.machine.settle(q, v, self.modes, fired)
+        if settled.passed:
+            self.modes, self.on = settled.modes, active(settled.modes)
+            self.log.events += settled.events(t)
+            lam = self.rows.accelerate(q, settled.v, self.on)[1]
+            y = np.concatenate((q, settled.v))
+        if settled.passed or first:
+            self.log.add(t, q, settled.v, lam, self.modes)
+        if settled.cycle:
+            self._end(Outcome.MODE_CYCLE, t, y, f"the rows come back to {settled.modes} at one instant")
+        return y
+
+    def _pulls(self, lam: Floats) -> bool:
+        """Whether a contact pulls though its zero was not found: it began below, by the rounding of its start."""
+        return any(m == Mode.CONTACT and lam[i] < 0.0 for i, m in enumerate(self.modes))
+
+    def _overran(self, y: Floats, fired: Fired) -> bool:
+        """Whether a free row stands below its surface without its touch having been found."""
+        h = self.rows.gaps(y[: self.n], y[self.n :])[0]
+        return any(m == Mode.FREE and h[i] < 0.0 and (i, 0) not in fired for i, m in enumerate(self.modes))
+
+    def _rhs(self, _t: float, y: NDArray[Any], yp: NDArray[Any]) -> None:
+        n = self.n
+        self.rhs += 1
+        self.q[:], self.v[:] = y[:n], y[n:]
+        yp[:n] = self.v
+        yp[n:] = self.rows.accelerate(self.q, self.v, self.on)[0]
+
+    def _watch(self, y: NDArray[Any], out: NDArray[Any]) -> None:
+        self.q[:], self.v[:] = y[: self.n], y[self.n :]
+        self.machine.watch(self.q, self.v, self.modes, out)
+
+    def _end(self, outcome: Outcome, t: float, y: Floats, what: str) -> None:
+        self.outcome = outcome
+        self.message = f"t = {t:g} s, q = {y[: self.n].tolist()}, v = {y[self.n :].tolist()}: {what}."
+
+
+def _fired(step: Any) -> Fired:
+    if step.status != ROOT_FOUND or step.i_events is None:
+        return frozenset()
+    return frozenset(divmod(int(k), WATCHED) for k in np.flatnonzero(step.i_events[-1]))
