@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -69,28 +69,35 @@ def _plain(value: Any) -> Any:
 
 def _block(data: pa.Table, name: str) -> Floats:
     """Columns name0, name1, ... as one array (n, k)."""
-    columns = []
+    columns: list[Floats] = []
     while f"{name}{len(columns)}" in data.column_names:
         columns.append(data.column(f"{name}{len(columns)}").to_numpy())
     return np.stack(columns, axis=1) if columns else np.zeros((len(data), 0))
+
+
+def _motion(data: pa.Table, prefix: str) -> Trajectory:
+    q, v, gap, lam, energy, mode = (_block(data, prefix + name) for name in _ARRAYS)
+    t = data.column("t").to_numpy()
+    return Trajectory(t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode.astype(np.int8))
+
+
+def _ledger(data: pa.Table) -> Ledger | None:
+    if "work0" not in data.column_names:
+        return None
+    given, lost = (data.column(name).to_numpy() for name in ("input", "loss"))
+    return Ledger(contact=_block(data, "work"), input=given, dissipated=lost)
 
 
 def load(path: Path) -> Trace:
     """Read one motion back."""
     data = pq.read_table(path)
     about = json.loads(data.schema.metadata[_KEY])
-    t = data.column("t").to_numpy()
-    ledger = None
-    if "work0" in data.column_names:
-        flows = (data.column(name).to_numpy() for name in ("input", "loss"))
-        ledger = Ledger(contact=_block(data, "work"), **dict(zip(("input", "dissipated"), flows, strict=True)))
-    run = Trajectory(
-        t=t,
-        **{name: _block(data, name) for name in _ARRAYS},
+    run = replace(
+        _motion(data, ""),
+        ledger=_ledger(data),
         events=tuple(Event(t=s, contact=i, before=Mode(b), after=Mode(a)) for s, i, b, a in about["events"]),
         outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"], wall_s=about["wall_s"],
-        counts=about["counts"], ledger=ledger,
+        counts=about["counts"],
     )  # fmt: skip
-    has_truth = "truth_q0" in data.column_names
-    truth = Trajectory(t=t, **{name: _block(data, f"truth_{name}") for name in _ARRAYS}) if has_truth else None
+    truth = _motion(data, "truth_") if "truth_q0" in data.column_names else None
     return Trace(about=about["about"], run=run, truth=truth)
