@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +43,7 @@ def write(out: Path) -> Path:
 def render(out: Path) -> str:
     """The page as text."""
     environment = Environment(
-        loader=FileSystemLoader(str(files("crossbody.reports") / "templates")),
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters |= {"number": number, "slug": slug}
@@ -123,5 +122,5 @@ def slug(text: str) -> str:
 def number(value: Any) -> str:
     """A number for a table: four digits, a dash where there is none."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "–"
+        return "-"
     return f"{value:.4g}" if isinstance(value, (int, float)) and not isinstance(value, bool) else str(value)

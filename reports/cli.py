@@ -1,0 +1,115 @@
+"""The command `crossbody`.
+
+Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2: wrong use, told in one
+sentence on stderr. Whatever is not needed to read the command line is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+from crossbody.cases import CrossbodyError
+
+_Work = TypeVar("_Work", bound=Callable[..., int])
+
+DEFAULT_OUT = Path("out")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="crossbody")
+def cli() -> None:
+    """Cross-check a reference model of contact and constrained dynamics against rigid-body engines."""
+
+
+@cli.command("list")
+def list_() -> None:
+    """List cases, engines and metrics."""
+    from crossbody import cases, engines
+    from crossbody.reports import metrics
+
+    for title, source in (("Cases", cases), ("Engines", engines), ("Metrics", metrics)):
+        click.echo(f"{title}:")
+        width = max(map(len, source.names()), default=0)
+        for name in source.names():
+            click.echo(f"  {name:<{width}}  {source.summary(name)}")
+
+
+def _shared(command: _Work) -> _Work:
+    """Options that say what is run."""
+    options = (
+        click.argument("names", metavar="[CASE]...", nargs=-1),
+        click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable."),
+        click.option("--variant", metavar="V", help="Variant of the case; all if not given."),
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
+        click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR"),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@cli.command()
+@_shared
+@click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
+@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON and nothing else.")
+def run(
+    names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
+    rtol: float | None, as_json: bool,
+) -> int:  # fmt: skip
+    """Run cases on engines, judge them, and write the report."""
+    from crossbody.reports.commands import run as work
+
+    return work(names, wanted, variant, pairs, out, rtol, as_json, _command())
+
+
+@cli.command()
+@_shared
+@click.option("--repeats", type=click.IntRange(1, 1000), default=5, show_default=True, help="Timed runs of each.")
+def bench(
+    names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
+    repeats: int,
+) -> int:  # fmt: skip
+    """Time engines against their error over ladders of tolerances and steps."""
+    from crossbody.reports.commands import bench as work
+
+    return work(names, wanted, variant, pairs, out, repeats, _command())
+
+
+@cli.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+def report(folder: Path) -> int:
+    """Make the page of an earlier run again."""
+    from crossbody.reports import page
+
+    click.echo(f"Report: {page.write(folder).absolute()}")
+    return 0
+
+
+def _command() -> str:
+    return shlex.join(["crossbody", *sys.argv[1:]])
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point: every error of use is one sentence and exit code 2."""
+    try:
+        code = cli.main(args=arguments, prog_name="crossbody", standalone_mode=False)
+    except click.exceptions.Abort:
+        code = 130
+    except click.ClickException as error:
+        code = _say(error.format_message())
+    except CrossbodyError as error:
+        code = _say(str(error))
+    except KeyboardInterrupt:
+        code = 130
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _say(text: str) -> int:
+    click.echo("crossbody: " + " ".join(text.split()), err=True)
+    return 2

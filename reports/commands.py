@@ -1,0 +1,142 @@
+"""What the commands do: run, judge, write, show."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from crossbody.cases import Case, InvalidValue
+from crossbody.reports import jobs, output, page, study
+from crossbody.reports.audit import SEED
+from crossbody.reports.provenance import provenance
+from crossbody.reports.verdict import Word, exit_code
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+
+COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
+
+
+def run(
+    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
+    rtol: float | None, as_json: bool, command: str,
+) -> int:  # fmt: skip
+    """Run, judge, write and show; the exit code.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is written.
+    """
+    if rtol is not None and not 1e-14 <= rtol <= 1e-1:
+        raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
+    cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
+    picks = jobs.picks(wanted)
+    output.check(out)
+    with progress(len(cases) * (len(picks) + 1), quiet=as_json) as tell:
+        results = [jobs.run_case(case, picks, rtol, tell) for case in cases]
+    rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol) for case in cases})
+    told = provenance(command, rtol=rtol, seed=SEED)
+    with output.folder(out) as made:
+        study.write(made, results, rows, told)
+        page.write(made)
+    if as_json:
+        print(rows.to_json(orient="records", double_precision=15))
+    else:
+        show(rows, out)
+    return exit_code(rows["verdict"])
+
+
+def bench(
+    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
+    repeats: int, command: str,
+) -> int:  # fmt: skip
+    """Time engines against their error; writes the tables and the page."""
+    from crossbody.reports import bench as timing
+
+    cases = jobs.load_cases(names, variant or "listing", jobs.parse_settings(pairs))
+    picks = jobs.picks(wanted)
+    output.check(out)
+    with progress(len(cases) * len(picks)) as tell:
+        tables = [timing.bench(case, picks, repeats, tell) for case in cases]
+    rows, orders = timing.joined(tables)
+    told = provenance(command, repeats=repeats)
+    with output.folder(out) as made:
+        study.write(made, [], study.judge([], {}), told)
+        study.write_table(made / "bench", rows, told)
+        study.write_table(made / "orders", orders, told)
+        page.write(made)
+    show_bench(rows, orders, out)
+    return 0
+
+
+def repeat(case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None) -> str:
+    """The command that reproduces the rows of one case, but for its engine."""
+    source = next((name for name in names if name.endswith(".py") and Path(name).stem == case.name), case.name)
+    words = ["crossbody", "run", source, "--variant", case.variant]
+    words += [word for pair in pairs for word in ("--set", pair)]
+    return shlex.join(words + (["--rtol", f"{rtol:g}"] if rtol is not None else []))
+
+
+@contextmanager
+def progress(steps: int, quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """A bar on stderr, advanced each time it is told what is being done."""
+    if quiet:
+        yield lambda _text: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=steps, completed=-1)
+
+        def tell(text: str) -> None:
+            bar.update(task, description=text, advance=1)
+
+        yield tell
+
+
+def show(rows: pd.DataFrame, out: Path) -> None:
+    """The judged rows as a table, their count, and where the report is."""
+    from rich.console import Console
+
+    console = Console()
+    console.print(_table(rows[rows["verdict"] != Word.INFO]))
+    counts = rows["verdict"].value_counts()
+    console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
+    for text in rows.loc[rows["verdict"] == Word.SKIPPED, "why"].unique():
+        console.print(text, soft_wrap=True, highlight=False)
+    print(f"Report: {(out / page.PAGE).absolute()}", file=sys.stdout)
+
+
+def _table(rows: pd.DataFrame) -> Any:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("case", "engine", "metric"):
+        table.add_column(name, no_wrap=True)
+    for name in ("value", "claimed", "limit"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("unit")
+    table.add_column("verdict", no_wrap=True)
+    for row in rows.to_dict(orient="records"):
+        word = Word(row["verdict"])
+        colour = COLOURS.get(word, "dim")
+        table.add_row(
+            f"{row['case']}:{row['variant']}", f"{row['engine']}:{row['profile']}", row["metric"],
+            page.number(row["value"]), page.number(row["expected"]), page.number(row["limit"]), row["unit"],
+            f"[{colour}]{word}[/]",
+        )  # fmt: skip
+    return table
+
+
+def show_bench(rows: pd.DataFrame, orders: pd.DataFrame, out: Path) -> None:
+    """Timings and observed orders in the terminal."""
+    for table in (rows, orders):
+        print(table.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
+    print(f"Report: {(out / page.PAGE).absolute()}")
