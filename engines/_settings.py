@@ -7,6 +7,8 @@ from typing import Any
 
 from crossbody.cases import Parameter, UnknownName, Value
 
+MATCHED = "matched"
+
 
 def chosen(engine: str, profile: str, known: Mapping[str, Parameter], given: Mapping[str, Any]) -> dict[str, Value]:
     """Every setting's value: the user's where given, else the default.
@@ -29,11 +31,13 @@ def chosen(engine: str, profile: str, known: Mapping[str, Parameter], given: Map
 
 
 def profile_of(engine: str, profiles: Mapping[str, str], profile: str) -> str:
-    """The profile, if the engine has it.
+    """The profile, if the engine has it; "matched" is the first one of an engine that has no profile of that name.
 
     Raises:
         UnknownName: listing the profiles.
     """
+    if profile == MATCHED:
+        return MATCHED if MATCHED in profiles else next(iter(profiles))
     if profile not in profiles:
         raise UnknownName(f"profile of {engine}", profile, profiles)
     return profile

@@ -1,8 +1,10 @@
 """Time stepping with impulses from ADMM: the LCP baseline, first order in the step (spec 4.3).
 
-v+ = v + M^-1 ( dt (tau - b) + J^T p )        q+ = q + dt (v + v+)/2
+v+ = v + M^-1 ( dt (tau - b) + J^T p )        q+ = q + dt (theta v+ + (1 - theta) v)
 0 <= p  perp  J v+ + e J v >= 0               rows whose gap is closed half a step ahead (Moreau and Jean)
 (1 + a1 dt + k dt^2) J v+ = J v - k dt h      rows that are always on: implicit Euler of the law, k = a0 + a2 h^2
+
+theta = 1/2, exact in free flight; 1 if a row is always on, or its position would not follow its own condition.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import pinocchio as pin
 from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Log, Modes
+from crossbody.engines._machines import first_modes
 from crossbody.engines.pinocchio._rows import PinRows
 
 FREE, CONTACT, BILATERAL = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BILATERAL)
@@ -46,7 +49,8 @@ class TimeStepper:
     def run(self, q0: Floats, v0: Floats, t_end: float, dt: float) -> None:
         """Step from (q0, v0) to t_end, s; lam is the impulse of the step before each instant over its length."""
         t, q, v = 0.0, np.array(q0), np.array(v0)
-        modes = tuple(FREE if u else BILATERAL for u in self.rows.unilateral)
+        modes = first_modes(self.rows)
+        theta = 1.0 if BILATERAL in modes else 0.5
         self.log.add(t, q, v, np.zeros(self.rows.nc), modes)
         while t_end - t > 1e-9 * dt:
             if self.steps >= self.max_steps:
@@ -56,7 +60,7 @@ class TimeStepper:
             new, p = self._step(q, v, closed, tau)
             if not np.isfinite(new).all():
                 return self._end(Outcome.NOT_FINITE, t, q, v, "the next velocity is not finite")
-            q, v, t = q + 0.5 * tau * (v + new), new, t + tau
+            q, v, t = q + tau * (theta * new + (1.0 - theta) * v), new, t + tau
             self.steps += 1
             modes = self._modes(t, modes, p)
             self.log.add(t, q, v, p / tau, modes)

@@ -8,8 +8,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from crossbody.cases import Law, Mode
-from crossbody.cases import _closed_forms as closed_forms
 from crossbody.cases._arrays import Floats
+from crossbody.cases._closed_forms import damping_ratio
+from crossbody.cases._closed_forms import restitution as restitution_at
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import WATCHED, Fired, Settled, active
 from crossbody.engines.pinocchio._rows import PinRows
@@ -21,17 +22,14 @@ GAP, PUSH = 0, 1
 def restitution(law: Law, row: int) -> float:
     """e(zeta) of the linear part of the law; 0 without stiffness, whose collision never ends."""
     a0, a1 = float(law.a0[row]), float(law.a1[row])
-    if a0 == 0.0:
-        return 0.0
-    e: float = closed_forms.restitution(closed_forms.damping_ratio(a0, a1))
-    return e
+    return restitution_at(damping_ratio(a0, a1)) if a0 > 0.0 else 0.0
 
 
 def capture_speed(press: float, a0: float, e: float) -> float:
     """Approach speed below which the law never lets go, m/s: press / (w e^(3/2)), press = -h'' without the row."""
     if not (a0 > 0.0 and e > 0.0):
         return math.inf
-    return max(press, 0.0) / (math.sqrt(a0) * e**1.5)
+    return max(press, 0.0) / (math.sqrt(a0) * math.pow(e, 1.5))
 
 
 class ImpulseMachine:
