@@ -161,10 +161,12 @@ def _split(judge_: _Judge) -> Iterable[Verdict]:
     entry = judge_.entry
     if entry.refined is None or entry.run is None:
         return
-    finer = from_run(entry.refined, Tier.D, "the same engine refined")
+    sides = [("model", judge_.truth, entry.refined)]
+    if "dt" in entry.settings:  # a tolerance is refined to rounding: what is left is the model error alone
+        sides.append(("discretisation", from_run(entry.refined, Tier.D, "the same engine refined"), entry.run))
     for name in ("position", "event_times"):
         metric = metrics.load(name)
-        for label, against, run in (("discretisation", finer, entry.run), ("model", judge_.truth, entry.refined)):
+        for label, against, run in sides:
             value = metric.measure(against, run, judge_.case)
             if value is not None:
                 why = against.source

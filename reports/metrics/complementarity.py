@@ -1,6 +1,6 @@
 """How far the multipliers pull, or act where nothing touches, over the largest.
 
-Recomputed from lam and gap, never an engine's own flag.
+Recomputed from lam, gap and mode, never an engine's own flag.
 """
 
 from __future__ import annotations
@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.reports.metrics._contacts import CLOSED
+
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from crossbody.cases import Case, Trajectory
     from crossbody.reports.truth import Truth
 
@@ -17,15 +21,22 @@ UNIT = "1"
 CLAIMED = False
 
 
+def _open(truth: Truth, run: Trajectory) -> NDArray[np.bool_]:
+    """Samples and rows (n, nc) where nothing touches: by mode; without modes, above all contacts of the truth."""
+    if (run.mode >= 0).all():
+        return ~np.isin(run.mode, CLOSED)
+    touching = np.isin(truth.trajectory.mode, CLOSED)
+    reach = float(np.max(truth.trajectory.gap[touching], initial=0.0))
+    return run.gap > 1.01 * reach + 1e-9 * float(np.max(np.abs(run.gap), initial=0.0))
+
+
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max of -lam and of |lam| on open rows above the surface, over max |lam|; None where lam is not known."""
+    """Max of -lam and of |lam| on open unilateral rows, over max |lam|; None where lam is not known."""
     rows = case.law.unilateral
     if np.isnan(run.lam).any() or not rows.any():
         return None
-    lam, gap = run.lam[:, rows], run.gap[:, rows]
+    lam = run.lam[:, rows]
     scale = float(np.max(np.abs(lam), initial=0.0))
-    # A gap that is open further than rounding and than any contact of the truth holds on may not carry a force.
-    reach = max(float(np.max(truth.trajectory.gap[truth.trajectory.lam > 0.0], initial=0.0)), 0.0)
-    away = gap > reach + 1e-9 * float(np.max(np.abs(gap), initial=0.0))
-    worst = max(float(np.max(-lam, initial=0.0)), float(np.max(np.abs(lam[away]), initial=0.0)))
+    acting = np.abs(lam[_open(truth, run)[:, rows]])
+    worst = max(float(np.max(-lam, initial=0.0)), float(np.max(acting, initial=0.0)))
     return worst / scale if scale else 0.0

@@ -1,0 +1,56 @@
+"""Imports go one way, and what only lists things imports nothing heavy."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+BELOW = {
+    "cases": {"cases"},
+    "reference": {"reference", "cases"},
+    "engines": {"engines", "reference", "cases"},
+    "hw": {"hw", "engines", "reference", "cases"},
+    "reports": {"reports", "hw", "engines", "reference", "cases"},
+}
+HEAVY = ("numpy", "pandas", "numba", "scipy", "mujoco", "pinocchio", "plotly", "pyarrow", "sksundae")
+
+
+def imported(path: Path) -> set[str]:
+    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    names = {node.module for node in tree if isinstance(node, ast.ImportFrom) and node.module}
+    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    names |= {
+        f"{node.module}.{alias.name}"
+        for node in tree
+        if isinstance(node, ast.ImportFrom) and node.module == "crossbody"
+        for alias in node.names
+    }
+    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    names |= {alias.name for node in tree if isinstance(node, ast.Import) for alias in node.names}
+    return {name.split(".")[1] for name in names if name.startswith("crossbody.")}
+
+
+@pytest.mark.parametrize("layer", BELOW)
+def test_imports_go_one_way(layer: str) -> None:
+    files = list((ROOT / layer).rglob("*.py"))
+    assert files
+    for path in files:
+        assert imported(path) <= BELOW[layer], f"{path.relative_to(ROOT)} imports from above"
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["list"], ["run", "--help"]])
+def test_listing_imports_nothing_heavy(arguments: list[str]) -> None:
+    code = (
+        "import sys\nfrom crossbody.reports.cli import main\n"
+        f"try:\n    main({arguments!r})\nexcept SystemExit as end:\n    assert end.code == 0, end.code\n"
+        f"found = [name for name in {HEAVY!r} if name in sys.modules]\n"
+        "assert not found, found\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "crossbody" in done.stdout or "bouncing_ball" in done.stdout or "Usage" in done.stdout
