@@ -9,6 +9,7 @@ z, Jy, X = delta.jacobians(robot, q)
 from __future__ import annotations
 
 from crossbody.reference.delta.kinematics import closed_pose, flange, forward, inverse, jacobians, virtual_jacobian
+from crossbody.reference.delta.model import kick, system
 from crossbody.reference.delta.robot import HEAVY, LIGHT, SETS, Robot, Servo
 from crossbody.reference.delta.singularity import Margins, elbow_angle, ill_posed_tilts, margins, pendulum_rate
 from crossbody.reference.delta.statics import gravity_torque, holding_pose, task_mass
@@ -29,8 +30,10 @@ __all__ = [
     "ill_posed_tilts",
     "inverse",
     "jacobians",
+    "kick",
     "margins",
     "pendulum_rate",
+    "system",
     "task_mass",
     "virtual_jacobian",
 ]
