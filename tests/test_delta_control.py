@@ -375,3 +375,13 @@ def test_path_that_leaves_the_workspace_says_when_and_which_arm():
     path = paths.move((0.0, 0.0, 0.6), (0.0, 0.0, 1.2), 1.0)
     with pytest.raises(InvalidValue, match=r"At t = 0\.\d+ s: .*arm 1 would have to reach"):
         control.program(delta.LIGHT, Linearising(), path, 2.0)
+
+
+@pytest.mark.parametrize(("depth", "stable"), [(0.30, False), (0.40, False), (0.42, True), (0.60, True), (0.75, True)])
+def test_heave_under_constant_torque_is_unstable_above_a_depth(robot, depth, stable):
+    """Under the balancing torque heave is unstable above about 0.41 m, the lateral modes are stable everywhere."""
+    free = replace(robot, d1=0.0, d2=0.0, d3=0.0)
+    stiffness = -plant_model(free, delta.inverse(free, (0.0, 0.0, depth)))[0][3:, :3]
+    assert (stiffness[2, 2] > 0) == stable
+    assert stiffness[0, 0] > 0
+    assert stiffness[1, 1] == pytest.approx(stiffness[0, 0], rel=1e-4)
