@@ -164,3 +164,20 @@ def test_the_free_parts_of_a_scene_are_not_solved_for() -> None:
     found = run(case)
     assert found.events == ()
     assert not found.lam.any()
+
+
+@pytest.mark.parametrize("factor", [np.nan, 1e300])
+def test_failures_are_outcomes_and_print_nothing(factor: float, capfd: pytest.CaptureFixture[str]) -> None:
+    prepared = engines.load("pinocchio").prepare(ball(), "law", max_steps=2000)
+    prepared.scene.rows.tau[:] = factor
+    found = prepared.run()
+    assert found.outcome in (Outcome.NOT_FINITE, Outcome.STEP_TOO_SMALL, Outcome.DIVERGED)
+    assert (found.outcome is Outcome.NOT_FINITE) or not np.isnan(factor)
+    assert "t = " in found.message
+    assert capfd.readouterr() == ("", "")
+
+
+def test_start_below_the_surface_going_up_is_not_struck() -> None:
+    found = run(ball("linear", height=-0.01, speed=-1.0, gravity=0.0, t_end=0.1), "impulse")
+    assert found.outcome.ok
+    assert found.q[-1, 0] == pytest.approx(0.09)

@@ -12,11 +12,14 @@ from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Log
 from crossbody.engines._machines import WATCHED, Fired, Machine, Settled, active, first_modes
+from crossbody.engines._quiet import quiet
 
 PER_SOLVE = 100_000
 """Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""
 ROOT_FOUND = 2
 """CVODE's word for a step that ended at a zero of a watched function; later steps still carry the old events."""
+TINY = 1e-300
+"""In place of a watched function that is exactly 0: it has not passed yet. CVODE complains of what stays at 0."""
 SAME_INSTANT = 100
 """Events in a row without the time moving on that make a cycle."""
 
@@ -34,6 +37,7 @@ class Flow:
         self.machine, self.rows, self.log, self.max_steps = machine, machine.rows, log, max_steps
         self.n = len(atol) // 2
         self.q, self.v = np.empty(self.n), np.empty(self.n)  # Pinocchio and CVODE do not share memory
+        self.vd: Floats = np.zeros(self.n)
         self.steps = self.rhs = self.still = 0
         self.outcome, self.message = Outcome.FINISHED, ""
         self.modes = first_modes(self.rows)
@@ -43,11 +47,18 @@ class Flow:
 
         def watch(t: float, y: NDArray[Any], out: NDArray[Any]) -> None:  # CVODE hangs attributes on it
             self._watch(y, out)
+            out[out == 0.0] = TINY
 
         self.solver = CVODE(self._rhs, eventsfn=watch, num_events=watched, **options)
 
     def run(self, q0: Floats, v0: Floats, t_end: float) -> None:
         """Integrate from (q0, v0) to t_end, s."""
+        with quiet() as said:
+            self._run(q0, v0, t_end)
+        words = " ".join(said.getvalue().split())
+        self.message = f"{self.message} CVODE: {words}" if words else self.message
+
+    def _run(self, q0: Floats, v0: Floats, t_end: float) -> None:
         t, y = 0.0, np.concatenate((q0, v0))
         y = self._switch(t, y, frozenset(), first=True)
         self.solver.init_step(t, y)
@@ -58,12 +69,13 @@ class Flow:
             step = self.solver.step(stop, method="onestep", tstop=stop)
             self.steps += 1
             if not step.success:
-                what = " ".join(str(step.message).split())
-                return self._end(Outcome.STEP_TOO_SMALL, t, y, f"CVODE: {what}")
+                finite = bool(np.isfinite(self.vd).all())
+                bad = Outcome.STEP_TOO_SMALL if finite else Outcome.NOT_FINITE
+                return self._end(bad, t, y, "CVODE gave up" if finite else f"the acceleration is {self.vd.tolist()}")
             if not np.isfinite(step.y).all():
                 return self._end(Outcome.NOT_FINITE, t, y, "the next state is not finite")
             fired = _fired(step)
-            if self._overran(step.y, fired) and step.t > t and stop != step.t:
+            if step.t > t and stop != step.t and self._overran(y, step.y, fired):
                 stop = float(step.t)  # a dip that began and turned inside one step: again, no further than its bottom
                 self.solver.init_step(t, y)
                 continue
@@ -71,7 +83,8 @@ class Flow:
             modes, y = self.modes, self._switch(t, np.array(step.y), fired)
             self.still = self.still + 1 if t == before else 0
             if self.still > SAME_INSTANT:
-                return self._end(Outcome.MODE_CYCLE, t, y, f"rows {modes} switch for ever")
+                bad = Outcome.MODE_CYCLE if fired else Outcome.STEP_TOO_SMALL
+                return self._end(bad, t, y, f"the time does not move on (rows {modes})")
             if self.modes != modes or not np.array_equal(y, step.y):
                 self.solver.init_step(t, y)
         return None
@@ -100,17 +113,21 @@ class Flow:
         """Whether a contact pulls though its zero was not found: it began below, by the rounding of its start."""
         return any(m == Mode.CONTACT and lam[i] < 0.0 for i, m in enumerate(self.modes))
 
-    def _overran(self, y: Floats, fired: Fired) -> bool:
-        """Whether a free row stands below its surface without its touch having been found."""
-        h = self.rows.gaps(y[: self.n], y[self.n :])[0]
-        return any(m == Mode.FREE and h[i] < 0.0 and (i, 0) not in fired for i, m in enumerate(self.modes))
+    def _overran(self, before: Floats, after: Floats, fired: Fired) -> bool:
+        """Whether a free row came from above its surface and stands below it without its touch having been found."""
+        h = self.rows.gaps(after[: self.n], after[self.n :])[0]
+        if not (h < 0.0).any():
+            return False
+        above = self.rows.gaps(before[: self.n], before[self.n :])[0]
+        free = [i for i, m in enumerate(self.modes) if m == Mode.FREE]
+        return any(h[i] < 0.0 < above[i] and (i, 0) not in fired for i in free)
 
     def _rhs(self, _t: float, y: NDArray[Any], yp: NDArray[Any]) -> None:
         n = self.n
         self.rhs += 1
         self.q[:], self.v[:] = y[:n], y[n:]
         yp[:n] = self.v
-        yp[n:] = self.rows.accelerate(self.q, self.v, self.on)[0]
+        yp[n:] = self.vd = self.rows.accelerate(self.q, self.v, self.on)[0]
 
     def _watch(self, y: NDArray[Any], out: NDArray[Any]) -> None:
         self.q[:], self.v[:] = y[: self.n], y[self.n :]
