@@ -54,6 +54,12 @@ class Engine(Protocol):
     def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> Run:
         """Build the engine's own model once, untimed.
 
+        Args:
+            case: the scene.
+            profile: one of `profiles`. "matched" is the one that follows the case's own law most closely: the first
+                of an engine that has no profile of that name. `Run.profile` says which one it was.
+            settings: of the profile, by name.
+
         Raises:
             UnknownName: for a profile or setting that it does not have (the valid ones are listed).
             CaseUnsupported: with the sentence of `why_not`.

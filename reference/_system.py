@@ -139,7 +139,7 @@ class System:
         """M(q) dense (n, n) and f(q, v, u) (n,) at t = 0."""
         n, k = self.n, self.mass_block
         blocks, f = np.zeros((n, k)), np.zeros(n)
-        self.dynamics(0.0, *self._state(q, v), self._input(u), self.p, blocks, f, np.zeros(self.scratch))
+        self.dynamics(0.0, *self._state(q, v), self._input(u), np.array(self.p), blocks, f, np.zeros(self.scratch))
         M = np.zeros((n, n))
         for b in range(0, n, k):
             M[b : b + k, b : b + k] = blocks[b : b + k]
@@ -151,14 +151,14 @@ class System:
         q_, v_ = self._state(q, v)
         w = np.zeros(self.scratch)
         blocks, f = np.zeros((self.n, self.mass_block)), np.zeros(self.n)
-        self.dynamics(0.0, q_, v_, self._input(None), self.p, blocks, f, w)
-        self.rows(0.0, q_, v_, self.p, w, np.arange(self.nc), self.nc, H, h, Hdv)
+        self.dynamics(0.0, q_, v_, self._input(None), np.array(self.p), blocks, f, w)
+        self.rows(0.0, q_, v_, np.array(self.p), w, np.arange(self.nc), self.nc, H, h, Hdv)
         return H, h, Hdv
 
     def gap(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats]:
         """Gaps and their rates (nc,) at (q, v)."""
         h, hd = np.zeros(self.nc), np.zeros(self.nc)
-        self.gaps(0.0, *self._state(q, v), self.p, h, hd)
+        self.gaps(0.0, *self._state(q, v), np.array(self.p), h, hd)
         return h, hd
 
     def checked_state(self, name: str, value: ArrayLike) -> Floats:

@@ -1,0 +1,41 @@
+"""The physics as the reference's kernels return it, for the parity audit (spec 5.3)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.reference import System
+
+
+def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
+    """Constants, start, and functions of the state at zero input: M (n, n), bias (n,) = -f, H (nc, n), lam (nc,) N.
+
+    lam has every row active; NaN where the rows are dependent.
+    """
+
+    def M(q: Floats) -> Floats:
+        return system.mass_matrix(q)
+
+    def bias(q: Floats, v: Floats) -> Floats:
+        f: Floats = -system.terms(q, v)[1]
+        return f
+
+    def H(q: Floats) -> Floats:
+        return system.constraint(q)[0]
+
+    def lam(q: Floats, v: Floats) -> Floats:
+        mass, f = system.terms(q, v)
+        rows, h, Hdv = system.constraint(q, v)
+        a0, a1, a2 = system.alpha.T
+        inverse = np.linalg.solve(mass, np.column_stack([rows.T, f]))
+        push = rows @ inverse[:, -1] + Hdv + a1 * (rows @ v) + a0 * h + a2 * h**3
+        try:
+            return np.asarray(np.linalg.solve(rows @ inverse[:, :-1], -push))
+        except np.linalg.LinAlgError:
+            return np.full(system.nc, np.nan)
+
+    constants = dict(zip(("a0", "a1", "a2"), system.alpha.T, strict=True))
+    return {"constants": constants, "q0": q0, "v0": v0, "M": M, "bias": bias, "H": H, "lam": lam}

@@ -1,0 +1,156 @@
+"""The reference: the hybrid penalty DAE of the case, by the compiled integrator or by SUNDIALS."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import version
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory
+from crossbody.engines import _settings
+from crossbody.engines._reference_audit import audit
+from crossbody.reference import Options, System, prepare
+from crossbody.reference._options import COLLISIONS, FSMS, TOLERANCES
+
+SYSTEMS = "crossbody.reference.systems"
+OF_THE_CASE = "case"
+SWITCHES = ("ledger", "shortcuts", "implicit")
+
+
+@dataclass(slots=True, kw_only=True)
+class ReferenceRun:
+    """One prepared run; see `crossbody.engines.Run`.
+
+    Attributes:
+        system: the mechanism with the law of its rows.
+        inner: the prepared run of the solver.
+    """
+
+    case: Case
+    system: System
+    inner: Any
+    profile: str
+    settings: Mapping[str, Any]
+    engine: str = "reference"
+
+    def run(self) -> Trajectory:
+        """Integrate from the start."""
+        trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
+        return trajectory
+
+    def audit(self) -> Mapping[str, Any]:
+        """The physics as the kernels return it."""
+        listed = getattr(_module(self.case.mechanism), "listed", None)
+        return audit(self.system, self.case.q0, self.case.v0) | (listed(self.system.p) if listed else {})
+
+
+class Reference:
+    """The project's own integrators; see `crossbody.engines.Engine`.
+
+    A mechanism is a module in reference/systems with `build(parameters, law) -> System`; it may have
+    `inputs(parameters) -> (times (m,), values (m, nu))` and `listed(p)`, what the parity audit lists.
+    """
+
+    name = "reference"
+    profiles: Mapping[str, str] = {
+        "compiled": "compiled Runge-Kutta of order 8 with events on its dense output, implicit where the law is stiff",
+        "ida": "the DAE in (q, v, lam) by SUNDIALS IDA with its own root finding",
+        "cvode": "the reduced equations in (q, v) by SUNDIALS CVODE with its own root finding",
+    }
+    versions: Mapping[str, str] = {name: version(name) for name in ("numba", "numpy", "scikit-sundae")}
+
+    def why_not(self, case: Case, profile: str) -> str | None:
+        """Mechanisms without equations here, and collision rules that the reference does not know."""
+        _settings.profile_of(self.name, self.profiles, profile)
+        if find_spec(f"{SYSTEMS}.{case.mechanism}") is None or not hasattr(_module(case.mechanism), "build"):
+            return f"The reference has no equations of the mechanism {case.mechanism!r}."
+        if _rule(case) not in COLLISIONS:
+            return (
+                f"The reference has no rule {case.collisions!r} for several contacts; it has: {', '.join(COLLISIONS)}."
+            )
+        return None
+
+    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> ReferenceRun:
+        """Build the mechanism of a case and everything that does not depend on time.
+
+        Args:
+            case: the scene.
+            profile: one of `profiles`.
+            settings: rtol, atol, ledger, samples, fsm, max_steps, time_limit; shortcuts and implicit of `compiled`,
+                index of `ida`. `samples` is a number of equidistant rows, or their times.
+
+        Raises:
+            UnknownName: for a profile or setting that does not exist.
+            CaseUnsupported: for a mechanism or a collision rule that is not there.
+            InvalidValue: for a setting outside its range.
+        """
+        reason = self.why_not(case, profile)
+        if reason is not None:
+            raise CaseUnsupported(reason)
+        solver = _settings.profile_of(self.name, self.profiles, profile)
+        times = {k: v for k, v in settings.items() if k == "samples" and np.ndim(v)}
+        numbers = {k: v for k, v in settings.items() if k not in times}
+        used = _settings.chosen(self.name, solver, _known(solver), numbers)
+        options = _options(case, solver, {**used, **times})
+        system = _module(case.mechanism).build(case.parameters, case.law)
+        inner = prepare(system, case.q0, case.v0, options)
+        inner.warm()
+        return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
+
+
+def _module(mechanism: str) -> ModuleType:
+    return import_module(f"{SYSTEMS}.{mechanism}")
+
+
+def _rule(case: Case) -> str:
+    """One contact that can switch collides with no other: every rule is the same."""
+    return case.collisions if int(np.sum(case.law.unilateral)) > 1 else "resolved"
+
+
+def _known(solver: str) -> dict[str, Parameter]:
+    low, high = TOLERANCES
+    known = {
+        "rtol": Parameter(default=1e-9, doc="relative tolerance", low=low, high=high),
+        "atol": Parameter(default=0.0, doc="absolute tolerance; 0 for rtol/1000", low=0.0),
+        "ledger": Parameter(default=True, doc="keep the energy account", low=0, high=1),
+        "samples": Parameter(default=0, doc="number of equidistant rows; 0 for every step", low=0, high=1e8),
+        "fsm": Parameter(default=OF_THE_CASE, doc="state machine", choices=(OF_THE_CASE, *FSMS)),
+        "max_steps": Parameter(default=1_000_000, doc="bound on the number of steps", low=1, high=1e12),
+        "time_limit": Parameter(default=3600.0, unit="s", doc="bound on wall time", low=0.0, open_low=True),
+    }
+    if solver == "compiled":
+        known["shortcuts"] = Parameter(default=True, doc="closed-form arcs where the scene is affine", low=0, high=1)
+        known["implicit"] = Parameter(default=True, doc="the implicit method where the law is stiff", low=0, high=1)
+    if solver == "ida":
+        known["index"] = Parameter(default=1, doc="1, or 3 for bilateral rows", low=1, high=3)
+    return known
+
+
+def _options(case: Case, solver: str, used: Mapping[str, Any]) -> Options:
+    """The settings in the words of `simulate`."""
+    given: dict[str, Any] = {name: bool(value) if name in SWITCHES else value for name, value in used.items()}
+    given["atol"] = given["atol"] or None
+    if np.ndim(given["samples"]) == 0:
+        count = given["samples"]
+        given["samples"] = np.linspace(0.0, case.t_end, count) if count else None
+    if given["fsm"] == OF_THE_CASE:
+        given["fsm"] = case.fsm
+    inputs = getattr(_module(case.mechanism), "inputs", None)
+    given["inputs"] = inputs(case.parameters) if inputs else None
+    return Options(t_end=case.t_end, solver=solver, collisions=_rule(case), **given)
+
+
+def _provenance(used: Mapping[str, Any], options: Options) -> dict[str, Any]:
+    """What was really used."""
+    switches = {name: getattr(options, name) for name in SWITCHES if name in used}
+    settled = {"atol": options.tolerance, "fsm": options.fsm, "collisions": options.collisions}
+    return {**used, **switches, **settled, "samples": 0 if options.samples is None else np.size(options.samples)}
+
+
+ENGINE = Reference()
