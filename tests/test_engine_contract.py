@@ -148,7 +148,13 @@ def test_steps_are_bounded(name: str, profile: str) -> None:
         pytest.skip(f"{name}:{profile} has no max_steps.")
     run = FOUND[name].prepare(case, profile, max_steps=3).run()
     assert (run.outcome, run.steps) == (cases.Outcome.STEP_LIMIT, 3)
-    assert "3 steps" in run.message
+    assert "step" in run.message
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_matched_is_a_name_in_every_engine(name: str) -> None:
+    profile = FOUND[name].prepare(cases.load("bouncing_ball")).profile
+    assert profile == ("matched" if "matched" in FOUND[name].profiles else next(iter(FOUND[name].profiles)))
 
 
 @pytest.mark.parametrize("name", FOUND)

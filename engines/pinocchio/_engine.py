@@ -77,7 +77,7 @@ class Pinocchio:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""
-        _settings.profile_of(self.name, self.profiles, profile)
+        profile = _settings.profile_of(self.name, self.profiles, profile)
         known = _registry.plugin_names(PACKAGE, _path())
         if case.mechanism not in known:
             return f"Pinocchio has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
@@ -87,12 +87,12 @@ class Pinocchio:
             return f"The profile law switches by the machine 'level' and not by {case.fsm!r}."
         return None
 
-    def prepare(self, case: Case, profile: str = "law", **settings: Any) -> PinocchioRun:
+    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> PinocchioRun:
         """Build the model of a case.
 
         Args:
             case: the scene.
-            profile: one of `profiles`; "matched" is another name for law.
+            profile: one of `profiles`; "matched" is law.
             settings: law: rtol, method, algebra, max_steps; impulse: rtol, restitution, max_steps;
                 admm: dt in s, tol in m/s and N s, restitution, max_steps.
 
@@ -101,6 +101,7 @@ class Pinocchio:
             CaseUnsupported: with the sentence of `why_not`.
             InvalidValue: for a setting outside its range.
         """
+        profile = _settings.profile_of(self.name, self.profiles, profile)
         reason = self.why_not(case, profile)
         if reason is not None:
             raise CaseUnsupported(reason)
