@@ -48,7 +48,8 @@ def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     t, values = t[keep], values[keep]
     if len(t) == 1:
         return np.repeat(values, len(times), axis=0)
-    if smooth and len(t) > 2:
-        cubic: Floats = CubicSpline(t, values)(np.clip(times, t[0], t[-1]))
-        return cubic
-    return np.stack([np.interp(times, t, column) for column in values.T], axis=1)
+    out = np.stack([np.interp(times, t, column) for column in values.T], axis=1)
+    finite = np.isfinite(values).all(axis=0)
+    if smooth and len(t) > 2 and finite.any():
+        out[:, finite] = CubicSpline(t, values[:, finite])(np.clip(times, t[0], t[-1]))
+    return out

@@ -1,0 +1,184 @@
+"""The command as a user meets it: exit codes, one-sentence errors, the folder it leaves."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from crossbody import engines
+from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory, UnknownName
+from crossbody.reports.cli import main
+from crossbody.reports.truth import truth_of
+
+
+@dataclass
+class FakeRun:
+    case: Case
+    profile: str
+    engine: str = "fake"
+    settings: Mapping[str, Any] = field(default_factory=lambda: {"dt": 1e-3})
+
+    def run(self) -> Trajectory:
+        run = truth_of(self.case).trajectory
+        wrong = {"exact": run.q, "off": 1.01 * run.q, "nan": np.full_like(run.q, np.nan)}
+        return replace(run, q=wrong[self.profile])
+
+    def audit(self) -> Mapping[str, Any]:
+        return {}
+
+
+class FakeEngine:
+    """The closed form under three names: as it is, one per cent off, and not a number."""
+
+    name = "fake"
+    profiles: Mapping[str, str] = {"exact": "as it is", "off": "1 % off", "nan": "not a number"}
+    versions: Mapping[str, str] = {}
+
+    def prepare(self, case: Case, profile: str = "exact", **settings: Any) -> FakeRun:
+        if case.closed_form is None:
+            raise CaseUnsupported("The fake engine knows closed forms only.")
+        return FakeRun(case, profile, settings={"dt": 1e-3} | settings)
+
+
+@pytest.fixture(autouse=True)
+def _fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def load(name: str) -> Any:
+        if name == "fake":
+            return FakeEngine()
+        if name == "absent":
+            raise EngineUnavailable("Engine 'absent' needs the package 'absent', which is not installed.")
+        raise UnknownName("engine", name, ("fake", "absent"))
+
+    monkeypatch.setattr(engines, "names", lambda: ("absent", "fake"))
+    monkeypatch.setattr(engines, "load", load)
+    monkeypatch.chdir(tmp_path)
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    return int(end.value.code or 0)
+
+
+LINEAR = ("run", "bouncing_ball", "--variant", "linear")
+
+
+def test_all_within_is_zero(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(*LINEAR, "-e", "fake:exact") == 0
+    said = capsys.readouterr().out
+    assert f"Report: {Path('out/index.html').absolute()}" in said
+
+
+def test_outside_is_one() -> None:
+    assert call(*LINEAR, "-e", "fake:nan") == 1
+
+
+def test_an_engine_without_its_package_is_skipped_with_its_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(*LINEAR, "-e", "fake:exact", "-e", "absent") == 0
+    assert "not installed" in capsys.readouterr().out
+    rows = pd.read_parquet("out/verdicts.parquet")
+    assert rows.loc[rows["engine"] == "absent", "verdict"].tolist() == ["skipped"]
+
+
+def test_a_case_that_an_engine_cannot_do_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("crossbody.reports.jobs.truth_of", lambda case: truth_of(replace(case, closed_form=LAW)))
+    assert call("run", "--variant", "listing", "-e", "fake:exact") == 0
+    rows = pd.read_parquet("out/verdicts.parquet")
+    assert rows["why"].tolist() == ["The fake engine knows closed forms only."]
+
+
+def LAW(times: Any) -> Trajectory:
+    from crossbody.cases import load
+
+    motion = load("bouncing_ball", "linear").closed_form
+    assert motion is not None
+    return motion(times)
+
+
+def test_json_is_one_list_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
+    call(*LINEAR, "-e", "fake:exact", "--json")
+    rows = json.loads(capsys.readouterr().out)
+    wanted = {"case", "variant", "engine", "profile", "metric", "value", "unit", "limit", "tier", "verdict", "why"}
+    assert rows
+    assert all(wanted | {"command"} <= set(row) for row in rows)
+
+
+def test_the_folder_holds_the_same_rows_three_times_with_provenance() -> None:
+    call(*LINEAR, "-e", "fake:exact", "--set", "a0=2e4")
+    parquet, csv = pd.read_parquet("out/verdicts.parquet"), pd.read_csv("out/verdicts.csv")
+    told = json.loads(Path("out/verdicts.json").read_text())
+    assert len(parquet) == len(csv) == len(told["rows"]) > 10
+    np.testing.assert_allclose(csv["value"], parquet["value"], rtol=1e-14)
+    stored = json.loads(pq.read_schema("out/verdicts.parquet").metadata[b"provenance"])
+    assert stored == told["provenance"]
+    assert {"command", "git", "versions", "cpu", "python", "threads", "seed", "rtol"} <= set(stored)
+    assert parquet["command"][0] == "crossbody run bouncing_ball --variant linear --set a0=2e4 --engine fake:exact"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("run", "bouncing_bal"), "Did you mean 'bouncing_ball'"),
+        (("run", "--variant", "nope"), "listing"),
+        (("run", "-e", "nope"), "fake"),
+        (("run", "-e", "fake:nope"), "exact"),
+        (("run", "--set", "stiffness=1"), "a0"),
+        (("run", "--set", "a0"), "name=value"),
+        (("run", "--set", "mass=-1"), "mass is -1"),
+        (("run", "--set", "a0=nan"), "a0 is nan"),
+        (("run", "--set", "t_end=-1"), "t_end is -1"),
+        (("run", "--rtol", "1"), "[1e-14, 0.1]"),
+        (("run", "--rtol", "small"), "small"),
+        (("run", "--nonsense"), "--nonsense"),
+        (("nonsense",), "nonsense"),
+        (("report", "nowhere"), "nowhere"),
+    ],
+)
+def test_wrong_use_is_one_sentence_and_leaves_nothing(
+    arguments: tuple[str, ...], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert call(*arguments) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert says in told.err
+    assert told.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_somebody_elses_folder_is_refused_before_anything_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").write_text("mine")
+    assert call(*LINEAR, "-e", "fake:exact") == 2
+    assert "crossbody did not write" in capsys.readouterr().err
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["thesis.tex"]
+
+
+def test_report_makes_the_same_page_again() -> None:
+    call(*LINEAR, "-e", "fake:exact")
+    page = Path("out/index.html")
+    text = page.read_text()
+    page.unlink()
+    assert call("report", "out") == 0
+    assert page.read_text() == text
+
+
+def test_bench_times_every_rung(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("bench", "--variant", "linear", "-e", "fake:exact", "-e", "fake:off", "--repeats", "2") == 0
+    rows = pd.read_parquet("out/bench.parquet")
+    assert set(rows["profile"]) == {"exact", "off"}
+    assert (rows["repeats"] == 2).all()
+    assert (rows["median_ms"] > 0).all()
+    orders = pd.read_parquet("out/orders.parquet").set_index("profile")["says"]
+    assert orders["exact"] == "too few points above rounding"
+    assert orders["off"] == "does not converge to the truth of the case"
+    assert "work-precision" in Path("out/index.html").read_text()
