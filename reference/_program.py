@@ -13,14 +13,8 @@ from numba import types
 from crossbody.reference import kernels
 from crossbody.reference._cache import compiled
 from crossbody.reference.core import advance as core
+from crossbody.reference.core._struct import TABLE
 from crossbody.reference.core.layout import STATE
-
-_F, _F2 = types.float64[::1], types.float64[:, ::1]
-_B, _B2 = types.int8[::1], types.int8[:, ::1]
-_I, _I2 = types.int64[::1], types.int64[:, ::1]
-# What `advance` takes after the kernels and the state.
-_DATA = (_F, _F2, _F2, _B, _I, _F, _F2, _F, _F, _I, _B, _B2, _F2, _B2, _F, _I2, types.int64)
-
 
 def _state() -> Any:
     return numba.typeof(np.zeros(1, STATE))
@@ -30,7 +24,7 @@ def _state() -> Any:
 def program() -> Any:
     """The function `advance`, from the cache or compiled (once per installation)."""
     functions = [kernels.function_type(name) for name in kernels.NAMES]
-    return compiled(core.advance, [types.int64(*functions, _state(), *_DATA)])
+    return compiled(core.advance, [types.int64(*functions, _state(), TABLE, TABLE, TABLE, types.int64)])
 
 
 @cache
@@ -43,14 +37,7 @@ def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     advance = program()
     dynamics, gaps, rows, energy, power, solve, control = functions
 
-    def call(
-        state, p, alpha, beta, unilateral, follows, inputs_t, inputs_u, samples, W, I,  # noqa: E741
-        mode, history, out, modes, events_t, events, budget,
-    ):  # type: ignore[no-untyped-def]  # fmt: skip
-        return advance(
-            dynamics, gaps, rows, energy, power, solve, control,
-            state, p, alpha, beta, unilateral, follows, inputs_t, inputs_u, samples, W, I,
-            mode, history, out, modes, events_t, events, budget,
-        )  # fmt: skip
+    def call(state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
+        return advance(dynamics, gaps, rows, energy, power, solve, control, state, model, work, buffers, budget)
 
-    return numba.njit([types.int64(_state(), *_DATA)])(call)  # type: ignore[no-any-return]
+    return numba.njit([types.int64(_state(), TABLE, TABLE, TABLE, types.int64)])(call)  # type: ignore[no-any-return]

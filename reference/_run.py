@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Trajectory
-from crossbody.reference._kinds import Bytes, Floats, Index
+from crossbody.reference._kinds import Floats
 from crossbody.reference._options import FSMS, Options
 from crossbody.reference._program import entry, program
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
+from crossbody.reference.core._struct import table
 
 SLICE = 2000  # steps between two looks at the clock: well below 0.1 s
 ROWS, EVENTS, HISTORY = 256, 256, 64
@@ -41,26 +42,21 @@ class CompiledRun:
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         self.system, self.options = system, options
         self.start_state = np.concatenate([q0, v0])
-        self.samples = options.grid()
-        self.inputs_t, self.inputs_u = options.schedule(system)
+        samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)
         n, nc = system.n, system.nc
         self.nz = nc + 2 if options.ledger else 0
-        self.W, self.I = layout.workspace(
-            n, nc, system.inputs, system.mass_block, self.nz, system.memory, system.scratch
-        )
-        self.width = 1 + 2 * n + 2 * nc + 2 + self.nz
-        self.history = np.zeros((max(HISTORY, 4 * nc) + 1, nc), dtype=np.int8)
+        self.work = layout.workspace(n, nc, system.inputs, system.mass_block, self.nz, system.memory, system.scratch)
         natural = options.samples is None
-        self.out = np.zeros((ROWS if natural else len(self.samples) + 1, self.width))
-        self.modes = np.zeros((len(self.out), nc), dtype=np.int8)
-        self.events_t = np.zeros(EVENTS + 16 * nc)
-        self.events = np.zeros((len(self.events_t), 3), dtype=np.int64)
+        rows, events = (ROWS if natural else len(samples) + 1), EVENTS + 16 * nc
+        self.buffers = {
+            "inputs_t": np.array(inputs_t), "inputs_u": np.array(inputs_u), "samples": np.array(samples),
+            "mode": np.zeros(nc, np.int8), "history": np.zeros((max(HISTORY, 4 * nc) + 1, nc), np.int8),
+            "out": np.zeros((rows, 1 + 2 * n + 2 * nc + 2 + self.nz)), "modes": np.zeros((rows, nc), np.int8),
+            "events_t": np.zeros(events), "events": np.zeros((events, 3), np.int64),
+        }  # fmt: skip
+        self.model = [np.array(getattr(system, name)) for name in layout.Model.__annotations__]
+        self.tables = [table(self.model), table([*self.work.values()]), table([*self.buffers.values()])]
         self.template = self._state_template(natural)
-        self.fixed = (
-            np.array(system.p), np.array(system.alpha), np.array(system.beta),
-            np.array(system.unilateral), np.array(system.follows), np.array(self.inputs_t), np.array(self.inputs_u),
-            np.array(self.samples), self.W, self.I,
-        )  # fmt: skip
         self.call: Callable[..., int] = partial(program(), *system.kernels.values())
 
     def _state_template(self, natural: bool) -> Any:
@@ -81,18 +77,14 @@ class CompiledRun:
     def start(self) -> None:
         """Back to the beginning."""
         self.state = self.template.copy()
-        self.mode = initial_modes(self.system)
-        self.W[:] = 0.0
-        self.W[: 2 * self.system.n] = self.start_state
+        self.buffers["mode"][:] = initial_modes(self.system)
+        for name in ("u", "s", "z"):
+            self.work[name][:] = 0.0
+        self.work["y"][:] = self.start_state
 
     def slice(self, budget: int) -> int:
         """Advance by at most `budget` steps; the loop's return code."""
-        return int(
-            self.call(
-                self.state, *self.fixed, self.mode, self.history,
-                self.out, self.modes, self.events_t, self.events, budget,
-            )
-        )  # fmt: skip
+        return int(self.call(self.state, *self.tables, budget))
 
     def warm(self) -> None:
         """Prepare for many repetitions: build the kernels into the program and run once."""
@@ -127,22 +119,22 @@ class CompiledRun:
             return Outcome.INTERRUPTED
 
     def _grow(self, code: int) -> None:
-        if code == layout.ROWS_FULL:
-            self.out = np.concatenate([self.out, np.zeros_like(self.out)])
-            self.modes = np.concatenate([self.modes, np.zeros_like(self.modes)])
-        elif code == layout.EVENTS_FULL:
-            self.events_t = np.concatenate([self.events_t, np.zeros_like(self.events_t)])
-            self.events = np.concatenate([self.events, np.zeros_like(self.events)])
+        """Double the buffers that are full."""
+        full = {layout.ROWS_FULL: ("out", "modes"), layout.EVENTS_FULL: ("events_t", "events")}.get(code, ())
+        for name in full:
+            self.buffers[name] = np.concatenate([self.buffers[name], np.zeros_like(self.buffers[name])])
+        if full:
+            self.tables[2] = table([*self.buffers.values()])
 
     def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
         """What was recorded, as a Trajectory."""
         n, nc = self.system.n, self.system.nc
         state = self.state[0]
-        rows = self.out[: int(state["rows"])]
+        rows = self.buffers["out"][: int(state["rows"])]
         cuts = np.cumsum([1, n, n, nc, nc, 2])
         t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
         return Trajectory(
-            t=t[:, 0], q=q, v=v, gap=gap, lam=lam, energy=energy, mode=self.modes[: len(rows)],
+            t=t[:, 0], q=q, v=v, gap=gap, lam=lam, energy=energy, mode=self.buffers["modes"][: len(rows)],
             events=self._event_list(), outcome=outcome, message=self._message(outcome),
             steps=int(state["steps"]), wall_s=wall_s,
             counts=MappingProxyType({name: int(state[name]) for name in _COUNTERS}),
@@ -156,16 +148,16 @@ class CompiledRun:
         return tuple(
             Event(t=t, contact=i, before=Mode(before), after=Mode(after))
             for t, (i, before, after) in zip(
-                self.events_t[:count].tolist(), self.events[:count].tolist(), strict=True
+                self.buffers["events_t"][:count].tolist(), self.buffers["events"][:count].tolist(), strict=True
             )
         )
 
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
             return ""
-        n = self.system.n
-        where = f"t = {float(self.state['t'][0]):.12g} s, q = {self.W[:n].tolist()}, v = {self.W[n : 2 * n].tolist()}"
+        q, v = np.split(self.work["y"], 2)
+        where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
         if outcome is Outcome.MODE_CYCLE:
-            rows = np.flatnonzero(self.history[-1]).tolist()
+            rows = np.flatnonzero(self.buffers["history"][-1]).tolist()
             return f"{outcome.advice} Rows {rows} at {where}."
         return f"{outcome.advice} {where}."

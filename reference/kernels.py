@@ -12,7 +12,8 @@ n coordinates, nc constraint rows, nu inputs, k the size of the blocks on the ma
     power(t, q, v, u, p, e)              e (2,) = power of the inputs, power dissipated (optional)
     solve(t, q, v, u, p, w, law, idx, na, vd, lam, hd)
                                          optional, instead of the general algebra: acceleration vd (n,), multipliers
-                                         lam[j] and rates hd[j]; law (nc, 3) = a0, a1, a2; returns 0, or 1 if ill posed
+                                         lam[j] and rates hd[j]; law (nc, 3) = a0, a1, a2; returns 0, or 1 if ill posed;
+                                         w is its own scratch: dynamics is not called before it
     control(t, q, v, u, s, p)            optional, called at sampling instants: fills u (nu,), may keep its state in s
 
 Each is compiled for float64 and complex128, so that derivatives can be checked by complex step: use np functions

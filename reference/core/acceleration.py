@@ -139,8 +139,7 @@ def accelerate(
     """
     s.rhs += 1
     na = s.na
-    if s.has_solve and not general:
-        dynamics(t, q, v, w.u, m.p, w.M, w.f, w.w)
+    if s.has_solve and general == OWN:
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
     if _free(dynamics, s, m.p, w, t, q, v) != 0:
         return 1

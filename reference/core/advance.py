@@ -9,7 +9,6 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.core import dense, dop853, esdirk, events, exact, machine, record
-from crossbody.reference.core._struct import by_reference
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.dop853_table import STABILITY_LIMIT
 from crossbody.reference.core.layout import (
@@ -26,9 +25,12 @@ from crossbody.reference.core.layout import (
     NOT_FINITE,
     ROWS_FULL,
     STEP_TOO_SMALL,
+    Buffers,
     Model,
     Work,
-    carve,
+    open_buffers,
+    open_model,
+    open_work,
 )
 
 SAFETY = 0.9
@@ -49,21 +51,6 @@ class Kernels(NamedTuple):
     power: Any
     solve: Any
     control: Any
-
-
-@by_reference
-class Buffers:
-    """What Python and the loop share besides the workspace."""
-
-    inputs_t: Floats
-    inputs_u: Floats
-    samples: Floats
-    mode: Bytes
-    history: Bytes
-    out: Floats
-    modes: Bytes
-    events_t: Floats
-    events: Index
 
 
 @inlined
@@ -361,11 +348,15 @@ def _room(s: Any, b: Buffers) -> int:
 
 def advance(
     dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, solve: Any, control: Any,
-    state: Any, p: Floats, alpha: Floats, beta: Floats, unilateral: Bytes, follows: Index,
-    inputs_t: Floats, inputs_u: Floats, samples: Floats, W: Floats, I: Index,
-    mode: Bytes, history: Bytes, out: Floats, modes: Bytes, events_t: Floats, events: Index, budget: int,
-) -> int:  # fmt: skip  # noqa: E741
+    state: Any, model: Index, work: Index, buffers: Index, budget: int,
+) -> int:  # fmt: skip
     """Go on for at most `budget` steps.
+
+    Args:
+        dynamics, gaps, rows, energy, power, solve, control: the mechanism's kernels.
+        state (1,): record of `layout.STATE`.
+        model, work, buffers: tables of the bundles in `layout`.
+        budget: bound on steps.
 
     Returns:
         DONE at the horizon, MORE after the budget, ROWS_FULL or EVENTS_FULL where the caller must grow a buffer,
@@ -373,9 +364,7 @@ def advance(
     """
     s = state[0]
     K = Kernels(dynamics, gaps, rows, energy, power, solve, control)
-    m = Model(p, alpha, beta, unilateral, follows)
-    b = Buffers(inputs_t, inputs_u, samples, mode, history, out, modes, events_t, events)
-    w = carve(W, I, s.n, s.nc, s.nu, s.k, s.nz, s.ns, s.nw)
+    m, w, b = open_model(model), open_work(work), open_buffers(buffers)
     if not s.started:
         code = _begin_run(K, s, m, w, b)
         if code != 0:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from crossbody.reference._cache import compiled
-from crossbody.reference._kinds import Array, Bytes, Floats, Index
-from crossbody.reference.core._struct import by_reference
+from crossbody.reference._kinds import Bytes, Bytes2, Floats, Floats2, Index, Index2
+from crossbody.reference.core._struct import bundle_type, opener
 from crossbody.reference.core.dop853_table import DENSE_STAGES, DENSE_TERMS
 
 # Return codes of `advance`; the Python side turns them into outcomes.
@@ -92,40 +93,52 @@ STATE = np.dtype(
 )
 
 
-@by_reference
 class Model:
     """A system as the compiled code sees it."""
 
     p: Floats
-    alpha: Floats  # (nc, 3) a0, a1, a2
-    beta: Floats  # (nc, 3) the fast constants; a0 = 0 where the row has none
+    alpha: Floats2  # (nc, 3) a0, a1, a2
+    beta: Floats2  # (nc, 3) the fast constants; a0 = 0 where the row has none
     unilateral: Bytes
     follows: Index  # the row whose activity this row shares; -1 for none
 
 
-@by_reference
+class Buffers:
+    """What Python and the loop share besides the workspace."""
+
+    inputs_t: Floats
+    inputs_u: Floats2
+    samples: Floats
+    mode: Bytes
+    history: Bytes2  # mode sets seen at one instant; the last line marks the rows that changed
+    out: Floats2
+    modes: Bytes2
+    events_t: Floats
+    events: Index2
+
+
 class Work:
-    """Views into the two flat workspaces; compiled functions take what they need from here."""
+    """The workspace."""
 
     y: Floats  # (2n,) q and v
     y1: Floats
     ys: Floats
-    k: Floats  # (16, 2n) stage derivatives
-    F: Floats  # (7, 2n) dense output
+    k: Floats2  # (16, 2n) stage derivatives
+    F: Floats2  # (7, 2n) dense output
     z: Floats  # (nz,) ledger: work of every row, of the inputs, of the damping
     z1: Floats
-    kz: Floats  # (16, nz)
-    Fz: Floats  # (7, nz)
+    kz: Floats2  # (16, nz)
+    Fz: Floats2  # (7, nz)
     e: Floats  # (2,)
     u: Floats
     s: Floats  # controller state
-    M: Floats  # (n, k)
-    L: Floats  # (n, k) Cholesky factor of M
+    M: Floats2  # (n, k)
+    L: Floats2  # (n, k) Cholesky factor of M
     f: Floats
     w: Floats
-    H: Floats  # (nc, n) active rows, compact
-    X: Floats  # (nc, n) M^-1 H^T, transposed
-    G: Floats  # (nc, nc)
+    H: Floats2  # (nc, n) active rows, compact
+    X: Floats2  # (nc, n) M^-1 H^T, transposed
+    G: Floats2  # (nc, nc)
     Hdv: Floats
     r: Floats
     scale: Floats  # size of the terms behind each row's right-hand side
@@ -134,20 +147,20 @@ class Work:
     hda: Floats
     la: Floats
     vd: Floats
-    law: Floats  # (nc, 3) in force now
+    law: Floats2  # (nc, 3) in force now
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
     lo: Floats  # least and largest multiplier seen at the stages
     hi: Floats
     gap: Floats
     rate: Floats
-    gaps: Floats  # (5, nc) at the nodes of the step
-    rates: Floats
-    lams: Floats
+    gaps: Floats2  # (5, nc) at the nodes of the step
+    rates: Floats2
+    lams: Floats2
     hit: Floats  # (nc,) where in the step each contact switches
-    J: Floats  # (n, n)
-    Jq: Floats
-    Jv: Floats
+    J: Floats2  # (n, n)
+    Jq: Floats2
+    Jv: Floats2
     d: Floats
     g: Floats
     idx: Index  # active rows
@@ -155,82 +168,24 @@ class Work:
     pivot: Index
 
 
-@compiled
-def _vector(W: Array, cursor: Index, n: int) -> Array:
-    start = cursor[0]
-    cursor[0] += n
-    return W[start : start + n]
+MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)
+open_model, open_buffers, open_work = opener(MODEL), opener(BUFFERS), opener(WORK)
 
 
-@compiled
-def _matrix(W: Array, cursor: Index, m: int, n: int) -> Array:
-    return _vector(W, cursor, m * n).reshape(m, n)
-
-
-@compiled
-def carve(W: Floats, I: Index, n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int) -> Work:  # noqa: E741
-    """Name the parts of the flat workspaces; I[0] and I[1] end as the lengths used."""
-    c, ci = I[0:1], I[1:2]
-    c[0], ci[0] = 0, 2
-    return Work(
-        _vector(W, c, 2 * n),
-        _vector(W, c, 2 * n),
-        _vector(W, c, 2 * n),
-        _matrix(W, c, DENSE_STAGES, 2 * n),
-        _matrix(W, c, DENSE_TERMS, 2 * n),
-        _vector(W, c, nz),
-        _vector(W, c, nz),
-        _matrix(W, c, DENSE_STAGES, nz),
-        _matrix(W, c, DENSE_TERMS, nz),
-        _vector(W, c, 2),
-        _vector(W, c, nu),
-        _vector(W, c, ns),
-        _matrix(W, c, n, k),
-        _matrix(W, c, n, k),
-        _vector(W, c, n),
-        _vector(W, c, nw),
-        _matrix(W, c, nc, n),
-        _matrix(W, c, nc, n),
-        _matrix(W, c, nc, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, n),
-        _matrix(W, c, nc, 3),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _vector(W, c, nc),
-        _matrix(W, c, NODES, nc),
-        _matrix(W, c, NODES, nc),
-        _matrix(W, c, NODES, nc),
-        _vector(W, c, nc),
-        _matrix(W, c, n, n),
-        _matrix(W, c, n, n),
-        _matrix(W, c, n, n),
-        _vector(W, c, n),
-        _vector(W, c, n),
-        _vector(I, ci, nc),
-        _vector(I, ci, nc),
-        _vector(I, ci, n),
-    )
-
-
-@compiled
-def _measure(W: Floats, I: Index, n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int) -> None:  # noqa: E741
-    """Carve, for the lengths alone: the views themselves never reach Python."""
-    carve(W, I, n, nc, nu, k, nz, ns, nw)
-
-
-def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int) -> tuple[Floats, Index]:
-    """Allocate the two flat workspaces, exactly as large as `carve` needs them."""
-    bound = 200 * (n + nc + 2) + 5 * (n + nc) ** 2 + 40 * nz + nu + ns + nw
-    lengths = np.zeros(2 * (n + nc) + 8, dtype=np.int64)
-    _measure(np.empty(bound), lengths, n, nc, nu, k, nz, ns, nw)
-    return np.zeros(lengths[0]), np.zeros(lengths[1], dtype=np.int64)
+def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int) -> dict[str, Any]:
+    """Allocate the workspace: one array a field of `Work`, in its order."""
+    shapes: dict[str, tuple[int, ...]] = {
+        **dict.fromkeys(("y", "y1", "ys"), (2 * n,)),
+        "k": (DENSE_STAGES, 2 * n), "F": (DENSE_TERMS, 2 * n),
+        "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
+        "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
+        "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "G": (nc, nc), "law": (nc, 3),
+        **dict.fromkeys(("f", "vd", "d", "g", "pivot"), (n,)),
+        **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
+        **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
+    }  # fmt: skip
+    integer = ("idx", "kind", "pivot")
+    return {
+        name: np.zeros(shapes.get(name, (nc,)), dtype=np.int64 if name in integer else np.float64)
+        for name in Work.__annotations__
+    }
