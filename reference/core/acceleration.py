@@ -109,23 +109,30 @@ def assemble(rows: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array
 
 
 @inlined
-def _one_row(rows: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
-    """One coordinate, one active row: everything is scalar."""
-    rows(t, q, v, p, w.w, w.idx, 1, w.H, w.ha, w.Hdv)
-    H, h, i = w.H[0, 0], w.ha[0], w.idx[0]
-    push, rate = H * w.vd[0], H * v[0]
-    damping, spring = w.law[i, 1] * rate, (w.law[i, 0] + w.law[i, 2] * h * h) * h
-    X = H / (w.L[0, 0] * w.L[0, 0])
-    w.X[0, 0], w.hda[0] = X, rate
-    w.r[0] = -(push + w.Hdv[0] + damping + spring)
-    w.scale[0] = abs(push) + abs(w.Hdv[0]) + abs(damping) + abs(spring)
-    G = H * X
-    if not G > 0.0:
+def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+    """One coordinate and at most one active row: everything is scalar."""
+    M, f = w.M, w.f
+    dynamics(t, q, v, w.u, p, M, f, w.w)
+    inverse = 1.0 / M[0, 0]
+    free = f[0] * inverse
+    w.vd[0] = free
+    if not inverse > 0.0:
         return 1
-    w.G[0, 0] = G**0.5
-    w.la[0] = w.r[0] / G
-    w.vd[0] += X * w.la[0]
-    return 0
+    if s.na == 0:
+        return 0
+    Hs, ha, Hdvs = w.H, w.ha, w.Hdv
+    rows(t, q, v, p, w.w, w.idx, 1, Hs, ha, Hdvs)
+    H, h, i, law = Hs[0, 0], ha[0], w.idx[0], w.law
+    push, rate = H * free, H * v[0]
+    damping, spring = law[i, 1] * rate, (law[i, 0] + law[i, 2] * h * h) * h
+    X = H * inverse
+    G = H * X
+    w.X[0, 0], w.hda[0], w.G[0, 0] = X, rate, np.sqrt(G)
+    w.scale[0] = abs(push) + abs(Hdvs[0]) + abs(damping) + abs(spring)
+    lam = -(push + Hdvs[0] + damping + spring) / G
+    w.la[0] = lam
+    w.vd[0] = free + X * lam
+    return 0 if G > 0.0 else 1
 
 
 @compiled
@@ -141,12 +148,12 @@ def accelerate(
     na = s.na
     if s.has_solve and general == OWN:
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
+    if s.n == 1 and na <= 1:
+        return _scalar(dynamics, rows, s, m.p, w, t, q, v)
     if _free(dynamics, s, m.p, w, t, q, v) != 0:
         return 1
     if na == 0:
         return 0
-    if s.n == 1:
-        return _one_row(rows, s, m.p, w, t, q, v)
     if assemble(rows, s, m.p, w, t, q, v) != 0:
         return 1
     solve_schur(w.G, na, w.r, w.la)

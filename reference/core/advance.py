@@ -272,7 +272,7 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return code
 
 
-@inlined
+@compiled
 def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """One step, cut short where a machine must switch."""
     length = exact.plan(s, w, m.unilateral)

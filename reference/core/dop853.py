@@ -77,24 +77,44 @@ def _error(s: Any, w: Work, h: float) -> float:
 
 
 @inlined
-def _watch(s: Any, w: Work) -> None:
-    """Remember the least and the largest multiplier at the stages: a free filter for events."""
+def begin_watch(s: Any, w: Work) -> None:
+    """Extremes of multipliers and gaps over the step, as far as its start tells."""
+    for i in range(s.nc):
+        w.lo[i] = w.hi[i] = w.lam0[i]
+        w.gap_lo[i] = w.gap_hi[i] = w.gaps[0, i]
+
+
+@inlined
+def watch_multipliers(s: Any, w: Work) -> None:
+    """Take the multipliers at a stage into the extremes: a free filter for events."""
+    lo, hi, la, idx = w.lo, w.hi, w.la, w.idx
     for j in range(s.na):
-        i = w.idx[j]
-        w.lo[i] = min(w.lo[i], w.la[j])
-        w.hi[i] = max(w.hi[i], w.la[j])
+        i = idx[j]
+        lo[i] = min(lo[i], la[j])
+        hi[i] = max(hi[i], la[j])
+
+
+@inlined
+def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float) -> None:
+    """Take the gaps at a stage into the extremes."""
+    K.gaps(t, w.ys[: s.n], w.ys[s.n :], m.p, w.gap, w.rate)
+    for i in range(s.nc):
+        w.gap_lo[i] = min(w.gap_lo[i], w.gap[i])
+        w.gap_hi[i] = max(w.gap_hi[i], w.gap[i])
 
 
 @compiled
 def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     """From y and k[0] to y1; returns the error in units of the tolerance, -1 if a stage is ill posed."""
-    for i in range(s.nc):
-        w.lo[i] = w.hi[i] = w.lam0[i]
+    begin_watch(s, w)
     for stage in range(1, STAGES):
         _combine(w.y, w.k, stage, h, w.ys)
-        if derivative(K, s, m, w, s.t + C[stage] * h, w.ys, stage) != 0:
+        t = s.t + C[stage] * h
+        if derivative(K, s, m, w, t, w.ys, stage) != 0:
             return -1.0
-        _watch(s, w)
+        watch_multipliers(s, w)
+        if s.na < s.nc and (stage == 4 or stage == 8 or stage == 10):
+            watch_gaps(K, s, m, w, t)
     _combine(w.y, w.k, STAGES, h, w.y1)
     if s.ledger:
         _combine(w.z, w.kz, STAGES, h, w.z1)

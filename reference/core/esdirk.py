@@ -16,7 +16,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, laws_in_force
 from crossbody.reference.core.algebra import factor_lu, solve_lu, solve_schur
-from crossbody.reference.core.dop853 import powers
+from crossbody.reference.core.dop853 import begin_watch, powers, watch_gaps, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -58,7 +58,7 @@ def _row_part(s: Any, w: Work, j: int) -> None:
     i = w.idx[j]
     w.r[: s.na] = 0.0
     w.r[j] = 1.0
-    if s.n == 1:
+    if s.n == 1 and s.na == 1:
         w.la[0] = 1.0 / (w.G[0, 0] * w.G[0, 0])
     else:
         solve_schur(w.G, s.na, w.r, w.la)
@@ -204,8 +204,7 @@ def step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> float:
             return -1.0
     elif s.jacobian_scale != h and _newton_matrix(s, w, h) != 0:
         return -1.0
-    for i in range(s.nc):
-        w.lo[i] = w.hi[i] = w.lam0[i]
+    begin_watch(s, w)
     for stage in range(1, STAGES):
         code = _stage(K, s, m, w, stage, h)
         if code == 1:
@@ -214,10 +213,9 @@ def step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> float:
             s.full_jacobian = 1
             s.have_jacobian = 0
             return np.inf
-        for j in range(s.na):
-            i = w.idx[j]
-            w.lo[i] = min(w.lo[i], w.la[j])
-            w.hi[i] = max(w.hi[i], w.la[j])
+        watch_multipliers(s, w)
+        if s.na < s.nc:
+            watch_gaps(K, s, m, w, s.t + C[stage] * h)
     w.y1[:] = w.ys
     for i in range(s.nz):
         w.z1[i] = w.z[i]

@@ -32,6 +32,7 @@ from crossbody.reference.core.machine import ULP, active_mode, multiplier_if_act
 
 # Guards: each is positive until it fires.
 NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, RATE, RATE_DOWN = np.arange(10)
+NEAR = 0.25  # of the range in the step: seen at twelve stages, a value does not come from farther to zero
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT (spec 1.2)
 
 
@@ -291,17 +292,19 @@ def _first_edge(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float
 def _watched(s: Any, w: Work, mode: Bytes, i: int) -> bool:
     """Whether a row can switch in this step: its gap, or its multiplier, came near zero against what it varied.
 
-    lo and hi hold the extremes at the stages: of the multiplier where the row is active, of the gap where it is not.
+    It is judged by the extremes at the stages.
     """
     if s.method == EXACT:
         return True
     if s.fsm != LEVEL or (mode[i] != FREE and mode[i] != CONTACT):
         return True
     last = NODES - 1
-    ends = w.gaps if mode[i] == FREE else w.lams
-    low = min(w.lo[i], ends[0, i], ends[last, i])
-    high = max(w.hi[i], ends[0, i], ends[last, i])
-    return not low > high - low
+    if mode[i] == FREE:
+        low, high, end = w.gap_lo[i], w.gap_hi[i], w.gaps[last, i]
+    else:
+        low, high, end = w.lo[i], w.hi[i], w.lams[last, i]
+    low, high = min(low, end), max(high, end)
+    return not low > NEAR * (high - low)
 
 
 @inlined
@@ -319,7 +322,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     return 0
 
 
-@inlined
+@compiled
 def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 1 if ill posed."""
     s.theta = NEVER

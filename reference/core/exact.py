@@ -62,7 +62,7 @@ def _half_contact(a0: float, a1: float) -> float:
 @inlined
 def _multiply_inverse(s: Any, w: Work, x: Array) -> None:
     """la = G^-1 x for the active rows."""
-    if s.n == 1:
+    if s.n == 1 and s.na == 1:
         w.la[0] = x[0] / (w.G[0, 0] * w.G[0, 0])
     else:
         solve_schur(w.G, s.na, x, w.la)

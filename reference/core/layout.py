@@ -152,6 +152,8 @@ class Work:
     lam0: Floats  # at the step's start
     lo: Floats  # least and largest multiplier seen at the stages
     hi: Floats
+    gap_lo: Floats  # the same of every gap, at three of the stages
+    gap_hi: Floats
     gap: Floats
     rate: Floats
     gaps: Floats2  # (5, nc) at the nodes of the step
