@@ -6,10 +6,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from crossbody.reports.compare import Entry, compare
+    from crossbody.reports.comparison import Entry, compare
     from crossbody.reports.truth import Truth, truth_of
 
-_LAZY = {"compare": "compare", "Entry": "compare", "Truth": "truth", "truth_of": "truth"}
+_LAZY = {"compare": "comparison", "Entry": "comparison", "Truth": "truth", "truth_of": "truth"}
 
 __all__ = ["Entry", "Truth", "compare", "truth_of"]
 

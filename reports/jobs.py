@@ -10,7 +10,7 @@ from typing import Any
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName, Value
 from crossbody.reports.audit import AuditRow, audit
-from crossbody.reports.compare import Entry
+from crossbody.reports.comparison import Entry
 from crossbody.reports.truth import Truth, sample_times, truth_of
 
 DEFAULT_CASES = ("bouncing_ball",)

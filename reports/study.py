@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from crossbody.cases import Case, OutputError
-from crossbody.reports.compare import Entry, table, verdicts
+from crossbody.reports.comparison import Entry, table, verdicts
 from crossbody.reports.figures import TRUTH
 from crossbody.reports.jobs import CaseResult
 from crossbody.reports.store import Trace, save

@@ -15,7 +15,7 @@ import pytest
 from crossbody.cases import OutputError, load
 from crossbody.reports import figures, page, study
 from crossbody.reports.bench import observed_order
-from crossbody.reports.compare import Entry
+from crossbody.reports.comparison import Entry
 from crossbody.reports.jobs import CaseResult
 from crossbody.reports.output import folder
 from crossbody.reports.thin import keep

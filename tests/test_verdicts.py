@@ -10,7 +10,7 @@ import pytest
 
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
 from crossbody.reports.audit import audit, difference
-from crossbody.reports.compare import Entry, compare
+from crossbody.reports.comparison import Entry, compare
 from crossbody.reports.truth import truth_of
 from crossbody.reports.verdict import Word, exit_code, judge, limit_for
 
