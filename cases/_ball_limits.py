@@ -1,7 +1,88 @@
-"""How far each engine may be from the truth of the bouncing ball, and why."""
+"""How far each engine may be from the truth of the bouncing ball at its default settings, and why."""
 
 from __future__ import annotations
 
-from crossbody.cases._case import Limit
+from collections.abc import Iterable, Iterator
 
-LIMITS: tuple[Limit, ...] = ()
+from crossbody.cases._case import Claim, Limit
+
+_TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from impact to impact"
+
+# Largest error of an engine that follows the law, by metric.
+ERRORS = {
+    "position": (1e-6, _TOLERANCE),
+    "event_times": (1e-6, _TOLERANCE),
+    "energy_drift": (1e-6, _TOLERANCE),
+    "energy_integrator": (1e-6, "the ledger must close to integration accuracy"),
+    "penetration_error": (1e-6, _TOLERANCE),
+    "restitution_error": (1e-5, "near the threshold speed the exit speed is a small difference"),
+    "lam_impulse": (1e-6, _TOLERANCE),
+    "lam_impulse_path": (1e-5, "the path is sampled at steps, the total is not"),
+    "law_residual": (1e-8, "an algebraic identity at every state"),
+    "complementarity": (1e-6, "contacts push only, to the precision of the released instant"),
+    "touch_count": (0.0, "a count"),
+}
+
+# How exactly a claimed number must come out.
+CLAIMS = {
+    "contacts": (0.0, "a count"),
+    "bounces": (0.0, "a count"),
+    "transitions": (0.0, "a count"),
+    "final_gap": (1e-9, "the rest of the decay exp(-10 t), and the tolerance"),
+    "final_lam": (1e-6, "the rest of the decay exp(-10 t), and the tolerance"),
+    "fifth_exit": (1e-2, "width of the zoomed figure"),
+    "energy_per_bounce": (1e-6, _TOLERANCE),
+    "separation_gap": (1e-7, _TOLERANCE),
+    "restitution": (1e-6, _TOLERANCE),
+    "contact_time": (1e-7, _TOLERANCE),
+    "penetration": (1e-5, "the deepest sample, not the deepest instant"),
+}
+
+MEMORYLESS = (
+    "MuJoCo's contact is memoryless and ends at h = 0: it has no ballistic state, pushes again on the way out, "
+    "and makes no energy where the law does."
+)
+OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and a step of 2 ms, not the case's law."
+IMPACT = (
+    "An impact in no time has no contact phase: a restitution replaces the law, so the ball neither sinks in nor stays "
+    "for the contact time, and weight does not act during it."
+)
+STEPPING = (
+    "Time stepping on a rigid contact: first order, with impacts on the grid and a restitution instead of the law."
+)
+
+_KNOWN = (
+    ("mujoco", "matched", MEMORYLESS),
+    ("mujoco", "default", OBVIOUS),
+    ("pinocchio", "impulse", IMPACT),
+    ("pinocchio", "admm", STEPPING),
+)
+_OTHER_LAW = (("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT), ("pinocchio", "admm", STEPPING))
+_STIFF = "fixed steps of 1 ms against the cubic spring's periods of 2 ms when it is released from 1 m"
+_FIXED_STEP = {
+    "position": 1e-3,
+    "energy_drift": 1e-3,
+    "penetration_error": 1e-3,
+    "lam_impulse": 1e-4,
+    "lam_impulse_path": 1e-3,
+}
+
+
+def limits(claims: Iterable[Claim], bilateral: bool) -> tuple[Limit, ...]:
+    """The limits of one variant: errors always, and the claims that it makes."""
+    claimed = {claim.metric for claim in claims}
+    wanted = ERRORS | {metric: CLAIMS[metric] for metric in CLAIMS if metric in claimed}
+    return tuple(_all(wanted, bilateral))
+
+
+def _all(wanted: dict[str, tuple[float, str]], bilateral: bool) -> Iterator[Limit]:
+    for metric, (value, why) in wanted.items():
+        yield Limit(metric=metric, value=value, why=why)
+        for engine, profile, known in _KNOWN:
+            if not bilateral or known != MEMORYLESS:
+                yield Limit(metric=metric, value=value, engine=engine, profile=profile, why=why, known=known)
+    if bilateral:
+        for metric, value in _FIXED_STEP.items():
+            yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=_STIFF)
+    for engine, profile, known in _OTHER_LAW:
+        yield Limit(metric="audit", value=0.0, engine=engine, profile=profile, known=known)

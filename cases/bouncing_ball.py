@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from crossbody.cases import _closed_forms as cf
-from crossbody.cases._ball_limits import LIMITS
+from crossbody.cases._ball_limits import limits
 from crossbody.cases._ball_truth import Ball, Motion
 from crossbody.cases._case import Case, Claim, Coordinate, Law, Parameter, Tier, Value
 
@@ -134,6 +134,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         ),
         closed_form=Motion(ball, p["height"], -p["speed"], p["t_end"]) if linear else None,
         claims=claims,
-        limits=LIMITS,
+        limits=limits(claims, bilateral),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName, Value
 from crossbody.reports.audit import AuditRow, audit
 from crossbody.reports.comparison import Entry
-from crossbody.reports.truth import Truth, sample_times, truth_of
+from crossbody.reports.truth import Truth, sample_times, truth_of, with_both_sides
 
 DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
@@ -109,7 +109,7 @@ def run_case(
     entries = []
     for pick in wanted:
         tell(f"{case.label}: {pick.engine}:{pick.profile}")
-        entries.append(_entry(case, pick, rtol, reference, truth))
+        entries.append(_entry(case, pick, rtol, reference))
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
 
 
@@ -119,11 +119,11 @@ def _reference_audit(case: Case) -> Mapping[str, Any]:
     return engines.load("reference").prepare(case, "compiled").audit()
 
 
-def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, Any], truth: Truth) -> Entry:
+def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, Any]) -> Entry:
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
-        prepared = prepare(case, pick, rtol, truth)
+        prepared = prepare(case, pick, rtol)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     rows: tuple[AuditRow, ...] = audit(prepared.audit(), reference, case) if reference else ()
@@ -131,22 +131,30 @@ def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, A
         engine=pick.engine,
         profile=pick.profile,
         settings=prepared.settings,
-        run=prepared.run(),
+        run=_dense(case, pick, prepared),
         audit=rows,
         refined=_refined(case, pick, prepared.settings),
     )
 
 
-def prepare(case: Case, pick: Pick, rtol: float | None, truth: Truth | None = None) -> Any:
-    """A prepared run; the tolerance where the engine has one, samples of the truth where it can give them."""
+def prepare(case: Case, pick: Pick, rtol: float | None) -> Any:
+    """A prepared run, with the tolerance where the engine has one."""
     engine = engines.load(pick.engine)
     prepared = engine.prepare(case, pick.profile)
-    more: dict[str, Any] = {}
     if rtol is not None and "rtol" in prepared.settings:
-        more["rtol"] = rtol
-    if truth is not None and "samples" in prepared.settings:
-        more["samples"] = sample_times(truth.trajectory, case.t_end)
-    return engine.prepare(case, pick.profile, **more) if more else prepared
+        return engine.prepare(case, pick.profile, rtol=rtol)
+    return prepared
+
+
+def _dense(case: Case, pick: Pick, prepared: Any) -> Trajectory:
+    """The run; where the engine can be asked for samples, again with enough of them to be drawn."""
+    natural: Trajectory = prepared.run()
+    if "samples" not in prepared.settings or not natural.outcome.ok:
+        return natural
+    asked = {key: prepared.settings[key] for key in ("rtol",) if key in prepared.settings}
+    times = sample_times(natural, case.t_end)
+    dense = engines.load(pick.engine).prepare(case, pick.profile, samples=times, **asked).run()
+    return replace(with_both_sides(dense, natural), wall_s=natural.wall_s, steps=natural.steps)
 
 
 def _refined(case: Case, pick: Pick, settings: Mapping[str, Any]) -> Trajectory | None:

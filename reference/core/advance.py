@@ -182,11 +182,17 @@ def _attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @inlined
+def _end_stage(s: Any) -> int:
+    """The stage whose derivative is that of the step's end."""
+    return esdirk.STAGES - 1 if s.method == IMPLICIT else dop853.STAGES
+
+
+@inlined
 def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
     """Evaluate the end of the step: derivative, multipliers, gaps."""
     n = s.n
     last = NODES - 1
-    end = dop853.STAGES if s.method == EXPLICIT else esdirk.STAGES - 1
+    end = _end_stage(s)
     t = s.t + s.hs
     if s.method != IMPLICIT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
@@ -231,7 +237,7 @@ def _land(K: Any, s: Any, m: Model, w: Work) -> None:
 def _take_over(s: Any, w: Work) -> None:
     """The end of the whole step becomes the start of the next."""
     last = NODES - 1
-    end = esdirk.STAGES - 1 if s.method == IMPLICIT else dop853.STAGES
+    end = _end_stage(s)
     w.k[0] = w.k[end]
     w.kz[0] = w.kz[end]
     w.lam0[:] = w.lams[last]

@@ -20,6 +20,7 @@ CLAIMED = False
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """max(0, max over t of the work of all rows) / max T of the truth; None without a ledger."""
     scale = float(truth.trajectory.energy[:, 0].max())
-    if run.ledger is None or scale == 0.0:
+    rows = case.law.unilateral
+    if run.ledger is None or scale == 0.0 or not rows.any():
         return None
-    return float(np.max(run.ledger.contact.sum(axis=1), initial=0.0)) / scale
+    return float(np.max(run.ledger.contact[:, rows].sum(axis=1), initial=0.0)) / scale
