@@ -1,0 +1,182 @@
+"""The reduced equations by numpy, one evaluation a call: slow, and independent of the compiled loop.
+
+    [ M   -H_A^T ] [ v'  ]   [ f                                          ]
+    [ H_A    0   ] [ lam ] = [ -(H_A' v + a1 h' + a0 h + a2 h^3)_A        ]      spec 1.1
+
+The mechanism's kernels are called from Python, but not its own `solve`: the whole matrix is solved by LU with partial
+pivoting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from crossbody.cases import Mode, Outcome
+from crossbody.reference._kinds import Floats
+from crossbody.reference._system import System
+
+ACTIVE = frozenset({Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL})
+ROUNDING = 1e-13  # part of a sum's terms that rounding may make of the sum
+ULP = float(np.finfo(np.float64).eps)
+DEPENDENT = 1e-13  # ratio of singular values of the scaled rows below which the multipliers are not unique
+
+
+class Ended(Exception):  # noqa: N818 - an end, not an error: it is caught where the run is driven
+    """A run ends here.
+
+    Args:
+        outcome: how.
+        rows: the rows concerned.
+    """
+
+    def __init__(self, outcome: Outcome, rows: Sequence[int] = ()) -> None:
+        self.outcome, self.rows = outcome, list(rows)
+        super().__init__(outcome.advice)
+
+
+class Equations:
+    """Evaluates a mechanism for a list of active rows.
+
+    Attributes:
+        u (nu,): inputs in force. memory: state of the controller.
+        active: indices of the active rows.
+        law (nc, 3): a0, a1, a2 in force for every row.
+        evaluations: right-hand sides so far.
+    """
+
+    def __init__(self, system: System, rigid: bool = False) -> None:
+        n, nc = system.n, system.nc
+        self.system = system
+        self.slow, self.fast = np.array(system.alpha), np.array(system.beta)
+        self.has_fast = self.fast.any(axis=1)
+        if rigid:  # h = 0 itself holds a bilateral row: on it the law has nothing to add
+            self.slow[~np.asarray(system.unilateral, dtype=bool)] = 0.0
+        self.law = self.slow.copy()
+        self.p, self.u, self.memory = np.array(system.p), np.zeros(system.inputs), np.zeros(system.memory)
+        self.active: list[int] = []
+        self.evaluations = 0
+        self._blocks, self._f, self._w = np.zeros((n, system.mass_block)), np.zeros(n), np.zeros(system.scratch)
+        self._H, self._h, self._Hdv = np.zeros((nc, n)), np.zeros(nc), np.zeros(nc)
+        self._gap, self._rate, self._two = np.zeros(nc), np.zeros(nc), np.zeros(2)
+        self._M = self._blocks if system.mass_block == n else np.zeros((n, n))
+        self._index = np.zeros(nc, dtype=np.int64)
+
+    def activate(self, modes: Sequence[int]) -> None:
+        """List the active rows of a mode set and put their constants in force."""
+        self.active = [i for i, mode in enumerate(modes) if mode in ACTIVE]
+        self._index[: len(self.active)] = self.active
+        self._H[:] = 0.0  # kernels need not write the zeros
+        for i, mode in enumerate(modes):
+            self.law[i] = self.fast[i] if mode == Mode.COLLISION and self.has_fast[i] else self.slow[i]
+
+    def terms(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """M (n, n) and f (n,); both are views that the next call overwrites."""
+        s = self.system
+        self.evaluations += 1
+        s.dynamics(t, q, v, self.u, self.p, self._blocks, self._f, self._w)
+        k = s.mass_block
+        if k != s.n:
+            for b in range(0, s.n, k):
+                self._M[b : b + k, b : b + k] = self._blocks[b : b + k]
+        return self._M, self._f
+
+    def rows(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
+        """H_A (na, n), h_A (na,) and H_A' v (na,); `terms` must have been called at this state."""
+        na = len(self.active)
+        if na:
+            self.system.rows(t, q, v, self.p, self._w, self._index, na, self._H, self._h, self._Hdv)
+        return self._H[:na], self._h[:na], self._Hdv[:na]
+
+    def pull(self, h: Floats, rate: Floats) -> Floats:
+        """a1 h' + a0 h + a2 h^3 of the active rows."""
+        law = self.law[self.active]
+        drive: Floats = law[:, 1] * rate + (law[:, 0] + law[:, 2] * h * h) * h
+        return drive
+
+    def accelerate(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Acceleration v' (n,) and lam of all rows (nc,).
+
+        Raises:
+            Ended: ILL_POSED if the matrix is singular, NOT_FINITE if the kernels or the solution are not finite.
+        """
+        n, nc, na = self.system.n, self.system.nc, len(self.active)
+        M, f = self.terms(t, q, v)
+        H, h, Hdv = self.rows(t, q, v)
+        matrix, right = np.zeros((n + na, n + na)), np.empty(n + na)
+        matrix[:n, :n], right[:n] = M, f
+        if na:
+            matrix[:n, n:], matrix[n:, :n] = -H.T, H
+            right[n:] = -(Hdv + self.pull(h, H @ v))
+        if not (np.isfinite(right).all() and np.isfinite(matrix).all()):
+            raise Ended(Outcome.NOT_FINITE)
+        try:
+            solved = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            raise Ended(Outcome.ILL_POSED, self.active) from None
+        if not np.isfinite(solved).all():
+            raise Ended(Outcome.ILL_POSED, self.active)
+        lam = np.zeros(nc)
+        lam[self.active] = solved[n:]
+        return solved[:n], lam
+
+    def gaps(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Gaps h and rates h' of all rows (nc,); views that the next call overwrites."""
+        self.system.gaps(t, q, v, self.p, self._gap, self._rate)
+        return self._gap, self._rate
+
+    def energy(self, q: Floats, v: Floats) -> Floats:
+        """Kinetic and potential energy (2,), J."""
+        self.system.energy(q, v, self.p, self._two)
+        return self._two.copy()
+
+    def powers(self, t: float, q: Floats, v: Floats, lam: Floats) -> Floats:
+        """Power of every row's multiplier, of the inputs, and dissipated (nc + 2,), W."""
+        _, rate = self.gaps(t, q, v)
+        self.system.power(t, q, v, self.u, self.p, self._two)
+        return np.concatenate([lam * rate, self._two])
+
+    def control(self, t: float, q: Floats, v: Floats) -> None:
+        """Let the sampled controller set the inputs."""
+        self.system.control(t, q, v, self.u, self.memory, self.p)
+
+    def noise(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """What rounding may make of each active multiplier, and the size of its terms (nc,), N.
+
+        Raises:
+            Ended: ILL_POSED if the active rows are dependent.
+        """
+        noise, size = np.zeros(self.system.nc), np.zeros(self.system.nc)
+        if not self.active:
+            return noise, size
+        M, f = self.terms(t, q, v)
+        H, h, Hdv = self.rows(t, q, v)
+        X = np.linalg.solve(M, np.column_stack([H.T, f]))
+        G = H @ X[:, :-1]
+        self._check_rank(G)
+        law, rate = self.law[self.active], H @ v
+        spring = np.abs((law[:, 0] + law[:, 2] * h * h) * h)
+        terms = np.abs(H @ X[:, -1]) + np.abs(Hdv) + law[:, 1] * np.abs(rate) + spring
+        state = 8.0 * ULP * (law[:, 0] * np.abs(q).max() + law[:, 1] * np.abs(v).max())
+        noise[self.active] = (ROUNDING * terms + state) / np.diag(G)
+        size[self.active] = (terms + np.sqrt(law[:, 0]) * np.abs(rate)) / np.diag(G)
+        return noise, size
+
+    def _check_rank(self, G: Floats) -> None:
+        scale = np.sqrt(np.diag(G))
+        if not (np.isfinite(G).all() and (scale > 0.0).all()):
+            raise Ended(Outcome.ILL_POSED, self.active)
+        values = np.linalg.svd(G / np.outer(scale, scale), compute_uv=False)
+        if values[-1] < DEPENDENT * values[0]:
+            raise Ended(Outcome.ILL_POSED, self.active)
+
+    def elastic_part(self, t: float, q: Floats, v: Floats, i: int) -> tuple[float, float]:
+        """b1 |h'| + b0 |h| of the active row i, and lam_i / (G_A^-1)_ii (spec 1.2), m/s^2."""
+        _, lam = self.accelerate(t, q, v)
+        M, _ = self.terms(t, q, v)
+        H, h, _ = self.rows(t, q, v)
+        j = self.active.index(i)
+        inverse = np.linalg.inv(H @ np.linalg.solve(M, H.T))
+        elastic = self.law[i, 1] * abs(float(H[j] @ v)) + self.law[i, 0] * abs(float(h[j]))
+        return elastic, float(lam[i] / inverse[j, j])

@@ -1,0 +1,210 @@
+"""A run by SUNDIALS through scikit-sundae (Hindmarsh et al. 2005): the independent check on the compiled loop.
+
+Nothing of the compiled loop is shared but the mechanism's kernels: equations, state machine, integrator and root finding
+are others. It is slower by the price of Python callbacks. Every arc between two events, input changes or controller
+ticks begins anew at order one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+
+from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
+from crossbody.reference._arcs import Arc, CvodeArc, IdaArc, Scene, State
+from crossbody.reference._equations import ULP, Ended, Equations
+from crossbody.reference._kinds import Floats
+from crossbody.reference._level_machine import LevelMachine, View
+from crossbody.reference._options import Options
+from crossbody.reference._quiet import quiet
+from crossbody.reference._system import System
+
+FAR = 1e30
+RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
+ON_THE_MANIFOLD = 1e-6
+
+
+class SundialsRun:
+    """One prepared run; `go` may be repeated, with the same result.
+
+    Args:
+        system: the mechanism.
+        q0, v0 (n,): start.
+        options: what is asked; solver "cvode" or "ida", fsm "level".
+
+    Raises:
+        InvalidValue: for another machine than "level".
+        SceneError: if rows of index 3 do not hold at the start.
+    """
+
+    def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
+        if options.fsm != "level":
+            raise InvalidValue(f"fsm is {options.fsm!r} with solver {options.solver!r}; valid: 'level'.")
+        self.system, self.options, self.q0, self.v0 = system, options, q0, v0
+        self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
+        self.natural = options.samples is None
+        self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
+        if options.index == 3:
+            self._check_manifold()
+
+    def _check_manifold(self) -> None:
+        h, hd = self.system.gap(self.q0, self.v0)
+        held = ~np.asarray(self.system.unilateral, dtype=bool)
+        off = max(np.abs(h[held]).max(initial=0.0), np.abs(hd[held]).max(initial=0.0))
+        if off > ON_THE_MANIFOLD:
+            raise SceneError(f"index=3 needs a start with h = h' = 0 in every bilateral row; the largest is {off:.3g}.")
+
+    def warm(self) -> None:
+        """Nothing to prepare: kernels are compiled where they are declared."""
+
+    def start(self) -> None:
+        """Back to the beginning."""
+        e = self.equations = Equations(self.system, rigid=self.options.index == 3)
+        self.machine = LevelMachine(self.system, e)
+        nz = self.system.nc + 2 if self.options.ledger else 0
+        energy = np.abs(np.nan_to_num(e.energy(self.q0, self.v0))).sum()
+        self.scene = Scene(e, self.machine, self.options, nz, max(float(energy), 1.0))
+        self.state = State(0.0, self.q0.copy(), self.v0.copy(), np.zeros(nz))
+        self.rows: list[tuple[float, Floats, Floats, Floats, Floats, Floats, list[int], Floats]] = []
+        self.next_sample = self.next_input = self.next_tick = 0
+        self.retries, self.ended_rows = 0, list[int]()
+
+    def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
+        """Run to the end; how it ended, and the wall time in s."""
+        began = time.perf_counter()
+        self.start()
+        outcome = Outcome.FINISHED
+        try:
+            with quiet():
+                self._drive(began, progress)
+        except Ended as end:
+            outcome, self.ended_rows = end.outcome, end.rows
+        except KeyboardInterrupt:
+            outcome = Outcome.INTERRUPTED
+        return outcome, time.perf_counter() - began
+
+    def _drive(self, began: float, progress: Callable[[float], None] | None) -> None:
+        t_end = self.options.t_end
+        stop = self._take_inputs()
+        view = self._settle()
+        self._sample(view.lam)
+        arc = self._arc(view)
+        while self.state.t < t_end:
+            self._check_bounds(began)
+            switched = self._step(arc, stop)
+            if switched is None:
+                arc = self._arc(view, cautious=True)
+                continue
+            if progress is not None:
+                progress(self.state.t / t_end)
+            at_stop = self.state.t >= stop
+            if at_stop and stop < t_end:
+                stop = self._take_inputs()
+            if switched or (at_stop and self.state.t < t_end):
+                view = self._settle()
+                arc = self._arc(view)
+
+    def _check_bounds(self, began: float) -> None:
+        if self.scene.steps >= self.options.max_steps:
+            raise Ended(Outcome.STEP_LIMIT)
+        if time.perf_counter() - began > self.options.time_limit:
+            raise Ended(Outcome.TIME_LIMIT)
+
+    def _settle(self) -> View:
+        """Switch what must be switched now, and record the instant behind it."""
+        s = self.state
+        view = self.machine.settle(s.t, s.q, s.v)
+        if self.natural:
+            self._record(view.lam)
+        return view
+
+    def _arc(self, view: View, cautious: bool = False) -> Arc:
+        longest = self.options.max_step
+        if cautious:
+            longest = min(longest, (self.options.t_end - self.state.t) * CAUTION**self.retries)
+        return self.kind(self.scene, self.state, view, longest)
+
+    def _step(self, arc: Arc, stop: float) -> bool | None:
+        """Go on; whether a machine switched, or None if the arc must begin anew with shorter steps."""
+        before = self.state
+        if stop - before.t <= 16.0 * ULP * stop:
+            self.state.t = stop
+            return False
+        target = stop if self.natural else min(stop, self._next_sample())
+        try:
+            state, fired = arc.step(target, stop, self.natural)
+        except Ended as end:
+            if end.outcome is not Outcome.NOT_FINITE or self.retries >= RETRIES:
+                raise
+            self.retries += 1
+            return None
+        if max(np.abs(state.q).max(), np.abs(state.v).max()) > FAR:
+            raise Ended(Outcome.DIVERGED)
+        self.state = state
+        if state.t > before.t:
+            self.retries = 0
+        lam = self._multipliers(arc)
+        if self.natural:
+            self._record(lam)
+        else:
+            self._sample(lam)
+        return self.machine.fire(state.t, state.q, state.v, fired) if fired else False
+
+    def _multipliers(self, arc: Arc) -> Floats:
+        """Lam that holds before anything switches."""
+        s = self.state
+        return self.equations.accelerate(s.t, s.q, s.v)[1] if s.lam is None else s.lam
+
+    def _next_sample(self) -> float:
+        return float(self.samples[self.next_sample]) if self.next_sample < len(self.samples) else np.inf
+
+    def _sample(self, lam: Floats) -> None:
+        """Record the samples that fall on the present instant."""
+        while self._next_sample() <= self.state.t:
+            self._record(lam)
+            self.next_sample += 1
+
+    def _record(self, lam: Floats) -> None:
+        s, e = self.state, self.equations
+        gap = e.gaps(s.t, s.q, s.v)[0].copy()
+        self.rows.append((s.t, s.q, s.v, gap, lam, e.energy(s.q, s.v), [int(m) for m in self.machine.modes], s.z))
+
+    def _take_inputs(self) -> float:
+        """Put the inputs that hold from now on in force; the next instant at which they change."""
+        s, system = self.state, self.system
+        while self.next_input < len(self.inputs_t) and self.inputs_t[self.next_input] <= s.t:
+            self.equations.u[:] = self.inputs_u[self.next_input]
+            self.next_input += 1
+        if system.control is not None and self.next_tick * system.tick <= s.t:
+            self.equations.control(s.t, s.q, s.v)
+            self.next_tick += 1
+        stops = [self.options.t_end, *self.inputs_t[self.next_input : self.next_input + 1].tolist()]
+        if system.control is not None:
+            stops.append(self.next_tick * system.tick)
+        return float(min(stops))
+
+    def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
+        """What was recorded, as a Trajectory."""
+        n, nc, count = self.system.n, self.system.nc, len(self.rows)
+        columns = list(zip(*self.rows, strict=True)) if self.rows else [()] * 8
+        widths = (n, n, nc, nc, 2, nc, self.scene.nz)
+        t = np.array(columns[0], dtype=np.float64)
+        q, v, gap, lam, energy, mode, z = (
+            np.array(c, dtype=np.float64).reshape(count, w) for c, w in zip(columns[1:], widths, strict=True)
+        )
+        return Trajectory(
+            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=tuple(self.machine.events),
+            outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
+            counts=MappingProxyType({"rhs": self.equations.evaluations}),
+            ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
+        )  # fmt: skip
+
+    def _message(self, outcome: Outcome) -> str:
+        if outcome is Outcome.FINISHED:
+            return ""
+        s = self.state
+        rows = f"Rows {self.ended_rows}, " if self.ended_rows else ""
+        return f"{outcome.advice} {rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}."
