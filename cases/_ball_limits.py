@@ -39,8 +39,8 @@ CLAIMS = {
 }
 
 MEMORYLESS = (
-    "MuJoCo's contact is memoryless and ends at h = 0: it has no ballistic state, pushes again on the way out, "
-    "and makes no energy where the law does."
+    "MuJoCo's contact is memoryless and ends at h = 0: it has no ballistic state, pushes wherever the law is "
+    "positive below the surface, and makes no energy where the law does."
 )
 OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and a step of 2 ms, not the case's law."
 IMPACT = (

@@ -1,0 +1,68 @@
+"""Multipliers against the case's law at the run's own states, over the largest.
+
+The KKT residual of spec 1.1, recomputed by us from q and v:
+
+    (H M^-1 H^T) lam = -(H M^-1 f + H'v + a1 h' + a0 h + a2 h^3)
+
+on the rows that the run has closed. It tells an engine that follows another law from one that follows this one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.reports.metrics._contacts import CLOSED
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+SAMPLES = 400
+
+
+def _equations(case: Case) -> Any:
+    """The mechanism's equations, or None if the reference has none."""
+    from crossbody.cases import CaseUnsupported
+    from crossbody.engines import load
+
+    try:
+        prepared: Any = load("reference").prepare(case, "compiled")
+    except CaseUnsupported:
+        return None
+    return prepared.system
+
+
+def multipliers(system: Any, case: Case, q: Floats, v: Floats, rows: NDArray[np.intp]) -> Floats:
+    """Lam (len(rows),) that the law asks for at one state with those rows active."""
+    M, f = system.terms(q, v)
+    H, h, Hdv = (part[rows] for part in system.constraint(q, v))
+    a0, a1, a2 = (a[rows] for a in (case.law.a0, case.law.a1, case.law.a2))
+    law = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
+    inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
+    found: Floats = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + law), rcond=None)[0]
+    return found
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples; None where lam is not known."""
+    closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
+    some = np.flatnonzero(closed.any(axis=1))
+    if not len(some) or np.isnan(run.lam).any():
+        return None
+    system = _equations(case)
+    if system is None:
+        return None
+    worst, scale = 0.0, 0.0
+    for i in some[:: max(1, len(some) // SAMPLES)]:
+        rows = np.flatnonzero(closed[i])
+        lam = multipliers(system, case, run.q[i], run.v[i], rows)
+        worst = max(worst, float(np.max(np.abs(run.lam[i, rows] - lam))))
+        scale = max(scale, float(np.max(np.abs(lam))))
+    return worst / scale if scale else None
