@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+SHOWN = {"position": "position", "event_times": "times [s]", "energy_drift": "energy"}
 COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
 
 
@@ -102,37 +103,48 @@ def progress(steps: int, quiet: bool = False) -> Iterator[Callable[[str], None]]
 
 
 def show(rows: pd.DataFrame, out: Path) -> None:
-    """The judged rows as a table, their count, and where the report is."""
+    """One line a run with its worst errors and verdicts, every row that is outside, and where the report is."""
     from rich.console import Console
 
     console = Console()
-    console.print(_table(rows[rows["verdict"] != Word.INFO]))
+    console.print(_summary(rows))
     counts = rows["verdict"].value_counts()
     console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
-    for text in rows.loc[rows["verdict"] == Word.SKIPPED, "why"].unique():
-        console.print(text, soft_wrap=True, highlight=False)
+    told = rows[rows["verdict"].isin([Word.SKIPPED, Word.OUTSIDE])]
+    for row in told.to_dict(orient="records"):
+        run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
+        number = (
+            f" {row['value']:.4g} {row['unit']}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
+        )
+        text = f"{row['verdict']}: {run} {row['metric']}{number}. {row['why']}"
+        console.print(text, soft_wrap=True, highlight=False, markup=False)
     print(f"Report: {(out / page.PAGE).absolute()}", file=sys.stdout)
 
 
-def _table(rows: pd.DataFrame) -> Any:
+def _summary(rows: pd.DataFrame) -> Any:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("case", "engine", "metric"):
+    for name in ("case", "engine"):
         table.add_column(name, no_wrap=True)
-    for name in ("value", "claimed", "limit"):
+    for name in (*SHOWN.values(), Word.WITHIN, "expected", Word.OUTSIDE):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("unit")
-    table.add_column("verdict", no_wrap=True)
-    for row in rows.to_dict(orient="records"):
-        word = Word(row["verdict"])
-        colour = COLOURS.get(word, "dim")
+    for (case, variant, engine, profile), run in rows.groupby(["case", "variant", "engine", "profile"], sort=False):
+        values = run.drop_duplicates("metric").set_index("metric")["value"]
+        counts = run["verdict"].value_counts()
         table.add_row(
-            f"{row['case']}:{row['variant']}", f"{row['engine']}:{row['profile']}", row["metric"],
-            page.number(row["value"]), page.number(row["expected"]), page.number(row["limit"]), row["unit"],
-            f"[{colour}]{word}[/]",
+            f"{case}:{variant}", f"{engine}:{profile}", *(_short(values.get(metric)) for metric in SHOWN),
+            *(_count(int(counts.get(word, 0)), word) for word in (Word.WITHIN, Word.EXPECTED, Word.OUTSIDE)),
         )  # fmt: skip
     return table
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None or value != value else f"{value:.1e}"
+
+
+def _count(count: int, word: Word) -> str:
+    return f"[{COLOURS[word]}]{count}[/]" if count else "[dim]0[/]"
 
 
 def show_bench(rows: pd.DataFrame, orders: pd.DataFrame, out: Path) -> None:

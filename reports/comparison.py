@@ -101,6 +101,15 @@ class _Judge:
             tier=self.truth.tier.value if claim is None else claim.tier.value,
         )  # fmt: skip
 
+    def missing(self, metric: str, unit: str) -> Verdict:
+        """A claimed number that the run does not have, for example the fifth exit of a ball that left twice."""
+        claim = self.claims[metric]
+        limit = limit_for(self.case.limits, metric, self.entry.engine, self.entry.profile)
+        known = "" if limit is None else limit.known
+        word = Word.EXPECTED if known else Word.OUTSIDE
+        why = known or f"The run has no such number; {claim.expected:g} claimed: {claim.source}."
+        return self.row(metric, math.nan, unit, word, why, expected=claim.expected, tier=claim.tier.value)
+
 
 def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdict]:
     """Every row of one run."""
@@ -119,7 +128,8 @@ def _outcome(judge_: _Judge, run: Trajectory) -> Verdict:
     """Whether the run reached its horizon: a run that did not is outside, with the advice."""
     if run.outcome.ok:
         return judge_.row("finished", 1.0, "1", Word.WITHIN, "", expected=1.0, limit=0.0)
-    why = f"{run.outcome.value}: {run.message + '. ' if run.message else ''}{run.outcome.advice}"
+    told = "" if run.outcome.advice in run.message else run.outcome.advice
+    why = " ".join(text for text in (f"{run.outcome.value}:", run.message, told) if text)
     return judge_.row("finished", 0.0, "1", Word.OUTSIDE, why, expected=1.0, limit=0.0)
 
 
@@ -150,7 +160,7 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterable[Verdict
         if value is not None:
             yield judge_.judged(name, value, metric.UNIT)
         elif name in judge_.claims:
-            yield judge_.judged(name, math.nan, metric.UNIT)
+            yield judge_.missing(name, metric.UNIT)
 
 
 def _split(judge_: _Judge) -> Iterable[Verdict]:
