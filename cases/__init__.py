@@ -27,11 +27,11 @@ from crossbody.cases._errors import (
 from crossbody.cases._outcome import Outcome
 
 if TYPE_CHECKING:
-    from crossbody.cases._case import Case, Claim, Coordinate, Law, Limit, Parameter, Tier, Value
+    from crossbody.cases._case import Case, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
     from crossbody.cases._trajectory import Event, Ledger, Mode, Trajectory
 
 _LAZY = {
-    **dict.fromkeys(("Case", "Claim", "Coordinate", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"),
+    **dict.fromkeys(("Case", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"),
     **dict.fromkeys(("Event", "Ledger", "Mode", "Trajectory"), "_trajectory"),
 }
 
@@ -43,6 +43,7 @@ __all__ = [
     "CrossbodyError",
     "EngineUnavailable",
     "Event",
+    "Inputs",
     "InvalidValue",
     "Law",
     "Ledger",

@@ -114,6 +114,36 @@ class Law:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Inputs:
+    """What acts on a mechanism from outside: each row of values holds from its time on, zero before the first.
+
+    Attributes:
+        names: names of the inputs, with their units, in the order of the mechanism's u.
+        times (m,): s, increasing.
+        values (m, nu): in the inputs' own units.
+    """
+
+    names: tuple[str, ...]
+    times: Floats
+    values: Floats
+
+    def __post_init__(self) -> None:
+        """Check shapes, and that times increase.
+
+        Raises:
+            SceneError: naming the field and what would be valid.
+        """
+        times = frozen("Inputs", "times", self.times, (None,))
+        values = frozen("Inputs", "values", self.values, (len(times), len(self.names)))
+        if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0) and np.all(times >= 0)):
+            raise SceneError(f"Inputs.times is {times.tolist()}; they must be finite, at least 0 and increasing.")
+        if not np.all(np.isfinite(values)):
+            raise SceneError("Inputs.values holds a value that is not finite.")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
     """How large one metric may be for one engine and profile, and why.
 
@@ -170,6 +200,7 @@ class Case:
         fsm: machine that switches the rows: "level", "edge" or "memoryless".
         collisions: rule for several contacts: "sequential", "simultaneous" or "resolved".
         closed_form: the exact motion at given times, where one exists (tier A).
+        inputs: what acts from outside; None for nothing.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
     """
@@ -188,6 +219,7 @@ class Case:
     fsm: str = "level"
     collisions: str = "sequential"
     closed_form: Callable[[Floats], Trajectory] | None = None
+    inputs: Inputs | None = None
     claims: tuple[Claim, ...] = ()
     limits: tuple[Limit, ...] = ()
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))

@@ -53,8 +53,8 @@ class ReferenceRun:
 class Reference:
     """The project's own integrators; see `crossbody.engines.Engine`.
 
-    A mechanism is a module in reference/systems with `build(parameters, law) -> System`; it may have
-    `inputs(parameters) -> (times (m,), values (m, nu))` and `listed(p)`, what the parity audit lists.
+    A mechanism is a module in reference/systems with `build(parameters, law) -> System`; it may have `listed(p)`, what
+    the parity audit lists, and `check_start(parameters, q0, v0)`, which raises SceneError.
     """
 
     name = "reference"
@@ -99,6 +99,9 @@ class Reference:
         used = _settings.chosen(self.name, solver, _known(solver), numbers)
         options = _options(case, solver, {**used, **times})
         system = _module(case.mechanism).build(case.parameters, case.law)
+        check = getattr(_module(case.mechanism), "check_start", None)
+        if check is not None:
+            check(case.parameters, case.q0, case.v0)
         inner = prepare(system, case.q0, case.v0, options)
         inner.warm()
         return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
@@ -141,8 +144,7 @@ def _options(case: Case, solver: str, used: Mapping[str, Any]) -> Options:
         given["samples"] = np.linspace(0.0, case.t_end, count) if count else None
     if given["fsm"] == OF_THE_CASE:
         given["fsm"] = case.fsm
-    inputs = getattr(_module(case.mechanism), "inputs", None)
-    given["inputs"] = inputs(case.parameters) if inputs else None
+    given["inputs"] = None if case.inputs is None else (case.inputs.times, case.inputs.values)
     return Options(t_end=case.t_end, solver=solver, collisions=_rule(case), **given)
 
 
