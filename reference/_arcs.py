@@ -3,7 +3,7 @@
     cvode            q' = v, v' from the KKT matrix
     ida, index 1     q' = v, M v' = f + H_A^T lam_A, active rows H v' + H' v + a1 h' + a0 h + a2 h^3 = 0, else lam = 0
     ida, index 3     for bilateral rows h = 0 in the stabilised form of index 2 (Gear, Leimkuhler and Gupta 1985):
-                     q' = v + H^T mu, h = 0, H v = 0. IDA fails on the plain form of index 3, which is why it is not used.
+                     q' = v + H^T mu, h = 0, H v = 0; unilateral rows keep their law
 
 The work of rows, inputs and damping is integrated beside the motion (z), in the same error control.
 """
@@ -25,7 +25,9 @@ from crossbody.reference._options import Options
 
 SHARE = 0.1  # of the tolerance asked for: a multistep method's error grows well beyond that of one step
 CHUNK = 500  # internal steps between two looks at the clock
-AT_STOP, ROOT, TOO_MUCH_WORK = 1, 2, -1
+ROOT, TOO_MUCH_WORK = 2, -1
+ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
+STALLED, LIMIT, DAMPED = 200, 0.3, 0.3  # steps; step times pole; damping ratio: beyond all three the arc is stiff
 UNWATCHED = 1e6  # in units of a multiplier's size: IDA cannot leave variables of index 2 out of its error test
 
 
@@ -54,6 +56,14 @@ class Scene:
     """Instants at which the equations were evaluated: steps tried."""
 
 
+def _damped_pole(equations: Equations) -> float:
+    """Fastest pole of the active rows that decays rather than swings, 1/s."""
+    a0, a1, _ = equations.law[equations.active].T
+    frequency, half = np.sqrt(a0), 0.5 * a1
+    poles = half + np.sqrt(np.maximum(half**2 - a0, 0.0))
+    return float(poles[half > DAMPED * frequency].max(initial=0.0))
+
+
 class Arc:
     """The part that both solvers share.
 
@@ -68,7 +78,8 @@ class Arc:
         self.scene, self.options, self.n = scene, scene.options, scene.equations.system.n
         self.q, self.v = start.q.copy(), start.v.copy()
         self._last = -np.inf
-        self._seen = 0
+        self._known = start.t, view.lam
+        self._stalled, self._pole = 0, _damped_pole(scene.equations)
         self.common = {
             "rtol": SHARE * self.options.rtol,
             "max_num_steps": CHUNK,
@@ -83,11 +94,17 @@ class Arc:
     def _state(self, t: float, y: Floats) -> State:
         raise NotImplementedError
 
+    @property
+    def stiff(self) -> bool:
+        """Whether the damped poles of the active rows, not accuracy, have bound the steps for long."""
+        return self._stalled >= STALLED
+
     def _take(self, t: float, y: Floats) -> None:
         """Copy the solver's read-only state for the kernels, and count the steps."""
         n = self.n
         self.q[:], self.v[:] = y[:n], y[n : 2 * n]
         if t != self._last:
+            self._stalled = self._stalled + 1 if (t - self._last) * self._pole > LIMIT else 0
             self._last = t
             self.scene.steps += 1
 
@@ -95,7 +112,15 @@ class Arc:
         n, scene = self.n, self.scene
         self.q[:], self.v[:] = y[:n], y[n : 2 * n]
         _, lam = scene.equations.accelerate(t, self.q, self.v)
+        self._known = t, lam
         scene.machine.guards(t, self.q, self.v, lam, out)
+
+    def multipliers(self, s: State) -> Floats:
+        """Lam at a state that `step` returned: the solver's own, or that of the last look at the guards."""
+        if s.lam is not None:
+            return s.lam
+        t, lam = self._known
+        return lam if t == s.t else self.scene.equations.accelerate(s.t, s.q, s.v)[1]
 
     def _guards(self, function: Any) -> dict[str, Any]:
         """The options of root finding: every function fires where it falls through zero."""
@@ -129,7 +154,9 @@ class Arc:
 
 
 class CvodeArc(Arc):
-    """CVODE, by Adams' formulas; by backward differentiation where the active rows are stiff."""
+    """CVODE, by Adams' formulas; by backward differentiation once stability holds the steps back (`stiff`)."""
+
+    method = "Adams"
 
     def _begin(self, start: State, view: View) -> Any:
         def rhs(t: float, y: Floats, yp: Floats) -> None:
@@ -143,20 +170,21 @@ class CvodeArc(Arc):
         def watch(t: float, y: Floats, out: Floats) -> None:
             self._watch(t, y, out)
 
-        guards = self._guards(watch)
-        solver = CVODE(rhs, method=self._method(start, view), atol=self._tolerances(), **self.common, **guards)
+        guards, e = self._guards(watch), self.scene.equations
+        order = {} if self.method == "BDF" else {"max_order": ORDER_IN_CONTACT if e.active else ORDER}
+        solver = CVODE(rhs, method=self.method, atol=self._tolerances(), **self.common, **order, **guards)
         solver.init_step(start.t, np.concatenate([start.q, start.v, start.z]))
         return solver
-
-    def _method(self, start: State, view: View) -> str:
-        return METHOD
 
     def _state(self, t: float, y: Floats) -> State:
         n = self.n
         return State(t, y[:n].copy(), y[n : 2 * n].copy(), y[2 * n :].copy())
 
 
-METHOD = "Adams"
+class BdfArc(CvodeArc):
+    """CVODE by backward differentiation formulas."""
+
+    method = "BDF"
 
 
 class IdaArc(Arc):
@@ -165,7 +193,7 @@ class IdaArc(Arc):
     def _begin(self, start: State, view: View) -> Any:
         n, nc, e = self.n, self.scene.equations.system.nc, self.scene.equations
         bilateral = ~np.asarray(e.system.unilateral, dtype=bool)
-        self.rigid = np.flatnonzero(bilateral) if self.options.index == 3 else np.zeros(0, dtype=np.int64)
+        self.rigid = np.flatnonzero(bilateral).tolist() if self.options.index == 3 else []
         nb = len(self.rigid)
         self.lam, self.mu = slice(2 * n, 2 * n + nc), slice(2 * n + nc, 2 * n + nc + nb)
         self.work = slice(2 * n + nc + nb, None)
@@ -202,7 +230,7 @@ class IdaArc(Arc):
         out[n : 2 * n] = M @ vd - f - H.T @ lam[e.active]
         rows = out[self.lam]
         rows[:] = lam
-        rows[e.active] = H @ vd + Hdv + e.pull(h, H @ v)
+        rows[e.active] = H @ vd + Hdv + e.drive(h, H @ v)
         if len(self.rigid):
             places = [e.active.index(i) for i in self.rigid]
             out[:n] -= H[places].T @ y[self.mu]

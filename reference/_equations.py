@@ -1,4 +1,4 @@
-"""The reduced equations by numpy, one evaluation a call: slow, and independent of the compiled loop.
+"""The reduced equations in plain Python, one evaluation a call: slow, and independent of the compiled loop.
 
     [ M   -H_A^T ] [ v'  ]   [ f                                          ]
     [ H_A    0   ] [ lam ] = [ -(H_A' v + a1 h' + a0 h + a2 h^3)_A        ]      spec 1.1
@@ -10,8 +10,10 @@ pivoting.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
 import numpy as np
+from scipy.linalg.lapack import dgesv
 
 from crossbody.cases import Mode, Outcome
 from crossbody.reference._kinds import Floats
@@ -50,7 +52,7 @@ class Equations:
         n, nc = system.n, system.nc
         self.system = system
         self.slow, self.fast = np.array(system.alpha), np.array(system.beta)
-        self.has_fast = self.fast.any(axis=1)
+        self.has_fast: list[bool] = np.any(self.fast, axis=1).tolist()
         if rigid:  # h = 0 itself holds a bilateral row: on it the law has nothing to add
             self.slow[~np.asarray(system.unilateral, dtype=bool)] = 0.0
         self.law = self.slow.copy()
@@ -62,6 +64,7 @@ class Equations:
         self._gap, self._rate, self._two = np.zeros(nc), np.zeros(nc), np.zeros(2)
         self._M = self._blocks if system.mass_block == n else np.zeros((n, n))
         self._index = np.zeros(nc, dtype=np.int64)
+        self.activate([])
 
     def activate(self, modes: Sequence[int]) -> None:
         """List the active rows of a mode set and put their constants in force."""
@@ -70,6 +73,9 @@ class Equations:
         self._H[:] = 0.0  # kernels need not write the zeros
         for i, mode in enumerate(modes):
             self.law[i] = self.fast[i] if mode == Mode.COLLISION and self.has_fast[i] else self.slow[i]
+        self._law = self.law[self.active].T.copy()
+        size = self.system.n + len(self.active)
+        self._matrix, self._right = np.zeros((size, size), order="F"), np.zeros(size)
 
     def terms(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """M (n, n) and f (n,); both are views that the next call overwrites."""
@@ -89,36 +95,31 @@ class Equations:
             self.system.rows(t, q, v, self.p, self._w, self._index, na, self._H, self._h, self._Hdv)
         return self._H[:na], self._h[:na], self._Hdv[:na]
 
-    def pull(self, h: Floats, rate: Floats) -> Floats:
+    def drive(self, h: Floats, rate: Floats) -> Floats:
         """a1 h' + a0 h + a2 h^3 of the active rows."""
-        law = self.law[self.active]
-        drive: Floats = law[:, 1] * rate + (law[:, 0] + law[:, 2] * h * h) * h
-        return drive
+        a0, a1, a2 = self._law
+        value: Floats = a1 * rate + (a0 + a2 * h * h) * h
+        return value
 
     def accelerate(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Acceleration v' (n,) and lam of all rows (nc,).
 
         Raises:
-            Ended: ILL_POSED if the matrix is singular, NOT_FINITE if the kernels or the solution are not finite.
+            Ended: ILL_POSED if the matrix is singular, NOT_FINITE if the kernels return what is not finite.
         """
-        n, nc, na = self.system.n, self.system.nc, len(self.active)
-        M, f = self.terms(t, q, v)
-        H, h, Hdv = self.rows(t, q, v)
-        matrix, right = np.zeros((n + na, n + na)), np.empty(n + na)
-        matrix[:n, :n], right[:n] = M, f
-        if na:
+        n, matrix, right = self.system.n, self._matrix, self._right
+        matrix[:n, :n], right[:n] = self.terms(t, q, v)
+        if self.active:
+            H, h, Hdv = self.rows(t, q, v)
             matrix[:n, n:], matrix[n:, :n] = -H.T, H
-            right[n:] = -(Hdv + self.pull(h, H @ v))
-        if not (np.isfinite(right).all() and np.isfinite(matrix).all()):
-            raise Ended(Outcome.NOT_FINITE)
-        try:
-            solved = np.linalg.solve(matrix, right)
-        except np.linalg.LinAlgError:
-            raise Ended(Outcome.ILL_POSED, self.active) from None
-        if not np.isfinite(solved).all():
-            raise Ended(Outcome.ILL_POSED, self.active)
-        lam = np.zeros(nc)
-        lam[self.active] = solved[n:]
+            right[n:] = -(Hdv + self.drive(h, H @ v))
+        _, _, solved, info = dgesv(matrix, right)
+        if info or not isfinite(solved.dot(solved)):
+            good = np.isfinite(right).all() and np.isfinite(matrix).all()
+            raise Ended(Outcome.ILL_POSED if good else Outcome.NOT_FINITE, self.active)
+        lam = np.zeros(self.system.nc)
+        if self.active:
+            lam[self.active] = solved[n:]
         return solved[:n], lam
 
     def gaps(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:

@@ -115,7 +115,12 @@ class LevelMachine:
     def _wanted(self, i: int, view: View, t: float, q: Floats, v: Floats) -> Mode:
         """Where row i belongs at this instant."""
         mode, h, rate = self.modes[i], float(view.gap[i]), float(view.rate[i])
-        closing, presses = rate < -self.slow, lambda: np.greater(*self.pressure(i, t, q, v))
+        closing = rate < -self.slow
+
+        def presses() -> bool:
+            lam, noise = self.pressure(i, t, q, v)
+            return lam > noise
+
         if mode in ACTIVE:
             return self._released(i, h) if view.lam[i] < -view.noise[i] else mode
         if h > 0.0:

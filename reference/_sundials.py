@@ -1,8 +1,8 @@
 """A run by SUNDIALS through scikit-sundae (Hindmarsh et al. 2005): the independent check on the compiled loop.
 
-Nothing of the compiled loop is shared but the mechanism's kernels: equations, state machine, integrator and root finding
-are others. It is slower by the price of Python callbacks. Every arc between two events, input changes or controller
-ticks begins anew at order one.
+It shares nothing with the compiled loop but the mechanism's kernels: equations, state machine, integrator and root
+finding are others. It is slower by the price of Python callbacks. Every arc between two events, changes of the inputs
+or ticks of the controller begins anew at order one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
-from crossbody.reference._arcs import Arc, CvodeArc, IdaArc, Scene, State
+from crossbody.reference._arcs import Arc, BdfArc, CvodeArc, IdaArc, Scene, State
 from crossbody.reference._equations import ULP, Ended, Equations
 from crossbody.reference._kinds import Floats
 from crossbody.reference._level_machine import LevelMachine, View
@@ -106,6 +106,8 @@ class SundialsRun:
             if switched or (at_stop and self.state.t < t_end):
                 view = self._settle()
                 arc = self._arc(view)
+            elif arc.stiff and self.kind is CvodeArc:
+                arc = BdfArc(self.scene, self.state, view, self.options.max_step)
 
     def _check_bounds(self, began: float) -> None:
         if self.scene.steps >= self.options.max_steps:
@@ -146,17 +148,12 @@ class SundialsRun:
         self.state = state
         if state.t > before.t:
             self.retries = 0
-        lam = self._multipliers(arc)
+        lam = arc.multipliers(state)
         if self.natural:
             self._record(lam)
         else:
             self._sample(lam)
         return self.machine.fire(state.t, state.q, state.v, fired) if fired else False
-
-    def _multipliers(self, arc: Arc) -> Floats:
-        """Lam that holds before anything switches."""
-        s = self.state
-        return self.equations.accelerate(s.t, s.q, s.v)[1] if s.lam is None else s.lam
 
     def _next_sample(self) -> float:
         return float(self.samples[self.next_sample]) if self.next_sample < len(self.samples) else np.inf
@@ -195,8 +192,9 @@ class SundialsRun:
         q, v, gap, lam, energy, mode, z = (
             np.array(c, dtype=np.float64).reshape(count, w) for c, w in zip(columns[1:], widths, strict=True)
         )
+        modes = mode.astype(np.int8)
         return Trajectory(
-            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=tuple(self.machine.events),
+            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, events=tuple(self.machine.events),
             outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
             counts=MappingProxyType({"rhs": self.equations.evaluations}),
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
