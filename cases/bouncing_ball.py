@@ -30,7 +30,7 @@ VARIANTS: dict[str, dict[str, Value]] = {
     "elastic": {"a1": 0.0},
     "linear": {"a0": 1e4, "a1": 20.0, "a2": 0.0},
     "resting": {"a2": 0.0},
-    "bilateral": {},
+    "bilateral": {"height": 1e-3},
 }
 
 _TITLES = {

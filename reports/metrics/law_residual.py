@@ -30,8 +30,10 @@ SAMPLES = 400
 def _equations(case: Case) -> Any:
     """The mechanism's equations, or None if the reference has none."""
     from crossbody.cases import CaseUnsupported
-    from crossbody.engines import load
+    from crossbody.engines import load, names
 
+    if "reference" not in names():
+        return None
     try:
         prepared: Any = load("reference").prepare(case, "compiled")
     except CaseUnsupported:

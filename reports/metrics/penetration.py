@@ -15,5 +15,6 @@ CLAIMED = False
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """max(0, -gap) over all rows and samples, m."""
-    return float(np.max(-run.gap, initial=0.0))
+    """max(0, -gap) over all unilateral rows and samples, m."""
+    rows = case.law.unilateral
+    return float(np.max(-run.gap[:, rows], initial=0.0)) if rows.any() else None
