@@ -24,7 +24,7 @@ def frozen(owner: str, field: str, value: Any, shape: tuple[int | None, ...], dt
     except (TypeError, ValueError) as error:
         raise SceneError(f"{owner}.{field} is not an array of {np.dtype(dtype).name}: {error}.") from None
     if array.ndim != len(shape) or any(w is not None and g != w for g, w in zip(array.shape, shape, strict=True)):
-        wanted = "(" + ", ".join("any" if w is None else str(w) for w in shape) + ")"
+        wanted = str(tuple("any" if w is None else w for w in shape)).replace("'", "")
         raise SceneError(f"{owner}.{field} has shape {array.shape}; it must have shape {wanted}.")
     array.setflags(write=False)
     return array

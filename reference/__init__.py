@@ -1,8 +1,8 @@
 """The reference model: constrained dynamics with contact as a hybrid penalty DAE.
 
-    System      a mechanism: kernels, parameters, the law of every row
-    simulate    one motion of it
-    kernels     decorators that declare the functions of a mechanism
+System      a mechanism: kernels, parameters, the law of every row
+simulate    one motion of it
+kernels     decorators that declare the functions of a mechanism
 """
 
 from __future__ import annotations

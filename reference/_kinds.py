@@ -12,4 +12,6 @@ Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 Bytes = NDArray[np.int8]
 # In bundles of compiled code the number of dimensions is part of the name.
-Floats2, Index2, Bytes2 = Floats, Index, Bytes
+Floats2 = NDArray[np.float64]
+Index2 = NDArray[np.int64]
+Bytes2 = NDArray[np.int8]

@@ -108,9 +108,7 @@ def known(kind: str, name: str, names: Iterable[str]) -> None:
         raise UnknownName(kind, name, names)
 
 
-def within(
-    name: str, value: float, low: float, high: float, *, open_low: bool = False, infinite: bool = False
-) -> None:
+def within(name: str, value: float, low: float, high: float, *, open_low: bool = False, infinite: bool = False) -> None:
     """Raise InvalidValue unless low <= value <= high (low itself excluded if open) and value is finite."""
     good = isinstance(value, (int, float, np.integer, np.floating)) and low <= value <= high
     good = good and not (open_low and value == low) and (infinite or math.isfinite(value))

@@ -16,6 +16,7 @@ from crossbody.reference.core import advance as core
 from crossbody.reference.core._struct import TABLE
 from crossbody.reference.core.layout import STATE
 
+
 def _state() -> Any:
     return numba.typeof(np.zeros(1, STATE))
 

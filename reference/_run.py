@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Trajectory
 from crossbody.reference._kinds import Floats
@@ -48,7 +49,7 @@ class CompiledRun:
         self.work = layout.workspace(n, nc, system.inputs, system.mass_block, self.nz, system.memory, system.scratch)
         natural = options.samples is None
         rows, events = (ROWS if natural else len(samples) + 1), EVENTS + 16 * nc
-        self.buffers = {
+        self.buffers: dict[str, NDArray[Any]] = {
             "inputs_t": np.array(inputs_t), "inputs_u": np.array(inputs_u), "samples": np.array(samples),
             "mode": np.zeros(nc, np.int8), "history": np.zeros((max(HISTORY, 4 * nc) + 1, nc), np.int8),
             "out": np.zeros((rows, 1 + 2 * n + 2 * nc + 2 + self.nz)), "modes": np.zeros((rows, nc), np.int8),

@@ -16,7 +16,8 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
 
     Args:
         system: the mechanism.
-        q0, v0 (n,): start, finite.
+        q0: positions at the start (n,), finite.
+        v0: velocities at the start (n,), finite.
         t_end: horizon, s, above 0.
         options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples, ledger, ...
 
@@ -28,12 +29,13 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
         InvalidValue, UnknownName: for an option outside what it admits.
     """
     run = prepare(system, q0, v0, Options(t_end=t_end, **options))
-    return run.trajectory(*run.go())
+    motion: Trajectory = run.trajectory(*run.go())
+    return motion
 
 
 def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> Any:
     """A run that can be repeated: everything that does not depend on time is decided here."""
-    start = [system.checked_state(name, value) for name, value in (("q0", q0), ("v0", v0))]
+    start = system.checked_state("q0", q0), system.checked_state("v0", v0)
     if options.solver == "compiled":
         from crossbody.reference._run import CompiledRun
 

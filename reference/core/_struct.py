@@ -50,9 +50,7 @@ def _read_field(context: Any, builder: Any, bundle: BundleType, value: Any, name
     kind = bundle.fields[row][1]
     word = ir.IntType(64)
     table = builder.bitcast(value, word.as_pointer())
-    address, *shape = (
-        builder.load(builder.gep(table, [ir.Constant(word, 3 * row + i)])) for i in range(1 + kind.ndim)
-    )
+    address, *shape = (builder.load(builder.gep(table, [ir.Constant(word, 3 * row + i)])) for i in range(1 + kind.ndim))
     itemsize = ir.Constant(word, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
     strides = [itemsize] if kind.ndim == 1 else [builder.mul(itemsize, shape[1]), itemsize]
     view = context.make_array(kind)(context, builder)
@@ -65,7 +63,7 @@ def opener(kind: BundleType) -> Any:
     """A compiled function that turns a table into the bundle."""
 
     @intrinsic
-    def bundle(typingctx: Any, table: Any) -> Any:  # noqa: ARG001
+    def bundle(typingctx: Any, table: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             array = cgutils.create_struct_proxy(TABLE)(context, builder, args[0])
             return builder.bitcast(array.data, cgutils.voidptr_t)

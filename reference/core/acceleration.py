@@ -17,7 +17,6 @@ from crossbody.reference._kinds import Array, Bytes, Floats
 from crossbody.reference.core.algebra import factor_mass, factor_schur, solve_mass, solve_schur, span
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 
-
 # numba compiles a function anew for every literal that it is called with; numpy's integers are values, not literals.
 OWN, GENERAL = np.arange(2)
 
@@ -25,7 +24,7 @@ OWN, GENERAL = np.arange(2)
 @inlined
 def is_active(mode: int) -> bool:
     """CONTACT, COLLISION and BILATERAL rows carry a multiplier."""
-    return bool(mode == CONTACT or mode == COLLISION or mode == BILATERAL)
+    return bool(mode in (CONTACT, COLLISION, BILATERAL))
 
 
 @inlined
@@ -53,7 +52,7 @@ def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
 
 @inlined
 def scatter(s: Any, w: Work, lam: Array) -> None:
-    """lam of all rows from lam of the active ones."""
+    """Lam of all rows from lam of the active ones."""
     for i in range(s.nc):
         lam[i] = 0.0
     for j in range(s.na):
@@ -62,7 +61,7 @@ def scatter(s: Any, w: Work, lam: Array) -> None:
 
 @inlined
 def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
-    """vd = M^-1 f; leaves the factor of M."""
+    """Vd = M^-1 f; leaves the factor of M."""
     dynamics(t, q, v, w.u, p, w.M, w.f, w.w)
     if not (s.constant_mass and s.have_mass):
         if factor_mass(w.M, w.L, s.n, s.k) != 0:
@@ -141,8 +140,7 @@ def accelerate(
 ) -> int:
     """Fill w.vd, and w.la, w.hda of the active rows; 1 if ill posed.
 
-    Args:
-        general: GENERAL to leave H, X and the factor of G even if the system brings its own algebra, else OWN.
+    With general = GENERAL it leaves H, X and the factor of G even if the system brings its own algebra (OWN).
     """
     s.rhs += 1
     na = s.na

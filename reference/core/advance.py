@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes, Floats, Index
+from crossbody.reference._kinds import Index
 from crossbody.reference.core import dense, dop853, esdirk, events, exact, machine, record
 from crossbody.reference.core.acceleration import scatter
-from crossbody.reference.core.dop853_table import STABILITY_LIMIT
+from crossbody.reference.core.dop853_table import STABILITY_LIMIT, STAGES
 from crossbody.reference.core.layout import (
     DIVERGED,
     DONE,
@@ -40,6 +40,7 @@ TRIAL_STEPS = 12  # implicit steps before the two are compared
 HOLD_STEPS = 400  # explicit steps after a trial that was lost
 FAR = 1e30
 MAX_REJECTIONS = 60
+
 
 class Kernels(NamedTuple):
     """The functions of one mechanism."""
@@ -79,7 +80,9 @@ def _first_step(K: Any, s: Any, m: Model, w: Work) -> float:
 def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Put the inputs that hold from now on in force and find the next instant at which they change."""
     while s.next_input < len(b.inputs_t) and b.inputs_t[s.next_input] <= s.t:
-        w.u[:] = b.inputs_u[s.next_input]
+        before = s.next_input - 1
+        for i in range(s.nu):  # by its change, so that what a controller holds on top stays
+            w.u[i] += b.inputs_u[s.next_input, i] - (b.inputs_u[before, i] if before >= 0 else 0.0)
         s.next_input += 1
     if s.has_control and s.next_tick * s.tick <= s.t:
         K.control(s.t, w.y[: s.n], w.y[s.n :], w.u, w.s, m.p)
@@ -137,7 +140,6 @@ def _choose_method(s: Any, w: Work) -> None:
             s.trial_steps, s.trial_rhs, s.trial_t = 0, s.rhs, s.t
 
 
-
 @inlined
 def _grow(s: Any, error: float) -> float:
     """Factor for the next step from the error of this one, by the order of the method that took it."""
@@ -162,7 +164,7 @@ def _attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         if clipped:
             h = left
         if h < 4.0 * machine.ULP * abs(s.t):
-            return STEP_TOO_SMALL
+            break
         error = dop853.step(K, s, m, w, h) if s.method == EXPLICIT else esdirk.step(K, s, m, w, b.mode, h)
         if 0.0 <= error <= 1.0:
             s.hs = h
@@ -184,7 +186,7 @@ def _attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 @inlined
 def _end_stage(s: Any) -> int:
     """The stage whose derivative is that of the step's end."""
-    return esdirk.STAGES - 1 if s.method == IMPLICIT else dop853.STAGES
+    return esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES
 
 
 @inlined
@@ -194,7 +196,8 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
     last = NODES - 1
     end = _end_stage(s)
     t = s.t + s.hs
-    if s.method != IMPLICIT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
+    # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
+    if dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     scatter(s, w, w.lams[last])
     K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
@@ -216,7 +219,7 @@ def _take_arc(K: Any, s: Any, m: Model, w: Work, length: float) -> int:
     """One step in closed form."""
     s.method = EXACT
     s.have_dense = 1
-    s.hs = min(length, s.stop - s.t)
+    s.hs = min(length, s.stop - s.t, s.h_max)
     exact.begin(K, s, m, w)
     exact.evaluate(s, w, s.hs, w.y1)
     s.exact_steps += 1
@@ -358,11 +361,8 @@ def advance(
 ) -> int:  # fmt: skip
     """Go on for at most `budget` steps.
 
-    Args:
-        dynamics, gaps, rows, energy, power, solve, control: the mechanism's kernels.
-        state (1,): record of `layout.STATE`.
-        model, work, buffers: tables of the bundles in `layout`.
-        budget: bound on steps.
+    The seven kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
+    tables of the bundles in `layout`.
 
     Returns:
         DONE at the horizon, MORE after the budget, ROWS_FULL or EVENTS_FULL where the caller must grow a buffer,

@@ -33,7 +33,7 @@ def factor_mass(M: Floats, L: Floats, n: int, k: int) -> int:
 
 @compiled
 def solve_mass(L: Floats, x: Array, k: int, first: int, last: int) -> None:
-    """x := M^-1 x, in place, for the blocks from coordinate `first` up to `last`."""
+    """X := M^-1 x, in place, for the blocks from coordinate `first` up to `last`."""
     for b in range(first, last, k):
         for i in range(k):
             total = x[b + i]
@@ -78,7 +78,7 @@ def factor_schur(G: Floats, na: int) -> int:
 
 @compiled
 def solve_schur(G: Floats, na: int, r: Array, x: Array) -> None:
-    """x = G^-1 r from the factor of `factor_schur`."""
+    """X = G^-1 r from the factor of `factor_schur`."""
     for i in range(na):
         total = r[i]
         for m in range(i):
@@ -127,7 +127,7 @@ def factor_lu(A: Floats, n: int, pivot: Index) -> int:
 
 @compiled
 def solve_lu(A: Floats, n: int, pivot: Index, x: Array) -> None:
-    """x := A^-1 x, in place."""
+    """X := A^-1 x, in place."""
     for c in range(n):
         x[c], x[pivot[c]] = x[pivot[c]], x[c]
         for i in range(c + 1, n):

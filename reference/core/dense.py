@@ -41,7 +41,7 @@ def _quintic(n: int, w: Work, theta: float, h: float, out: Array) -> None:
 
 @compiled
 def state(s: Any, w: Work, theta: float, out: Array) -> None:
-    """out = (q, v) at the part theta of the step."""
+    """Out = (q, v) at the part theta of the step."""
     if s.method == EXACT:
         exact.evaluate(s, w, theta * s.hs, out)
     elif theta == 1.0:
@@ -55,7 +55,7 @@ def state(s: Any, w: Work, theta: float, out: Array) -> None:
 
 @inlined
 def ledger(s: Any, w: Work, theta: float, out: Array) -> None:
-    """out = the ledger at the part theta of the step."""
+    """Out = the ledger at the part theta of the step."""
     if s.method == EXPLICIT:
         dop853.evaluate(w.z, w.Fz, theta, out)
         return

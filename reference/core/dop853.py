@@ -50,7 +50,7 @@ def powers(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) ->
 
 @compiled
 def _combine(base: Array, k: Floats, stage: int, h: float, out: Array) -> None:
-    """out = base + h sum_j A[stage, j] k[j]."""
+    """Out = base + h sum_j A[stage, j] k[j]."""
     for i in range(len(base)):
         total = 0.0
         for c in range(_COUNT[stage]):
@@ -151,7 +151,7 @@ def _polynomial(y: Array, y1: Array, k: Floats, h: float, F: Floats) -> None:
 
 @compiled
 def evaluate(y: Array, F: Floats, theta: float, out: Array) -> None:
-    """out = the dense output at theta in [0, 1]."""
+    """Out = the dense output at theta in [0, 1]."""
     for i in range(len(y)):
         value = F[6, i] * theta
         value = (value + F[5, i]) * (1.0 - theta)

@@ -1,8 +1,8 @@
 """Where inside the step just taken a machine must switch first.
 
-Every step is watched on its dense output at its ends and three points between. A gap is searched by the sign of its rate
-as well: where the rate changes sign the gap has its extremum, and it is the extremum that decides, so that a contact
-entirely inside one step is found. A fired transition is applied as such, never decided again from a value at round-off.
+Every step is watched on its dense output at its ends and at three points between. A gap is searched by the sign of its
+rate as well: where the rate changes sign the gap has its extremum, which decides, so that a contact entirely inside one
+step is found. A fired transition is applied as such, never decided again from a value at round-off.
 """
 
 from __future__ import annotations
@@ -36,10 +36,9 @@ NEAR = 0.25  # of the range in the step: seen at twelve stages, a value does not
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT (spec 1.2)
 
 
-
 @inlined
 def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
-    """lam of the active row i at the state in ys."""
+    """Lam of the active row i at the state in ys."""
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
         return np.nan
     for j in range(s.na):

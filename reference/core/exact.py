@@ -61,7 +61,7 @@ def _half_contact(a0: float, a1: float) -> float:
 
 @inlined
 def _multiply_inverse(s: Any, w: Work, x: Array) -> None:
-    """la = G^-1 x for the active rows."""
+    """La = G^-1 x for the active rows."""
     if s.n == 1 and s.na == 1:
         w.la[0] = x[0] / (w.G[0, 0] * w.G[0, 0])
     else:
@@ -107,7 +107,7 @@ def _stays(s: Any, w: Work, unilateral: Bytes) -> bool:
 @compiled
 def plan(s: Any, w: Work, unilateral: Bytes) -> float:
     """Longest arc that may be taken in closed form from here; 0 if none."""
-    if not s.affine or s.na > 0 and (s.ledger or s.has_solve or not _is_linear(s, w)):
+    if not s.affine or (s.na > 0 and (s.ledger or s.has_solve or not _is_linear(s, w))):
         return 0.0
     length = np.inf
     if s.na > 0 and not (s.na == s.nc and _stays(s, w, unilateral)):
@@ -134,7 +134,7 @@ def begin(K: Any, s: Any, m: Model, w: Work) -> None:
 
 @inlined
 def _push(s: Any, w: Work, sign: float, out: Array) -> None:
-    """out += sign M^-1 H^T G^-1 r."""
+    """Out += sign M^-1 H^T G^-1 r."""
     _multiply_inverse(s, w, w.r)
     for j in range(s.na):
         for a in range(s.n):
@@ -143,7 +143,7 @@ def _push(s: Any, w: Work, sign: float, out: Array) -> None:
 
 @compiled
 def evaluate(s: Any, w: Work, t: float, out: Array) -> None:
-    """out = (q, v) after time t on the arc."""
+    """Out = (q, v) after time t on the arc."""
     n = s.n
     q, v = out[:n], out[n:]
     for a in range(n):

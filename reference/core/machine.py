@@ -103,7 +103,7 @@ def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
 def multiplier_if_active(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, t: float, q: Floats, v: Floats
 ) -> float:
-    """lam of row i if it were active now, from the same equations that the row would use; noise[i] beside it."""
+    """Lam of row i if it were active now, from the same equations that the row would use; noise[i] beside it."""
     before = mode[i]
     mode[i] = active_mode(m, i)
     activate(s, m, w, mode)

@@ -13,7 +13,6 @@ from crossbody.reference.core.layout import EXACT, Model, Work
 ARC_POINTS = 16  # an arc in closed form is one step, however long: these points show its shape
 
 
-
 @compiled
 def write_row(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, y: Array, lam: Array, z: Array, out: Floats, modes: Bytes

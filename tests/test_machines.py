@@ -1,0 +1,87 @@
+"""The state machines: the four defects of the edge machine, the same starts under the level machine."""
+
+import numpy as np
+import pytest
+from mechanisms import ball, sliders
+
+from crossbody.cases import Mode, Outcome
+from crossbody.reference import System, kernels, simulate
+from crossbody.reference.systems import ball as ball_kernels
+
+
+@kernels.dynamics
+def _gust(t, q, v, u, p, M, f, w):
+    M[0, 0] = p[0]
+    f[0] = u[0] - p[0] * p[1]
+
+
+def gusty(a0=1e4, a1=1.0):
+    """A ball with an input force."""
+    return System(
+        n=1, inputs=1, parameters=[1.0, 9.81], a0=[a0], a1=[a1], dynamics=_gust,
+        gaps=ball_kernels.gaps, rows=ball_kernels.rows, energy=ball_kernels.energy,
+    )  # fmt: skip
+
+
+def test_start_below_the_surface():
+    edge, level = (simulate(ball(), [-0.01], [0.0], 1.0, fsm=fsm) for fsm in ("edge", "level"))
+    assert edge.q[-1, 0] < -4.0
+    assert not edge.events
+    assert [e.after for e in level.events] == [Mode.CONTACT]
+    assert abs(level.q[-1, 0]) < 1e-3
+
+
+def test_exit_above_the_surface_keeps_the_label_ballistic():
+    edge, level = (simulate(ball(a1=0.0), [1.0], [0.0], 2.0, fsm=fsm) for fsm in ("edge", "level"))
+    assert [e.after for e in edge.events] == [Mode.CONTACT, Mode.BALLISTIC] * 2
+    assert [e.after for e in level.events] == [Mode.CONTACT, Mode.FREE] * 2
+    assert edge.q[-1, 0] == pytest.approx(level.q[-1, 0], abs=1e-7)
+
+
+def test_pulled_at_the_instant_of_touching():
+    # An updraught holds at the touch, so that lam would be negative; it ends while the ball is below.
+    inputs = ([0.0, 0.09, 0.104], [[9.81], [30.0], [0.0]])
+    runs = {f: simulate(gusty(), [0.1], [-1.0], 1.0, fsm=f, inputs=inputs) for f in ("edge", "level")}
+    assert runs["edge"].q[-1, 0] < -1.0, "nothing becomes true any more: it tunnels"
+    assert runs["level"].q[:, 0].min() > -0.05
+    assert Mode.BALLISTIC in [e.after for e in runs["level"].events]
+
+
+def test_contact_shorter_than_a_step():
+    from mechanisms import oscillator
+
+    wall = -1.0 + 1e-7
+    runs = {f: simulate(oscillator(wall), [1.0], [0.0], 5.0, fsm=f, rtol=1e-5, atol=1e-5) for f in ("edge", "level")}
+    assert not runs["edge"].events
+    assert runs["level"].events[0].after is Mode.CONTACT
+
+
+@pytest.mark.parametrize("a1", [0.0, 4.0])
+def test_memoryless_makes_no_energy(a1):
+    run = simulate(ball(a0=400.0, a1=a1, a2=0.0), [0.2], [0.0], 3.0, fsm="memoryless", rtol=1e-11)
+    assert run.outcome is Outcome.FINISHED
+    assert run.total_energy.max() <= run.total_energy[0] * (1.0 + 1e-9)
+    assert np.all(run.lam >= -1e-9)
+
+
+def test_touching_at_rest_is_free_unless_pressed():
+    floating = simulate(ball(gravity=0.0), [0.0], [0.0], 1.0)
+    pressed = simulate(ball(), [0.0], [0.0], 1.0)
+    assert not floating.events
+    assert [(e.t, e.after) for e in pressed.events] == [(0.0, Mode.CONTACT)]
+    assert pressed.lam[-1, 0] == pytest.approx(9.81, rel=1e-12)
+
+
+def test_several_contacts_at_one_instant_give_the_block_answer():
+    run = simulate(sliders(5), np.zeros(5), [1.0, 0, 0, 0, 0], 1.0, rtol=1e-11)
+    assert run.outcome is Outcome.FINISHED
+    assert run.v[-1] == pytest.approx([-0.6, 0.4, 0.4, 0.4, 0.4], abs=1e-9)
+
+
+def test_events_at_one_instant_share_their_time():
+    # Two outer masses close on the middle one symmetrically.
+    run = simulate(sliders(3), [-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], 1.5, rtol=1e-10)
+    first, second = run.events[:2]
+    assert (first.contact, second.contact) == (0, 1)
+    assert first.t == second.t == pytest.approx(1.0, abs=1e-12)
+    assert run.v[-1] == pytest.approx([-1.0, 0.0, 1.0], abs=1e-9)

@@ -1,0 +1,61 @@
+"""Rest is stiff, bouncing is not: the implicit method takes over and hands back."""
+
+import numpy as np
+import pytest
+from mechanisms import ball, flyby
+
+from crossbody.reference import simulate
+from crossbody.reference.core import esdirk
+
+
+def test_order_conditions():
+    A, b, c = esdirk.A + np.diag([0.0] + [esdirk.GAMMA] * 5), esdirk.B, esdirk.C
+    embedded = b - esdirk.E
+    assert A.sum(axis=1) == pytest.approx(c, abs=1e-15)
+    assert A[-1] == pytest.approx(b, abs=0)
+    three = [
+        (lambda w: w.sum(), 1),
+        (lambda w: w @ c, 1 / 2),
+        (lambda w: w @ c**2, 1 / 3),
+        (lambda w: w @ A @ c, 1 / 6),
+    ]
+    four = [(b @ c**3, 1 / 4), ((b * c) @ A @ c, 1 / 8), (b @ A @ c**2, 1 / 12), (b @ A @ A @ c, 1 / 24)]
+    for condition, value in three:
+        assert condition(b) == pytest.approx(value, abs=1e-15)
+        assert condition(embedded) == pytest.approx(value, abs=1e-15)
+    for value, wanted in four:
+        assert value == pytest.approx(wanted, abs=1e-15)
+    far = 1.0 - 1e8 * b @ np.linalg.solve(np.eye(6) + 1e8 * A, np.ones(6))
+    assert abs(far) < 1e-6, "L-stable"
+
+
+@pytest.mark.parametrize("a0", [1e4, 1e6, 1e8, 1e10, 1e12])
+def test_rest_costs_under_a_hundred_steps(a0):
+    system = ball(a0=a0, a1=2.0 * a0**0.5, a2=0.0)
+    rest = simulate(system, [0.0], [-1e-5], 1.0, rtol=1e-8, shortcuts=False)
+    drop = simulate(system, [0.1], [0.0], 1.0, rtol=1e-8, shortcuts=False)
+    for run in (rest, drop):
+        assert run.outcome.ok
+        assert run.steps < 100
+        assert run.counts["implicit_steps"] > 0
+        assert run.lam[-1, 0] == pytest.approx(9.81, rel=1e-6)
+
+
+def test_hands_back_to_the_explicit_method_at_an_event():
+    from test_machines import gusty
+
+    inputs = ([0.0, 1.0, 1.2], [[0.0], [15.0], [0.0]])
+    run = simulate(gusty(1e8, 2e4), [1e-6], [0.0], 4.0, rtol=1e-8, inputs=inputs)
+    assert run.outcome.ok
+    assert 0 < run.counts["implicit_steps"] < run.steps
+
+
+@pytest.mark.parametrize("p", [1e2, 1e3, 1e4])
+def test_stiff_pendulum_agrees_with_the_explicit_method(p):
+    system = flyby(1.0, 9.81, a0=p * p, a1=2.0 * p, unilateral=False)
+    start = ([1.0, 0.0], [0.0, 0.0])
+    stiff, explicit = (
+        simulate(system, *start, 1.0, rtol=1e-9, implicit=implicit, samples=[1.0]) for implicit in (True, False)
+    )
+    assert stiff.outcome.ok
+    assert stiff.q[-1] == pytest.approx(explicit.q[-1], abs=2e-7)

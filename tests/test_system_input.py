@@ -1,0 +1,92 @@
+"""A user's own mechanism and options: each mistake is one sentence that names the field and what would be valid."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mechanisms import ball, flyby
+
+from crossbody.cases import InvalidValue, SceneError, UnknownName
+from crossbody.reference import System, simulate
+from crossbody.reference.systems import ball as ball_kernels
+
+KERNELS = ball_kernels.KERNELS
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"n": 0}, ["System.n", "at least 1"]),
+        ({"mass_block": 2}, ["mass_block", "divide"]),
+        ({"a1": [1.0, 2.0]}, ["System.a1", "(2,)", "(1,)"]),
+        ({"a0": [np.nan]}, ["finite"]),
+        ({"a0": [-1.0]}, ["at least 0"]),
+        ({"parameters": [[1.0]]}, ["parameters", "shape"]),
+        ({"parameters": [np.inf, 1.0]}, ["finite"]),
+        ({"follows": [3]}, ["follows", "below 1"]),
+        ({"dynamics": lambda *a: None}, ["System.dynamics", "kernels.dynamics"]),
+        ({"gaps": ball_kernels.energy}, ["System.gaps", "signature"]),
+    ],
+)
+def test_wrong_system(fields, words):
+    good = {"n": 1, "parameters": [1.0, 9.81], "a0": [100.0], "a1": [20.0], **KERNELS}
+    with pytest.raises(SceneError) as caught:
+        System(**{**good, **fields})
+    assert all(word in str(caught.value) for word in words), caught.value
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"rtol": 1e-15}, InvalidValue),
+        ({"rtol": 0.2}, InvalidValue),
+        ({"rtol": np.nan}, InvalidValue),
+        ({"atol": 0.0}, InvalidValue),
+        ({"t_end": 0.0}, InvalidValue),
+        ({"t_end": -1.0}, InvalidValue),
+        ({"t_end": np.inf}, InvalidValue),
+        ({"fsm": "levle"}, UnknownName),
+        ({"solver": "rk4"}, UnknownName),
+        ({"collisions": "none"}, UnknownName),
+        ({"samples": [1.0, 0.5]}, InvalidValue),
+        ({"samples": [0.0, 9.0]}, InvalidValue),
+        ({"index": 3}, InvalidValue),
+        ({"inputs": ([0.0, 0.0], np.zeros((2, 0)))}, InvalidValue),
+        ({"inputs": ([0.0], [[1.0]])}, SceneError),
+        ({"max_steps": 0}, InvalidValue),
+    ],
+)
+def test_wrong_option(options, error):
+    with pytest.raises(error):
+        simulate(ball(), [1.0], [0.0], **{"t_end": 1.0, **options})
+
+
+@pytest.mark.parametrize(("q0", "v0"), [([1.0, 2.0], [0.0]), ([1.0], []), ([np.nan], [0.0]), (["x"], [0.0])])
+def test_wrong_start(q0, v0):
+    with pytest.raises(SceneError, match=r"simulate\.(q0|v0)"):
+        simulate(ball(), q0, v0, 1.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    height=st.floats(-0.1, 10.0), speed=st.floats(-1e3, 1e3), a0=st.floats(1.0, 1e12), zeta=st.floats(0.0, 10.0),
+    gravity=st.floats(0.0, 100.0), rtol=st.sampled_from([1e-3, 1e-6, 1e-9]),
+    fsm=st.sampled_from(["level", "memoryless"]),
+)  # fmt: skip
+def test_any_ball_ends_in_an_outcome(height, speed, a0, zeta, gravity, rtol, fsm):
+    system = ball(a0=a0, a1=2.0 * zeta * a0**0.5, a2=0.0, gravity=gravity)
+    run = simulate(system, [height], [speed], 1.0, rtol=rtol, fsm=fsm, max_steps=20_000)
+    assert np.all(np.isfinite(run.q))
+    assert np.all(np.isfinite(run.lam))
+    assert run.outcome.ok or run.message
+
+
+def test_mass_matrix_and_rows_can_be_asked_for():
+    system = flyby(0.5)
+    M, f = system.terms([3.0, 4.0])
+    H, h, Hdv = system.constraint([3.0, 4.0], [1.0, 0.0])
+    assert np.array_equal(M, np.eye(2))
+    assert not f.any()
+    assert np.allclose(H, [[0.6, 0.8]], rtol=1e-15)
+    assert h == pytest.approx([4.5])
+    assert Hdv == pytest.approx([(1.0 - 0.36) / 5.0])
