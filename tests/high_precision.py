@@ -1,5 +1,7 @@
 """The bouncing ball to forty digits: Taylor series of the contact, quadratics between, an oracle of its own."""
 
+from functools import cache
+
 from mpmath import mp, mpf
 
 ORDER = 40
@@ -56,6 +58,7 @@ def _fall(h, v, g):
     return (v + (v * v + 2 * g * h) ** mpf("0.5")) / g
 
 
+@cache
 def transitions(a0, a1, a2, g, height, count):
     """The first `count` transitions of the level machine: (time, gap, rate) each, mpf."""
     mp.dps = 40
