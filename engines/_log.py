@@ -12,6 +12,8 @@ from crossbody.cases._arrays import Floats
 
 Observe = Callable[[Floats, Floats], tuple[Floats, Floats]]
 """(q (n, nq), v (n, nv)) -> gap (n, nc), energy (n, 2), in the case's coordinates."""
+Chart = Callable[[Floats, Floats], tuple[Floats, Floats]]
+"""(q (n, nq), v (n, nv)) of an engine -> those of the case."""
 Modes = tuple[int, ...]
 
 
@@ -56,10 +58,13 @@ class Log:
         steps: int = 0,
         wall_s: float = 0.0,
         counts: Mapping[str, int] | None = None,
+        chart: Chart | None = None,
     ) -> Trajectory:
         """The run; gaps and energies are evaluated here."""
         t, q, v = self.columns()
         with np.errstate(all="ignore"):  # a run that failed may end where squares overflow
+            if chart is not None:
+                q, v = chart(q, v)
             gap, energy = observe(q, v)
         return Trajectory(
             t=t,

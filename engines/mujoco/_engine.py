@@ -43,7 +43,8 @@ class MujocoRun:
             wall = perf_counter() - start
         words = [march.message, *(f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys((*self.said, *warned)))]
         message = " ".join(w for w in words if w)
-        return tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, {"located": march.trials})
+        counts = {"located": march.trials}
+        return tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
 
     def audit(self) -> Mapping[str, Any]:
         """The physics read back from the compiled model."""

@@ -49,16 +49,30 @@ class March:
         self.now: Modes = ()
 
     def run(self, t_end: float) -> None:
-        """Step to t_end, s, the last step cut to end there."""
+        """Step to t_end, s, a step cut to end there and at every instant at which the inputs change."""
+        scene = self.scene
+        scene.start()
+        instants = list(scene.instants)
+        if instants and instants[0] == 0.0:
+            scene.change(instants.pop(0))
+        self.now = self._settled(scene.modes())
+        self.tape.record(scene.lam(), self.now)
+        for instant in instants:
+            if not self._until(instant):
+                return
+            scene.change(instant)
+            self.now = self._settled(self.now)
+            self.tape.record(scene.lam(), self.now)
+        self._until(t_end)
+
+    def _until(self, t_end: float) -> bool:
+        """Step to t_end, s; whether the run goes on."""
         scene, data, opt, dt = self.scene, self.scene.data, self.scene.model.opt, self.dt
         model, forward, advance, record = scene.model, mujoco.mj_forward, self.advance, self.tape.record
         modes, safe, lam = scene.modes, scene.safe, scene.lam
-        scene.start()
-        now = self.now = self._settled(modes())
-        record(lam(), now)
-        t, last = 0.0, t_end - dt * (1 + 1e-9)
+        now, t, last = self.now, float(data.time), t_end - dt * (1 + 1e-9)
         opt.timestep = dt
-        while t < t_end:
+        while t_end - t >= 1e-9 * dt:
             if t > last:
                 opt.timestep = t_end - t
             if self.steps == self.max_steps:
@@ -75,9 +89,9 @@ class March:
                     return self._end(Outcome.MODE_CYCLE, f"rows {now} and {self.now} switch for ever")
                 now, opt.timestep = self.now, dt
             record(lam(), now)
-            if t_end - t < 1e-9 * dt:
-                return None
-        return None
+        if scene.instants:
+            data.time = t_end  # instants are met exactly, whatever the sum of the steps
+        return True
 
     def _event(self, before: float) -> float:
         """Pass to the modes behind an event: located in the step, or taken as seen at its end. Returns the time."""
@@ -104,14 +118,15 @@ class March:
         mujoco.mj_forward(scene.model, scene.data)
         return scene.modes()
 
-    def _broken(self) -> None:
+    def _broken(self) -> bool:
         data = self.scene.data
         finite = all(bool(np.isfinite(x).all()) for x in (data.qpos, data.qvel, data.qacc))
         if finite:
             self.tape.record(self.scene.lam(), self.now)
-        self._end(Outcome.DIVERGED if finite else Outcome.NOT_FINITE, "the state left what the scene can reach")
+        return self._end(Outcome.DIVERGED if finite else Outcome.NOT_FINITE, "the state left what the scene can reach")
 
-    def _end(self, outcome: Outcome, what: str) -> None:
+    def _end(self, outcome: Outcome, what: str) -> bool:
         data = self.scene.data
         self.outcome = outcome
         self.message = f"t = {data.time:g} s, q = {data.qpos.tolist()}, v = {data.qvel.tolist()}: {what}."
+        return False

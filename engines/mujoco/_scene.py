@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from crossbody.engines._log import Modes, Observe
+from crossbody.engines._log import Chart, Modes, Observe
 from crossbody.engines.mujoco._globals import Hook
+
+
+def _nothing(_t: float) -> None:
+    """No input changes."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Scene:
-    """A compiled model with views and closures on it; the engine's coordinates are the case's.
+    """A compiled model with views and closures on it.
 
     The closures read `data` after mj_forward and are called every step: they touch only views made beforehand.
 
@@ -23,7 +27,10 @@ class Scene:
         modes: -> mode of every row.
         lam: -> multiplier of every row, N (one number for one row).
         safe: -> whether the state is finite and within what the scene can reach.
-        observe: gaps and energies of many states.
+        observe: gaps and energies of many states, in the case's coordinates.
+        chart: positions and velocities of the model -> those of the case; None where they are the same.
+        instants: when the inputs change, s, increasing.
+        change: puts in force what acts from such an instant on.
         hook: adds to efc_aref what solref cannot say; None if nothing.
         arm: opens and closes rows to suit their modes (matched profile only).
         margins: -> for every row its gap, m, and the sign of the multiplier that it would have without the bound
@@ -39,6 +46,9 @@ class Scene:
     lam: Callable[[], Any]
     safe: Callable[[], bool]
     observe: Observe
+    chart: Chart | None = None
+    instants: Sequence[float] = ()
+    change: Callable[[float], None] = _nothing
     hook: Hook | None = None
     arm: Callable[[Modes], None] | None = None
     margins: Callable[[], list[tuple[float, float]]] | None = None

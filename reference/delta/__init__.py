@@ -8,7 +8,15 @@ z, Jy, X = delta.jacobians(robot, q)
 
 from __future__ import annotations
 
-from crossbody.reference.delta.kinematics import closed_pose, flange, forward, inverse, jacobians, virtual_jacobian
+from crossbody.reference.delta.kinematics import (
+    closed_pose,
+    flange,
+    flanges,
+    forward,
+    inverse,
+    jacobians,
+    virtual_jacobian,
+)
 from crossbody.reference.delta.model import kick, system
 from crossbody.reference.delta.robot import HEAVY, LIGHT, SETS, Robot, Servo
 from crossbody.reference.delta.singularity import Margins, elbow_angle, ill_posed_tilts, margins, pendulum_rate
@@ -24,6 +32,7 @@ __all__ = [
     "closed_pose",
     "elbow_angle",
     "flange",
+    "flanges",
     "forward",
     "gravity_torque",
     "holding_pose",

@@ -38,17 +38,28 @@ def rotations(robot: Robot) -> Floats:
 
 def tips(robot: Robot, q: ArrayLike) -> Floats:
     """Tips of the three arms in the base frame (3, 3), m; equal where the pose is closed."""
-    a, b, c = np.reshape(vector("q", q, 9), (3, 3)).T
+    return _tips(robot, vector("q", q, 9))
+
+
+def _tips(robot: Robot, q: Floats) -> Floats:
+    """Tips (..., 3, 3) of poses (..., 9)."""
+    a, b, c = np.moveaxis(q.reshape(*q.shape[:-1], 3, 3), -1, 0)
     x = robot.l2 * np.sin(b) * np.sin(c)
     y = robot.offset + robot.l1 * np.cos(a) + robot.l2 * np.cos(b)
     z = robot.l1 * np.sin(a) + robot.l2 * np.sin(b) * np.cos(c)
-    turned: Floats = np.einsum("ijk,ik->ij", rotations(robot), np.column_stack([x, y, z]))
+    turned: Floats = np.einsum("ijk,...ik->...ij", rotations(robot), np.stack([x, y, z], axis=-1))
     return turned
 
 
 def flange(robot: Robot, q: ArrayLike) -> Floats:
     """Flange z = (psi(q1) + R2 psi(q2) + R3 psi(q3))/3 (3,), m."""
     mean: Floats = tips(robot, q).mean(axis=0)
+    return mean
+
+
+def flanges(robot: Robot, q: ArrayLike) -> Floats:
+    """Flange (n, 3), m, of many poses q (n, 9)."""
+    mean: Floats = _tips(robot, np.asarray(q, dtype=np.float64)).mean(axis=-2)
     return mean
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from crossbody.cases import InvalidValue, SceneError
+from crossbody.cases import InvalidValue, Law, SceneError
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.delta.kinematics import vector
@@ -53,6 +53,11 @@ def system(robot: Robot, *, p: float = 5.0, servo: Servo | None = None, program:
     if program is None:
         return closed
     return replace(closed, control=program.control, memory=program.memory, tick=program.tick)
+
+
+def law_of(closed: System, law: Law) -> System:
+    """The same system with a law of its own for each of the six rows."""
+    return replace(closed, a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral)
 
 
 def kick(robot: Robot, q: ArrayLike, v: ArrayLike, impulse: ArrayLike) -> Floats:

@@ -8,7 +8,10 @@ Rows h = (psi(q1) - R2 psi(q2); psi(q1) - R3 psi(q3)), with R2 = Rz(-sign 120 de
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Floats, Index
@@ -33,6 +36,10 @@ from crossbody.reference.systems._delta_arm import (
 )
 from crossbody.reference.systems._delta_servo import ramp, servo
 from crossbody.reference.systems._delta_solve import accelerate
+
+if TYPE_CHECKING:
+    from crossbody.cases import Law
+    from crossbody.reference import System
 
 PARAMETERS = _arm.NAMES + _servo.NAMES
 SERVO_FROM, SERVO_TO, SIZE = _servo.FROM, _servo.TO, _servo.END
@@ -193,3 +200,22 @@ KERNELS: dict[str, Any] = {
     "power": power,
     "solve": solve,
 }
+
+
+def build(parameters: Mapping[str, Any], law: Law) -> System:
+    """The mechanism of a case, see `crossbody.reference.delta.scene`."""
+    from crossbody.reference.delta import scene  # the library is built on these kernels
+
+    return scene.build(parameters, law)
+
+
+def check_start(parameters: Mapping[str, Any], q0: Floats, v0: Floats) -> None:
+    """Raise SceneError for a start that does not close the loops; it offers one that does."""
+    from crossbody.reference.delta import scene
+
+    scene.check_start(parameters, q0, v0)
+
+
+def listed(p: Floats) -> dict[str, Any]:
+    """What the parity audit lists: masses of the bodies arm by arm (kg) and gravity, from the parameter array."""
+    return {"masses": np.tile([p[4], p[5], p[6] / 3], 3), "gravity": float(p[8])}

@@ -1,0 +1,38 @@
+"""A delta robot released at rest, lightly damped: it falls through the pose where its elbows come together.
+
+Past it small differences grow: the motion is compared only as far as two tolerances agree (spec 2.4, 3.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from crossbody.cases import _delta_pose as pose
+from crossbody.cases import _delta_scene as delta
+from crossbody.cases._case import Case, Value
+from crossbody.cases._delta_limits import FREE
+
+PARAMETERS = {**delta.ROBOT, **delta.position(0.05, 0.02, 0.5), **delta.horizon(5.0)}
+
+VARIANTS: dict[str, dict[str, Value]] = {
+    "light": {},
+    "heavy": dict(delta.HEAVY),
+    "undamped": {"d1": 0.0, "d2": 0.0, "d3": 0.0},
+}
+
+_TITLES = {
+    "light": "a light robot released at rest",
+    "heavy": "a heavy robot released at rest",
+    "undamped": "a robot without friction released at rest",
+}
+
+
+def build(variant: str, parameters: Mapping[str, Value]) -> Case:
+    """The scene: closed, at rest, no torque."""
+    p = delta.numbers(parameters)
+    q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
+    return delta.scene(
+        "delta_free", variant, _TITLES[variant], PARAMETERS, parameters, q0, np.zeros(9), limits=FREE
+    )  # fmt: skip

@@ -1,0 +1,76 @@
+"""The flange of a delta robot follows a circle under sampled control with delay and encoder quantisation.
+
+Every `period` the controller reads the motor angles, rounded to the encoder's counts, and sets the torques that take
+effect `delay` samples later (spec 3.6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from crossbody.cases import _delta_pose as pose
+from crossbody.cases import _delta_scene as delta
+from crossbody.cases._case import Case, Claim, Parameter, Tier, Value
+from crossbody.cases._delta_limits import TRACKING
+
+PARAMETERS = {
+    **delta.ROBOT,
+    **delta.position(0.0, 0.0, 0.6),
+    "radius": Parameter(default=0.05, unit="m", doc="radius of the circle", low=0.0, open_low=True),
+    "frequency": Parameter(default=1.0, unit="Hz", doc="turns a second", low=0.0, open_low=True),
+    "fade": Parameter(default=0.5, unit="s", doc="time in which the radius grows", low=0.0, open_low=True),
+    "controller": Parameter(
+        default="linearising", doc="on the flange, or PD on the motors", choices=("linearising", "pd")
+    ),
+    "mass_matrix": Parameter(
+        default="exact", doc="mass felt by the motors; approximate leaves out the reflected constraint force",
+        choices=("exact", "approximate"),
+    ),
+    "kp": Parameter(default=147.0, doc="1/s^2, or N m/rad for pd"),
+    "kd": Parameter(default=21.0, doc="1/s, or N m s/rad for pd"),
+    "ki": Parameter(default=343.0, doc="1/s^3; not used by pd"),
+    "clamp": Parameter(default=1.0, unit="m s", doc="bound on the integral of the error", low=0.0, open_low=True),
+    "period": Parameter(default=0.88e-3, unit="s", doc="sample time", low=0.0, open_low=True),
+    "delay": Parameter(default=1, doc="whole samples between a reading and its torque", low=0, high=1000),
+    "bits": Parameter(default=18, doc="counts a motor turn are 2^bits", low=1, high=52),
+    "limit": Parameter(default=0.0, unit="N m", doc="bound on each torque; 0 for none", low=0.0),
+    **delta.horizon(1.5),
+}  # fmt: skip
+
+VARIANTS: dict[str, dict[str, Value]] = {
+    "circle": {},
+    "fine": {"bits": 52},
+    "heavy": dict(delta.HEAVY),
+    "pd": {"controller": "pd", "kp": 1.0, "kd": 0.25, "ki": 0.0, "limit": 2.4},
+}
+
+_TITLES = {
+    "circle": "a light robot follows a circle with the encoder of the rig",
+    "fine": "the same with an encoder whose counts do not matter",
+    "heavy": "a heavy robot follows the circle",
+    "pd": "early PD control of the motors with gravity compensation and bounded torques",
+}
+
+
+def _claims(variant: str, parameters: Mapping[str, Value]) -> tuple[Claim, ...]:
+    """What sampling and delay leave of the error on the default circle; void once a parameter is changed."""
+    preset = {k: VARIANTS[variant].get(k, parameter.default) for k, parameter in PARAMETERS.items()}
+    if variant == "pd" or dict(parameters) != preset:
+        return ()
+    return (
+        Claim(
+            metric="tracking_error", expected=1e-4, tier=Tier.B, source="about 0.1 mm on a circle of 50 mm at 1 Hz"
+        ),
+    )  # fmt: skip
+
+
+def build(variant: str, parameters: Mapping[str, Value]) -> Case:
+    """The scene: at rest in the middle of the circle."""
+    p = delta.numbers(parameters)
+    q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
+    return delta.scene(
+        "delta_tracking", variant, _TITLES[variant], PARAMETERS, parameters, q0, np.zeros(9),
+        claims=_claims(variant, parameters), limits=TRACKING,
+    )  # fmt: skip
