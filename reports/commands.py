@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+WIDTH = 120  # of the table in a file or a pipe
 SHOWN = {"position": "position", "event_times": "times [s]", "energy_drift": "energy"}
 COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
 
@@ -106,7 +107,7 @@ def show(rows: pd.DataFrame, out: Path) -> None:
     """One line a run with its worst errors and verdicts, every row that is outside, and where the report is."""
     from rich.console import Console
 
-    console = Console()
+    console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
     console.print(_summary(rows))
     counts = rows["verdict"].value_counts()
     console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
