@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Index
-from crossbody.reference.core import dense, dop853, esdirk, events, exact, machine, record
+from crossbody.reference.core import bogacki, dense, dop853, esdirk, events, exact, machine, record
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.dop853_table import STABILITY_LIMIT, STAGES
 from crossbody.reference.core.layout import (
@@ -24,6 +24,7 @@ from crossbody.reference.core.layout import (
     NODES,
     NOT_FINITE,
     ROWS_FULL,
+    SHORT,
     STEP_TOO_SMALL,
     Buffers,
     Model,
@@ -40,6 +41,8 @@ TRIAL_STEPS = 12  # implicit steps before the two are compared
 HOLD_STEPS = 400  # explicit steps after a trial that was lost
 FAR = 1e30
 MAX_REJECTIONS = 60
+SHORT_PART = 0.2  # ticks closer than this part of a high-order step are taken by the low-order method
+HOLD_SHORT = 16  # ticks by the high-order method after one that was not good enough
 
 
 class Kernels(NamedTuple):
@@ -108,6 +111,20 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @inlined
+def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Go on after a change of the inputs, with the step that was good before."""
+    if s.switching:
+        h = s.h
+        code = _restart(K, s, m, w, b)
+        s.h = h
+        return code
+    if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
+        return ILL_POSED
+    scatter(s, w, w.lam0)
+    return 0
+
+
+@inlined
 def _row_rate(s: Any, w: Work) -> float:
     """Fastest pole of the active rows, 1/s."""
     fastest = 0.0
@@ -151,9 +168,28 @@ def _grow(s: Any, error: float) -> float:
 
 
 @inlined
+def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
+    """Go to the next tick by the low-order method, if the tick is short against the motion and the error allows."""
+    h = s.stop - s.t
+    if s.hold_short > 0:
+        s.hold_short -= 1
+        return False
+    if h > SHORT_PART * min(s.h, s.h_max) or h < 4.0 * machine.ULP * abs(s.t):
+        return False
+    if not bogacki.step(K, s, m, w, h) <= 1.0:
+        s.hold_short = HOLD_SHORT
+        return False
+    s.method, s.end, s.hs = SHORT, bogacki.LAST, h
+    return True
+
+
+@inlined
 def _attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Take one step of the present method within the tolerance; y1 and the end's derivative are there afterwards."""
     s.have_dense = 0
+    if s.has_control and s.method == EXPLICIT and _short_step(K, s, m, w):
+        return _finish(K, s, m, w)
+    s.end = esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES
     clipped = False
     rejected = False
     ill = 0
@@ -184,20 +220,14 @@ def _attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @inlined
-def _end_stage(s: Any) -> int:
-    """The stage whose derivative is that of the step's end."""
-    return esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES
-
-
-@inlined
 def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
     """Evaluate the end of the step: derivative, multipliers, gaps."""
     n = s.n
     last = NODES - 1
-    end = _end_stage(s)
+    end = s.end
     t = s.t + s.hs
     # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
-    if dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
+    if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     scatter(s, w, w.lams[last])
     K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
@@ -217,7 +247,7 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
 @inlined
 def _take_arc(K: Any, s: Any, m: Model, w: Work, length: float) -> int:
     """One step in closed form."""
-    s.method = EXACT
+    s.method, s.end = EXACT, STAGES
     s.have_dense = 1
     s.hs = min(length, s.stop - s.t, s.h_max)
     exact.begin(K, s, m, w)
@@ -240,7 +270,7 @@ def _land(K: Any, s: Any, m: Model, w: Work) -> None:
 def _take_over(s: Any, w: Work) -> None:
     """The end of the whole step becomes the start of the next."""
     last = NODES - 1
-    end = _end_stage(s)
+    end = s.end
     w.k[0] = w.k[end]
     w.kz[0] = w.kz[end]
     w.lam0[:] = w.lams[last]
@@ -289,7 +319,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         before = s.method
         code = _take_arc(K, s, m, w, length)
     else:
-        if s.method == EXACT:
+        if s.method == EXACT or s.method == SHORT:
             s.method = EXPLICIT
         before = s.method
         code = _attempt(K, s, m, w, b)
@@ -312,13 +342,11 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _move(s, w, t)
     _remember_step(s, before)
     record.here(K, s, m, w, b.mode, b.out, b.modes)
-    if s.method != EXACT:
+    if s.method == EXPLICIT or s.method == IMPLICIT:
         _choose_method(s, w)
     if at_stop and s.stop < s.t_end:
-        h = s.h
         _take_inputs(K, s, m, w, b)
-        code = _restart(K, s, m, w, b)
-        s.h = h
+        code = _resume(K, s, m, w, b)
         record.here(K, s, m, w, b.mode, b.out, b.modes)
     return code
 
@@ -336,6 +364,8 @@ def _remember_step(s: Any, method: int) -> None:
 @inlined
 def _begin_run(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.started = 1
+    for i in range(s.nc):
+        s.switching |= m.unilateral[i]
     s.history_t = np.inf
     _take_inputs(K, s, m, w, b)
     code = _restart(K, s, m, w, b)

@@ -6,10 +6,8 @@ from typing import Any
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array
-from crossbody.reference.core import dop853, esdirk, exact
+from crossbody.reference.core import dop853, exact
 from crossbody.reference.core.layout import EXACT, EXPLICIT, Model, Work
-
-_END = esdirk.STAGES - 1  # the stage whose derivative is that of the step's end
 
 
 @compiled
@@ -22,7 +20,7 @@ def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
 
 
 @inlined
-def _quintic(n: int, w: Work, theta: float, h: float, out: Array) -> None:
+def _quintic(n: int, end_stage: int, w: Work, theta: float, h: float, out: Array) -> None:
     """Hermite interpolant of q, v and v' at both ends; its derivative is v."""
     x, x2 = theta, theta * theta
     x3 = x2 * x
@@ -34,7 +32,7 @@ def _quintic(n: int, w: Work, theta: float, h: float, out: Array) -> None:
     a0_d, a1_d = x * (1.0 - 4.5 * x + 6.0 * x2 - 2.5 * x3), x2 * (1.5 - 4.0 * x + 2.5 * x2)
     for i in range(n):
         dq, v, ve = w.y1[i] - w.y[i], h * w.y[n + i], h * w.y1[n + i]
-        a, ae = h * h * w.k[0, n + i], h * h * w.k[_END, n + i]
+        a, ae = h * h * w.k[0, n + i], h * h * w.k[end_stage, n + i]
         out[i] = w.y[i] + dq * end + v * v0 + ve * v1 + a * a0 + ae * a1
         out[n + i] = (dq * end_d + v * v0_d + ve * v1_d + a * a0_d + ae * a1_d) / h
 
@@ -50,7 +48,7 @@ def state(s: Any, w: Work, theta: float, out: Array) -> None:
     elif s.method == EXPLICIT:
         dop853.evaluate(w.y, w.F, theta, out)
     else:
-        _quintic(s.n, w, theta, s.hs, out)
+        _quintic(s.n, s.end, w, theta, s.hs, out)
 
 
 @inlined
@@ -61,5 +59,5 @@ def ledger(s: Any, w: Work, theta: float, out: Array) -> None:
         return
     x, h = theta, s.hs
     for i in range(s.nz):
-        dz, p0, p1 = w.z1[i] - w.z[i], h * w.kz[0, i], h * w.kz[_END, i]
+        dz, p0, p1 = w.z1[i] - w.z[i], h * w.kz[0, i], h * w.kz[s.end, i]
         out[i] = w.z[i] + x * (p0 + x * (3.0 * dz - 2.0 * p0 - p1 + x * (p0 + p1 - 2.0 * dz)))

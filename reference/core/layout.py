@@ -16,7 +16,7 @@ STEP_TOO_SMALL, NOT_FINITE, ILL_POSED, MODE_CYCLE, DIVERGED = -1, -2, -3, -4, -5
 
 # Machines, methods.
 LEVEL, EDGE, MEMORYLESS = 0, 1, 2
-EXPLICIT, IMPLICIT, EXACT = 0, 1, 2
+EXPLICIT, IMPLICIT, EXACT, SHORT = 0, 1, 2, 3
 
 # Modes, as in crossbody.cases.Mode.
 FREE, CONTACT, BALLISTIC, COLLISION, COLLISION_SEPARATION, BILATERAL = 0, 1, 2, 3, 4, 5
@@ -57,6 +57,9 @@ STATE = np.dtype(
         ("h_active", "f8"),
         ("stop", "f8"),
         ("method", "i8"),
+        ("end", "i8"),  # the stage whose derivative is that of the step's end
+        ("switching", "i8"),
+        ("hold_short", "i8"),
         ("na", "i8"),
         ("fresh", "i8"),
         ("have_dense", "i8"),
