@@ -19,7 +19,7 @@ from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
 from crossbody.reference.core._struct import table
 
-SLICE = 2000  # steps between two looks at the clock: well below 0.1 s
+SLICE, SLICE_S = 200, 0.05  # first steps between two looks at the clock, and the time aimed at, s
 ROWS, EVENTS, HISTORY = 256, 256, 64
 _OUTCOMES = {
     layout.STEP_TOO_SMALL: Outcome.STEP_TOO_SMALL,
@@ -100,20 +100,23 @@ class CompiledRun:
         return outcome, time.perf_counter() - began
 
     def _slices(self, began: float, progress: Callable[[float], None] | None) -> Outcome:
-        limit = self.options.max_steps
+        limit, budget = self.options.max_steps, SLICE
         try:
             while True:
-                steps = int(self.state["steps"][0])
+                steps, before = int(self.state["steps"][0]), time.perf_counter()
                 if steps >= limit:
                     return Outcome.STEP_LIMIT
-                code = self.slice(min(SLICE, limit - steps))
+                code = self.slice(min(budget, limit - steps))
                 if code == layout.DONE:
                     return Outcome.FINISHED
                 if code < 0:
                     return _OUTCOMES[code]
                 self._grow(code)
-                if time.perf_counter() - began > self.options.time_limit:
+                now = time.perf_counter()
+                if now - began > self.options.time_limit:
                     return Outcome.TIME_LIMIT
+                if code == layout.MORE:
+                    budget = max(1, int(budget * min(4.0, SLICE_S / (now - before))))
                 if progress is not None:
                     progress(float(self.state["t"][0]) / self.options.t_end)
         except KeyboardInterrupt:
