@@ -65,7 +65,9 @@ class Parameter:
         if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
             bracket = "(" if self.open_low or math.isinf(self.low) else "["
             close = ")" if math.isinf(self.high) else "]"
-            raise InvalidValue(f"{where} is {number:g}; valid: {bracket}{self.low:g}, {self.high:g}{close} {self.unit}.")
+            raise InvalidValue(
+                f"{where} is {number:g}; valid: {bracket}{self.low:g}, {self.high:g}{close} {self.unit}."
+            )
         if isinstance(self.default, int) and not isinstance(self.default, bool):
             if number != int(number):
                 raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")
