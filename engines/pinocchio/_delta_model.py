@@ -32,6 +32,7 @@ class Closed:
         model, data: Pinocchio's.
         ends: the frames at the tips.
         constraints, states: the two point constraints and their data.
+        settings: of the proximal solver.
     """
 
     model: Any
@@ -39,6 +40,7 @@ class Closed:
     ends: tuple[int, int, int]
     constraints: Any
     states: Any
+    settings: Any
 
     def accelerate(self, r: Floats, rd: Floats, tau: Floats) -> tuple[Floats, Floats]:
         """Accelerations of the tree (9,) and lam (6,), N, by Pinocchio's constrained forward dynamics.
@@ -48,10 +50,27 @@ class Closed:
             rd: rates (9,).
             tau: generalised forces (9,).
         """
-        settings = pin.ProximalSettings(*_SETTINGS)
-        pin.initConstraintDynamics(self.model, self.data, self.constraints, self.states)
-        pin.constraintDynamics(self.model, self.data, r, rd, tau, self.constraints, self.states, settings)
+        pin.constraintDynamics(self.model, self.data, r, rd, tau, self.constraints, self.states, self.settings)
         return self.data.ddq.copy(), self.data.lambda_c.copy()
+
+    def masses(self) -> Floats:
+        """Proximal link, distal link and tip of each arm (9,), kg: a joint has one inertia for all that it carries.
+
+        Its centre tells a uniform rod from the point at its end: m c = m_rod l2/2 + m_tip l2.
+        """
+        found = []
+        for i, end in enumerate(self.ends, start=1):
+            frame = self.model.frames[end]
+            far = self.model.inertias[frame.parentJoint]
+            tip = far.mass * (2 * far.lever[1] / frame.placement.translation[1] - 1)
+            found += [self.model.inertias[self.model.getJointId(f"q{i}")].mass, far.mass - tip, tip]
+        return np.array(found)
+
+    def constants(self) -> dict[str, Floats]:
+        """A0, a1 and a2 of the six rows."""
+        gains = [c.m_baumgarte_parameters for c in self.constraints]
+        a0, a1 = ([np.ravel(getattr(g, name))[0] for g in gains] for name in ("Kp", "Kd"))
+        return {"a0": np.repeat(a0, 3), "a1": np.repeat(a1, 3), "a2": np.zeros(6)}
 
     def terms(self, r: Floats, rd: Floats) -> tuple[Floats, Floats, Floats]:
         """Mass matrix (9, 9), bias (9,) and constraint Jacobian (6, 9) of the tree."""
@@ -121,4 +140,8 @@ def _closed(model: Any, robot: Robot, law: Law, tips: list[tuple[int, Floats]]) 
         loop.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(float(law.a0[row]), float(law.a1[row])))
         constraints.append(loop)
         states.append(loop.createData())
-    return Closed(model=model, data=model.createData(), ends=tuple(ends), constraints=constraints, states=states)
+    data, settings = model.createData(), pin.ProximalSettings(*_SETTINGS)
+    pin.initConstraintDynamics(model, data, constraints, states)  # once: the active set never changes
+    return Closed(
+        model=model, data=data, ends=tuple(ends), constraints=constraints, states=states, settings=settings
+    )  # fmt: skip

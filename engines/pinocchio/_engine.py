@@ -23,6 +23,7 @@ from crossbody.engines.pinocchio._flow import Flow
 from crossbody.engines.pinocchio._impulse import ImpulseMachine, restitution
 from crossbody.engines.pinocchio._rows import ALGEBRA
 from crossbody.engines.pinocchio._scene import Scene
+from crossbody.engines.pinocchio._smooth import Smooth, SmoothFlow
 
 PACKAGE = "crossbody.engines.pinocchio"
 STEPS = Parameter(default=200_000, doc="bound on the number of steps", low=1, high=1e9)
@@ -37,6 +38,34 @@ class Solver(Protocol):
     steps: int
     outcome: Outcome
     message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SmoothRun:
+    """One prepared run of rows that are always on; see `crossbody.engines.Run`."""
+
+    case: Case
+    scene: Smooth
+    profile: str
+    settings: Mapping[str, Any]
+    engine: str = "pinocchio"
+
+    def run(self) -> Trajectory:
+        """Integrate from the start."""
+        used, log = self.settings, Log()
+        start = perf_counter()
+        flow = SmoothFlow(self.scene, log, float(used["rtol"]), str(used["method"]), int(used["max_steps"]))
+        flow.run(self.case.t_end)
+        wall = perf_counter() - start
+        counts = {"rhs": flow.rhs}
+        return log.trajectory(
+            self.scene.observe, flow.outcome, flow.message, flow.steps, wall, counts, self.scene.chart
+        )  # fmt: skip
+
+    def audit(self) -> Mapping[str, Any]:
+        """The physics read back from the model."""
+        found: Mapping[str, Any] = self.scene.audit
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,19 +110,22 @@ class Pinocchio:
         known = _registry.plugin_names(PACKAGE, _path())
         if case.mechanism not in known:
             return f"Pinocchio has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
+        if profile == "admm" and not hasattr(_mechanism(case), "build"):
+            return "The profile admm steps contacts in time: the loops of this mechanism never open."
         if profile == "impulse" and not case.law.unilateral.all():
             return "An impact needs a contact that opens: a row that is always on has none."
         if profile == "law" and case.fsm != "level":
             return f"The profile law switches by the machine 'level' and not by {case.fsm!r}."
         return None
 
-    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> PinocchioRun:
+    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> PinocchioRun | SmoothRun:
         """Build the model of a case.
 
         Args:
             case: the scene.
             profile: one of `profiles`; "matched" is law.
-            settings: law: rtol, method, algebra, max_steps; impulse: rtol, restitution, max_steps;
+            settings: law: rtol, method, max_steps, and algebra, or model where no row ever opens;
+                impulse: rtol, restitution, max_steps;
                 admm: dt in s, tol in m/s and N s, restitution, max_steps.
 
         Raises:
@@ -106,7 +138,10 @@ class Pinocchio:
         if reason is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
-        mechanism: ModuleType = _registry.load_plugin("mechanism of Pinocchio", PACKAGE, _path(), case.mechanism)
+        mechanism = _mechanism(case)
+        if hasattr(mechanism, "smooth"):
+            smooth: Smooth = mechanism.smooth(case, str(used["model"]))
+            return SmoothRun(case=case, scene=smooth, profile=profile, settings=used)
         scene: Scene = mechanism.build(case, str(used.get("algebra", "forwardDynamics")))
         constants: dict[str, Any] = {"a0": case.law.a0, "a1": case.law.a1, "a2": case.law.a2}
         if profile != "law":
@@ -123,8 +158,16 @@ def _path() -> list[str]:
     return list(package.__path__)
 
 
+def _mechanism(case: Case) -> ModuleType:
+    return _registry.load_plugin("mechanism of Pinocchio", PACKAGE, _path(), case.mechanism)
+
+
 def _known(case: Case, profile: str) -> dict[str, Parameter]:
     """The settings of a profile."""
+    models = getattr(_mechanism(case), "MODELS", None)
+    if models is not None:
+        model = Parameter(default=next(iter(models)), doc="source of the model", choices=tuple(models))
+        return {"rtol": RTOL, "method": METHOD, "model": model, "max_steps": STEPS}
     if profile == "law":
         return {"rtol": RTOL, "method": METHOD, "algebra": SOLVER, "max_steps": STEPS}
     e = Parameter(default=restitution(case.law, 0), doc="restitution", low=0.0, high=1.0)

@@ -1,0 +1,78 @@
+"""The delta robot in Pinocchio: constrained forward dynamics of a tree with two loops (spec 3.8, 4.3)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Case
+from crossbody.cases._arrays import Floats
+from crossbody.engines import _delta_chart as chart
+from crossbody.engines._delta_forces import forces
+from crossbody.engines._delta_scene import Delta, delta, in_absolute
+from crossbody.engines.pinocchio._delta_model import Closed, by_hand, imported
+from crossbody.engines.pinocchio._smooth import Smooth
+
+MODELS = {"by_hand": by_hand, "imported": imported}
+
+
+def smooth(case: Case, model: str) -> Smooth:
+    """The scene.
+
+    Args:
+        case: of the delta robot.
+        model: one of `MODELS`: joint by joint, or from the MJCF that MuJoCo reads.
+
+    Raises:
+        SceneError: for a start that does not close the loops.
+    """
+    own = delta(case)
+    closed, tau, drive = MODELS[model](own.robot, case.law), np.zeros(9), own.drive
+    u, numbers = drive.u, own.table
+
+    def accelerate(t: float, r: Floats, rd: Floats) -> tuple[Floats, Floats]:
+        forces(t, r, rd, u, numbers, tau)
+        return closed.accelerate(r, rd, tau)
+
+    def change(t: float, r: Floats, rd: Floats) -> None:
+        drive.change(t, *chart.from_tree(r, rd))
+
+    return Smooth(
+        q0=own.r0,
+        v0=own.rd0,
+        accelerate=accelerate,
+        nc=6,
+        instants=drive.times,
+        change=change,
+        reset=drive.reset,
+        chart=own.absolute,
+        observe=own.observe,
+        audit=_audit(case, own, closed),
+    )
+
+
+def _audit(case: Case, own: Delta, closed: Closed) -> dict[str, Any]:
+    """Read back from the model; lam and bias without inputs, with friction and servos as they are at t = 0."""
+    rest, tau = np.zeros(6), np.zeros(9)
+
+    def terms(r: Floats, rd: Floats) -> tuple[Floats, Floats, Floats]:
+        M, bias, H = closed.terms(r, rd)
+        forces(0.0, r, rd, rest, own.table, tau)
+        return M, bias - tau, H
+
+    def lam(q: Floats, v: Floats) -> Floats:
+        r, rd = chart.to_tree(q, v)
+        forces(0.0, r, rd, rest, own.table, tau)
+        return closed.accelerate(r, rd, tau)[1]
+
+    start = chart.from_tree(own.r0, own.rd0)
+    return {
+        "masses": closed.masses(),
+        "gravity": float(np.linalg.norm(closed.model.gravity.linear)),
+        "constants": closed.constants(),
+        "q0": start[0],
+        "v0": start[1],
+        "lam": lam,
+        **in_absolute(terms),
+    }
