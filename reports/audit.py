@@ -73,8 +73,11 @@ def difference(mine: Any, theirs: Any) -> float:
 
 
 def states(case: Case) -> list[tuple[Floats, Floats]]:
-    """Random states in which every contact is entered, the same for all engines."""
+    """Random states in which every contact is entered, the same for all engines; near the start if none can open."""
     draw = np.random.default_rng(SEED)
+    n = len(case.q0)
+    if len(case.law.a0) and not case.law.unilateral.any():
+        return [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, n)) for _ in range(STATES)]
     reach = 1e-2 * np.maximum(np.abs(case.q0), 1e-3)
     return [
         (-reach * draw.uniform(0.01, 1.0, len(case.q0)), -draw.uniform(0.0, 1.0, len(case.v0))) for _ in range(STATES)

@@ -48,7 +48,7 @@ def _line(trace: Trace, y: Floats, i: int, *, legend: bool = True) -> go.Scatter
 
 def _frame(rows: Sequence[str], title: str) -> go.Figure:
     """Stacked plots over one time axis."""
-    figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=min(0.06, 0.3 / len(rows)))
     for i, name in enumerate(rows, start=1):
         figure.update_yaxes(title_text=name, row=i, col=1)
     figure.update_xaxes(title_text="time [s]", row=len(rows), col=1)

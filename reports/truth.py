@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,6 +17,8 @@ TIGHT = 1e-13
 """Tolerance of the reference where it stands for the truth."""
 SECOND = 1e-12
 """Tolerance of the independent integrator that it is held against."""
+PARTED = 1e-6
+"""Difference of the two, over the largest coordinate, from which on neither is trusted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +31,7 @@ class Truth:
         trajectory: the motion, dense enough to plot, both sides of every event.
         at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
         agreement: metric -> how far the two sources of tier C are apart; empty for the others.
+        trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
     """
 
     tier: Tier
@@ -35,6 +39,7 @@ class Truth:
     trajectory: Trajectory
     at: Callable[[Floats], Trajectory]
     agreement: dict[str, float]
+    trusted: float = math.inf
 
 
 def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
@@ -78,6 +83,19 @@ def truth_of(case: Case) -> Truth:
     )
 
 
+def cache_of_one(function: Callable[[Floats], Trajectory]) -> Callable[[Floats], Trajectory]:
+    """Keep the last answer: every metric asks for the truth at the same instants of a run."""
+    last: list[tuple[bytes, Trajectory]] = []
+
+    def cached(times: Floats) -> Trajectory:
+        key = times.tobytes()
+        if not last or last[0][0] != key:
+            last[:] = [(key, function(times))]
+        return last[0][1]
+
+    return cached
+
+
 def _integrated(case: Case) -> Truth:
     """Tier C: the compiled integrator at 1e-13, held against CVODE; tier D for another machine than level."""
     from crossbody.engines import load
@@ -85,6 +103,7 @@ def _integrated(case: Case) -> Truth:
     reference = load("reference")
     first = reference.prepare(case, "compiled", rtol=TIGHT).run()
 
+    @cache_of_one
     def at(times: Floats) -> Trajectory:
         run = reference.prepare(case, "compiled", rtol=TIGHT, samples=np.array(times)).run()
         return with_both_sides(run, first)
@@ -94,10 +113,23 @@ def _integrated(case: Case) -> Truth:
     tier, other = (Tier.C, "cvode") if case.fsm == "level" else (Tier.D, "compiled")
     second = reference.prepare(case, other, rtol=SECOND).run()
     truth = Truth(tier=tier, source="", trajectory=dense, at=at, agreement={})
+    truth = replace(truth, trusted=_trusted(truth, second))
     found = _agreement(truth, second, case)
     said = ", ".join(f"{name} {value:.1e}" for name, value in found.items())
     source = f"compiled reference at rtol {TIGHT:g}, {other} at {SECOND:g} agrees: {said}"
-    return Truth(tier=tier, source=source, trajectory=dense, at=at, agreement=found)
+    if truth.trusted < case.t_end:
+        source += f"; compared until they part at t = {truth.trusted:.4g} s"
+    return replace(truth, source=source, agreement=found)
+
+
+def _trusted(truth: Truth, second: Trajectory) -> float:
+    """When two runs part by more than `PARTED` of the largest coordinate, s; infinite if they never do."""
+    from crossbody.reports.metrics._align import aligned
+
+    inside, exact = aligned(truth, second)
+    scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0))
+    off = np.max(np.abs(second.q[inside] - exact.q), axis=1, initial=0.0) > PARTED * scale
+    return float(second.t[inside][np.argmax(off)]) if off.any() else math.inf
 
 
 def with_both_sides(run: Trajectory, natural: Trajectory) -> Trajectory:

@@ -47,7 +47,7 @@ def clock(truth: Truth, run: Trajectory) -> Floats:
 
 
 def aligned(truth: Truth, run: Trajectory) -> tuple[NDArray[np.bool_], Trajectory]:
-    """Which samples of the run (n,) have a counterpart, and the truth at them."""
+    """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run)
-    inside = t <= truth.trajectory.t[-1]
+    inside = t <= min(truth.trajectory.t[-1], truth.trusted)
     return inside, truth.at(t[inside])

@@ -1,0 +1,28 @@
+"""Multipliers of rows that are always on against the truth's, point by point, over the largest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.reports.metrics._align import aligned
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max |lam - lam_truth| over max |lam_truth|; None where a row can open, or where lam is not known.
+
+    Where an instant stands twice lam jumps: its two sides are compared each with its own.
+    """
+    if case.law.unilateral.any() or np.isnan(run.lam).any():
+        return None
+    inside, exact = aligned(truth, run)
+    scale = float(np.max(np.abs(exact.lam), initial=0.0))
+    return float(np.max(np.abs(run.lam[inside] - exact.lam), initial=0.0)) / scale if scale else None
