@@ -28,7 +28,8 @@ CHUNK = 500  # internal steps between two looks at the clock
 ROOT, TOO_MUCH_WORK = 2, -1
 ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
 STALLED, LIMIT, DAMPED = 200, 0.3, 0.3  # steps; step times pole; damping ratio: beyond all three the arc is stiff
-UNWATCHED = 1e6  # in units of a multiplier's size: IDA cannot leave variables of index 2 out of its error test
+UNWATCHED = 1e6  # in units of a multiplier's size: at index 2 errors of lam are errors of the motion over the step
+CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 
 
 @dataclass(slots=True)
@@ -206,12 +207,13 @@ class IdaArc(Arc):
             self._watch(t, y, out)
 
         share, size = SHARE * self.options.rtol, np.where(view.size > 0.0, view.size, 1.0)
-        loose = np.where(np.isin(np.arange(nc), self.rigid), UNWATCHED, 1.0)
+        loose = UNWATCHED if self.rigid else 1.0
         own = self._tolerances()
         atol = np.concatenate([own[: 2 * n], share * size * loose, np.full(nb, UNWATCHED), own[2 * n :]])
         solver = IDA(
-            residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), **self.common, **self._guards(watch)
-        )
+            residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), first_step=self._first_step(),
+            **self.common, **self._guards(watch),
+        )  # fmt: skip
         powers = e.powers(start.t, start.q, start.v, view.lam) if self.scene.nz else np.zeros(0)
         zero = np.zeros(nb)
         solver.init_step(
@@ -220,6 +222,14 @@ class IdaArc(Arc):
             np.concatenate([start.v, view.vd, np.zeros(nc), zero, powers]),
         )
         return solver
+
+    def _first_step(self) -> float:
+        """At index 2 IDA's own guess is so short that rounding over the step is all there is to see; 0 to let it guess."""
+        if not self.rigid:
+            return 0.0
+        a0, a1, _ = self.scene.equations.law[self.scene.equations.active].T
+        fastest = max(1.0, float(np.sqrt(a0).max()), float(a1.max()))
+        return float(CAUTIOUS * np.sqrt(SHARE * self.options.rtol) / fastest)
 
     def _residual(self, t: float, y: Floats, yp: Floats, out: Floats) -> None:
         n, e, q, v = self.n, self.scene.equations, self.q, self.v
@@ -237,7 +247,8 @@ class IdaArc(Arc):
             rows[self.rigid] = h[places]
             out[self.mu] = H[places] @ v
         if self.scene.nz:
-            out[self.work] = yp[self.work] - e.powers(t, q, v, lam)
+            smooth = e.accelerate(t, q, v)[1] if self.rigid else lam
+            out[self.work] = yp[self.work] - e.powers(t, q, v, smooth)
         if not np.isfinite(out).all():
             raise Ended(Outcome.NOT_FINITE)
 

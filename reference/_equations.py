@@ -9,7 +9,7 @@ pivoting.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 
 import numpy as np
@@ -22,6 +22,7 @@ from crossbody.reference._system import System
 ACTIVE = frozenset({Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL})
 ROUNDING = 1e-13  # part of a sum's terms that rounding may make of the sum
 ULP = float(np.finfo(np.float64).eps)
+PROJECTIONS = 2  # Newton steps from a drift of the size of the tolerance
 DEPENDENT = 1e-13  # ratio of singular values of the scaled rows below which the multipliers are not unique
 
 
@@ -142,8 +143,12 @@ class Equations:
         """Let the sampled controller set the inputs."""
         self.system.control(t, q, v, self.u, self.memory, self.p)
 
-    def noise(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """What rounding may make of each active multiplier, and the size of its terms (nc,), N.
+    def noise(self, t: float, q: Floats, v: Floats, speed: float = 0.0) -> tuple[Floats, Floats]:
+        """What rounding may make of each active multiplier, and the size that it has or may take (nc,), N.
+
+        Args:
+            t, q, v: the state.
+            speed: rate at which gaps may close, m/s.
 
         Raises:
             Ended: ILL_POSED if the active rows are dependent.
@@ -161,7 +166,7 @@ class Equations:
         terms = np.abs(H @ X[:, -1]) + np.abs(Hdv) + law[:, 1] * np.abs(rate) + spring
         state = 8.0 * ULP * (law[:, 0] * np.abs(q).max() + law[:, 1] * np.abs(v).max())
         noise[self.active] = (ROUNDING * terms + state) / np.diag(G)
-        size[self.active] = (terms + np.sqrt(law[:, 0]) * np.abs(rate)) / np.diag(G)
+        size[self.active] = (terms + np.sqrt(law[:, 0]) * np.maximum(np.abs(rate), speed)) / np.diag(G)
         return noise, size
 
     def _check_rank(self, G: Floats) -> None:
@@ -171,6 +176,31 @@ class Equations:
         values = np.linalg.svd(G / np.outer(scale, scale), compute_uv=False)
         if values[-1] < DEPENDENT * values[0]:
             raise Ended(Outcome.ILL_POSED, self.active)
+
+    def project(self, q: Floats, v: Floats, rows: list[int]) -> None:
+        """Move q and v onto h = 0 and H v = 0 of the given rows, by the least change in the metric of M.
+
+        Raises:
+            Ended: ILL_POSED if these rows are dependent.
+        """
+        active = self.active
+        self.active, self._index[: len(rows)] = rows, rows
+        try:
+            for _ in range(PROJECTIONS):
+                q -= self._least(q, v, lambda H, h: h)
+            v -= self._least(q, v, lambda H, h: H @ v)
+        finally:
+            self.active, self._index[: len(active)] = active, active
+
+    def _least(self, q: Floats, v: Floats, error: Callable[[Floats, Floats], Floats]) -> Floats:
+        """The smallest x with H x = error."""
+        M, _ = self.terms(0.0, q, v)
+        H, h, _ = self.rows(0.0, q, v)
+        X = np.linalg.solve(M, H.T)
+        G = H @ X
+        self._check_rank(G)
+        x: Floats = X @ np.linalg.solve(G, error(H, h))
+        return x
 
     def elastic_part(self, t: float, q: Floats, v: Floats, i: int) -> tuple[float, float]:
         """b1 |h'| + b0 |h| of the active row i, and lam_i / (G_A^-1)_ii (spec 1.2), m/s^2."""

@@ -93,9 +93,9 @@ class LevelMachine:
         gap, rate = (a.copy() for a in e.gaps(t, q, v))
         if not (np.isfinite(gap).all() and np.isfinite(rate).all()):
             raise Ended(Outcome.NOT_FINITE)
-        noise, size = e.noise(t, q, v)
-        vd, lam = e.accelerate(t, q, v)
         self.fastest = max([self.fastest, *(abs(float(rate[i])) for i in self.rows)])
+        noise, size = e.noise(t, q, v, self.fastest)
+        vd, lam = e.accelerate(t, q, v)
         return View(gap, rate, vd, lam, noise, size)
 
     def pressure(self, i: int, t: float, q: Floats, v: Floats) -> tuple[float, float]:

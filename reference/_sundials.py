@@ -24,6 +24,7 @@ from crossbody.reference._system import System
 
 FAR = 1e30
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
+STILL = 200  # steps in a row, each within rounding of the time
 ON_THE_MANIFOLD = 1e-6
 
 
@@ -47,13 +48,13 @@ class SundialsRun:
         self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
         self.natural = options.samples is None
         self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
-        if options.index == 3:
-            self._check_manifold()
+        held = ~np.asarray(system.unilateral, dtype=bool)
+        self.rigid: list[int] = np.flatnonzero(held).tolist() if options.index == 3 else []
+        self._check_manifold()
 
     def _check_manifold(self) -> None:
         h, hd = self.system.gap(self.q0, self.v0)
-        held = ~np.asarray(self.system.unilateral, dtype=bool)
-        off = max(np.abs(h[held]).max(initial=0.0), np.abs(hd[held]).max(initial=0.0))
+        off = max(np.abs(h[self.rigid]).max(initial=0.0), np.abs(hd[self.rigid]).max(initial=0.0))
         if off > ON_THE_MANIFOLD:
             raise SceneError(f"index=3 needs a start with h = h' = 0 in every bilateral row; the largest is {off:.3g}.")
 
@@ -62,7 +63,7 @@ class SundialsRun:
 
     def start(self) -> None:
         """Back to the beginning."""
-        e = self.equations = Equations(self.system, rigid=self.options.index == 3)
+        e = self.equations = Equations(self.system, rigid=bool(self.rigid))
         self.machine = LevelMachine(self.system, e)
         nz = self.system.nc + 2 if self.options.ledger else 0
         energy = np.abs(np.nan_to_num(e.energy(self.q0, self.v0))).sum()
@@ -70,7 +71,8 @@ class SundialsRun:
         self.state = State(0.0, self.q0.copy(), self.v0.copy(), np.zeros(nz))
         self.rows: list[tuple[float, Floats, Floats, Floats, Floats, Floats, list[int], Floats]] = []
         self.next_sample = self.next_input = self.next_tick = 0
-        self.retries, self.ended_rows = 0, list[int]()
+        self.retries = self.still = 0
+        self.ended_rows: list[int] = []
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
@@ -116,8 +118,14 @@ class SundialsRun:
             raise Ended(Outcome.TIME_LIMIT)
 
     def _settle(self) -> View:
-        """Switch what must be switched now, and record the instant behind it."""
+        """Switch what must be switched now, and record the instant behind it.
+
+        IDA cannot start off the manifold of rigid rows: the drift of the arc before is taken away first.
+        """
         s = self.state
+        if self.rigid:
+            s.q, s.v = s.q.copy(), s.v.copy()
+            self.equations.project(s.q, s.v, self.rigid)
         view = self.machine.settle(s.t, s.q, s.v)
         if self.natural:
             self._record(view.lam)
@@ -146,14 +154,20 @@ class SundialsRun:
         if max(np.abs(state.q).max(), np.abs(state.v).max()) > FAR:
             raise Ended(Outcome.DIVERGED)
         self.state = state
-        if state.t > before.t:
-            self.retries = 0
+        self._check_progress(state.t - before.t > 16.0 * ULP * stop)
         lam = arc.multipliers(state)
         if self.natural:
             self._record(lam)
         else:
             self._sample(lam)
         return self.machine.fire(state.t, state.q, state.v, fired) if fired else False
+
+    def _check_progress(self, moved: bool) -> None:
+        self.still = 0 if moved else self.still + 1
+        if moved:
+            self.retries = 0
+        elif self.still > STILL:
+            raise Ended(Outcome.STEP_TOO_SMALL)
 
     def _next_sample(self) -> float:
         return float(self.samples[self.next_sample]) if self.next_sample < len(self.samples) else np.inf
