@@ -224,7 +224,7 @@ class IdaArc(Arc):
         return solver
 
     def _first_step(self) -> float:
-        """At index 2 IDA's own guess is so short that rounding over the step is all there is to see; 0 to let it guess."""
+        """0 to let IDA guess; at index 2 its guess is so short that it sees rounding over the step and nothing else."""
         if not self.rigid:
             return 0.0
         a0, a1, _ = self.scene.equations.law[self.scene.equations.active].T

@@ -147,7 +147,9 @@ class Equations:
         """What rounding may make of each active multiplier, and the size that it has or may take (nc,), N.
 
         Args:
-            t, q, v: the state.
+            t: instant, s.
+            q: positions (n,).
+            v: velocities (n,).
             speed: rate at which gaps may close, m/s.
 
         Raises:
