@@ -155,6 +155,7 @@ class Limit:
         engine, profile: which runs it judges; "*" is any.
         why: the reason for the number.
         known: a known property of the engine that takes it outside; empty if it should be within.
+        known_size: how far that property may take it; beyond, it is outside like any other.
     """
 
     metric: str
@@ -163,6 +164,7 @@ class Limit:
     profile: str = "*"
     why: str = ""
     known: str = ""
+    known_size: float = math.inf
 
     def covers(self, engine: str, profile: str) -> bool:
         """Whether this limit judges that run."""

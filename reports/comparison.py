@@ -101,6 +101,15 @@ class _Judge:
             tier=self.truth.tier.value if claim is None else claim.tier.value,
         )  # fmt: skip
 
+    def part(self, metric: str, value: float, unit: str, against: Truth) -> Verdict:
+        """One part of an error, judged where the case limits that part, against its own truth."""
+        limit = limit_for(self.case.limits, metric, self.entry.engine, self.entry.profile)
+        word, why = judge(value, limit, None)
+        return self.row(
+            metric, value, unit, word, why or against.source,
+            limit=limit.value if limit else math.nan, tier=against.tier.value,
+        )  # fmt: skip
+
     def missing(self, metric: str, unit: str) -> Verdict:
         """A claimed number that the run does not have, for example the fifth exit of a ball that left twice."""
         claim = self.claims[metric]
@@ -179,5 +188,4 @@ def _split(judge_: _Judge) -> Iterable[Verdict]:
         for label, against, run in sides:
             value = metric.measure(against, run, judge_.case)
             if value is not None:
-                why = against.source
-                yield judge_.row(f"{name} ({label})", value, metric.UNIT, Word.INFO, why, tier=against.tier.value)
+                yield judge_.part(f"{name} ({label})", value, metric.UNIT, against)

@@ -75,10 +75,13 @@ def judge(value: float, limit: Limit | None, claim: Claim | None) -> tuple[Word,
     allowed = 0.0 if limit is None else limit.value
     said = "" if claim is None else f"{claim.expected:g} claimed: {claim.source}. "
     why = "" if limit is None else limit.why
-    if abs(value - (0.0 if claim is None else claim.expected)) <= allowed:
+    deviation = abs(value - (0.0 if claim is None else claim.expected))
+    if deviation <= allowed:
         return Word.WITHIN, (said + why).strip()
-    if limit is not None and limit.known:
+    if limit is not None and limit.known and deviation <= limit.known_size:
         return Word.EXPECTED, limit.known
+    if limit is not None and limit.known:
+        why = f"Beyond {limit.known_size:g}, which a known property explains: {limit.known}"
     return Word.OUTSIDE, (said + why).strip()
 
 
