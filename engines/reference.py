@@ -20,6 +20,11 @@ from crossbody.reference._options import COLLISIONS, FSMS, TOLERANCES
 
 SYSTEMS = "crossbody.reference.systems"
 OF_THE_CASE = "case"
+UNSUITED = {
+    ("delta", "ida"): "IDA loses its step on the robot's 24 unknowns at rest; CVODE is the independent check here, and "
+    "simulate(..., solver='ida', index=3) runs it from a moving start."
+}
+"""(mechanism, solver) -> why it is not run."""
 SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
@@ -67,7 +72,9 @@ class Reference:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without equations here, and collision rules that the reference does not know."""
-        _settings.profile_of(self.name, self.profiles, profile)
+        solver = _settings.profile_of(self.name, self.profiles, profile)
+        if (case.mechanism, solver) in UNSUITED:
+            return UNSUITED[case.mechanism, solver]
         if find_spec(f"{SYSTEMS}.{case.mechanism}") is None or not hasattr(_module(case.mechanism), "build"):
             return f"The reference has no equations of the mechanism {case.mechanism!r}."
         if _rule(case) not in COLLISIONS:

@@ -53,13 +53,18 @@ def multipliers(system: Any, case: Case, q: Floats, v: Floats, rows: NDArray[np.
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples; None where lam is not known."""
+    """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples.
+
+    None where lam is not known, and where inputs act that the run does not record.
+    """
+    if case.inputs is not None:
+        return None
     closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
     some = np.flatnonzero(closed.any(axis=1))
     if not len(some) or np.isnan(run.lam).any():
         return None
     system = _equations(case)
-    if system is None:
+    if system is None or system.control is not None:
         return None
     worst, scale = 0.0, 0.0
     for i in some[:: max(1, len(some) // SAMPLES)]:
