@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test slow bench check format clean
+.PHONY: run test slow bench check picture format clean
 
 run: $(READY)
 	$(BIN)/crossbody run --out out
@@ -24,6 +24,9 @@ check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+picture: $(READY)
+	$(BIN)/python docs/picture.py
 
 format: $(READY)
 	$(BIN)/ruff check --fix .

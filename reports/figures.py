@@ -159,7 +159,7 @@ def modes(traces: Sequence[Trace]) -> go.Figure:
         title_text="Modes of the state machine", barmode="overlay", height=170 + 32 * len(traces), bargap=0.25
     )
     figure.update_xaxes(title_text="time [s]")
-    figure.update_yaxes(title_text="engine and contact [-]")
+    figure.update_yaxes(title_text="engine and contact [-]", automargin=True)
     return figure
 
 

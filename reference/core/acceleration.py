@@ -29,10 +29,11 @@ def is_active(mode: int) -> bool:
 
 @inlined
 def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """The fast constants for a row in COLLISION, the slow ones for every other."""
+    """The fast constants for a row in COLLISION that has any (one that follows it may not), else the slow ones."""
     for i in range(s.nc):
+        fast = mode[i] == COLLISION and (m.beta[i, 0] > 0.0 or m.beta[i, 1] > 0.0)
         for j in range(3):
-            w.law[i, j] = m.beta[i, j] if mode[i] == COLLISION else m.alpha[i, j]
+            w.law[i, j] = m.beta[i, j] if fast else m.alpha[i, j]
 
 
 @compiled

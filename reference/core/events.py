@@ -15,6 +15,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, is_active, scatter
+from crossbody.reference.core.algebra import inverse_diagonal
 from crossbody.reference.core.layout import (
     BALLISTIC,
     COLLISION,
@@ -55,10 +56,7 @@ def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
     for j in range(s.na):
         if w.idx[j] == i:
             elastic = w.law[i, 1] * abs(w.hda[j]) + w.law[i, 0] * abs(w.ha[j])
-            total = 0.0
-            for c in range(s.n):
-                total += w.H[j, c] * w.X[j, c]
-            return float(elastic - HANDOVER_PART * w.la[j] * total)
+            return float(elastic - HANDOVER_PART * w.la[j] / inverse_diagonal(w.G, s.na, j, w.scale))
     return np.nan
 
 
