@@ -30,8 +30,10 @@ def check(path: Path) -> None:
         if foreign:
             raise OutputError(f"Output folder {path} holds files that crossbody did not write; name a new folder.")
     parent = next(p for p in path.absolute().parents if p.exists())
-    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise OutputError(f"Output folder {path} cannot be made: {parent} cannot be written.")
+    try:  # permissions alone do not tell: the file system has its own say
+        os.rmdir(tempfile.mkdtemp(prefix=".crossbody-", dir=parent))
+    except OSError:
+        raise OutputError(f"Output folder {path} cannot be made: {parent} cannot be written.") from None
 
 
 @contextmanager
