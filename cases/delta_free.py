@@ -12,14 +12,14 @@ import numpy as np
 from crossbody.cases import _delta_pose as pose
 from crossbody.cases import _delta_scene as delta
 from crossbody.cases._case import Case, Value
-from crossbody.cases._delta_limits import FREE
+from crossbody.cases._delta_limits import CHAOTIC, FREE
 
-PARAMETERS = {**delta.ROBOT, **delta.position(0.05, 0.02, 0.5), **delta.horizon(5.0)}
+PARAMETERS = {**delta.ROBOT, **delta.position(0.05, 0.02, 0.5), **delta.horizon(2.5)}
 
 VARIANTS: dict[str, dict[str, Value]] = {
     "light": {},
     "heavy": dict(delta.HEAVY),
-    "undamped": {"d1": 0.0, "d2": 0.0, "d3": 0.0},
+    "undamped": {"d1": 0.0, "d2": 0.0, "d3": 0.0, "t_end": 5.0},
 }
 
 _TITLES = {
@@ -33,6 +33,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene: closed, at rest, no torque."""
     p = delta.numbers(parameters)
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
+    limits = CHAOTIC if variant == "undamped" else FREE
     return delta.scene(
-        "delta_free", variant, _TITLES[variant], PARAMETERS, parameters, q0, np.zeros(9), limits=FREE
+        "delta_free", variant, _TITLES[variant], PARAMETERS, parameters, q0, np.zeros(9), limits=limits
     )  # fmt: skip

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from crossbody.reports.truth import Truth
 
 UNIT = "m"
-CLAIMED = True
+CLAIMED = False
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
