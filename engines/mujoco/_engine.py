@@ -10,7 +10,7 @@ from typing import Any
 
 import mujoco
 
-from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory, _registry
+from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory, _registry
 from crossbody.engines import _settings
 from crossbody.engines.mujoco._globals import captured, hooked
 from crossbody.engines.mujoco._march import March
@@ -90,6 +90,8 @@ class Mujoco:
         with captured() as said:
             try:
                 scene: Scene = mechanism.build(case, profile, float(used["dt"]))
+            except CrossbodyError:
+                raise  # ours, and it is a ValueError too
             except ValueError as error:
                 raise CaseUnsupported(f"MuJoCo refuses the model of {case.label}: {error}.") from None
         return MujocoRun(case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said))
