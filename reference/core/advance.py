@@ -8,11 +8,9 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Index
-from crossbody.reference.core import bogacki, dense, dop853, esdirk, events, exact, machine, record
+from crossbody.reference.core import choice, dense, dop853, events, exact, machine, record, stepping
 from crossbody.reference.core.acceleration import scatter
-from crossbody.reference.core.dop853_table import STABILITY_LIMIT, STAGES
 from crossbody.reference.core.layout import (
-    DIVERGED,
     DONE,
     EVENTS_FULL,
     EXACT,
@@ -22,10 +20,8 @@ from crossbody.reference.core.layout import (
     MODE_CYCLE,
     MORE,
     NODES,
-    NOT_FINITE,
     ROWS_FULL,
     SHORT,
-    STEP_TOO_SMALL,
     Buffers,
     Model,
     Work,
@@ -33,16 +29,6 @@ from crossbody.reference.core.layout import (
     open_model,
     open_work,
 )
-
-SAFETY = 0.9
-EXPLICIT_COST = 12.0  # right-hand sides of an explicit step
-STALLED_STEPS = 5  # explicit steps at the stability limit before the implicit method is tried
-TRIAL_STEPS = 12  # implicit steps before the two are compared
-HOLD_STEPS = 400  # explicit steps after a trial that was lost
-FAR = 1e30
-MAX_REJECTIONS = 60
-SHORT_PART = 0.2  # ticks closer than this part of a high-order step are taken by the low-order method
-HOLD_SHORT = 16  # ticks by the high-order method after one that was not good enough
 
 
 class Kernels(NamedTuple):
@@ -55,28 +41,6 @@ class Kernels(NamedTuple):
     power: Any
     solve: Any
     control: Any
-
-
-@inlined
-def _first_step(K: Any, s: Any, m: Model, w: Work) -> float:
-    """Hairer's guess for the first step from the sizes of y, y' and y''."""
-    size = 2 * s.n
-    d0, d1, d2 = 0.0, 0.0, 0.0
-    for i in range(size):
-        scale = s.atol + s.rtol * abs(w.y[i])
-        d0 += (w.y[i] / scale) ** 2
-        d1 += (w.k[0, i] / scale) ** 2
-    h0 = 1e-6 if d0 < 1e-10 or d1 < 1e-10 else 0.01 * np.sqrt(d0 / d1)
-    for i in range(size):
-        w.ys[i] = w.y[i] + h0 * w.k[0, i]
-    if dop853.derivative(K, s, m, w, s.t + h0, w.ys, dop853.SECOND) != 0:
-        return float(h0)
-    for i in range(size):
-        scale = s.atol + s.rtol * abs(w.y[i])
-        d2 += ((w.k[1, i] - w.k[0, i]) / scale) ** 2
-    steep = max(np.sqrt(d1 / size), np.sqrt(d2 / size) / h0)
-    h1 = max(1e-6, 1e-3 * h0) if steep <= 1e-15 else (0.01 / steep) ** 0.125
-    return float(min(100.0 * h0, h1))
 
 
 @inlined
@@ -106,7 +70,7 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.method = EXPLICIT
     s.stalled, s.hold, s.full_jacobian = 0, 0, 0
     remembered = s.h_active if s.na > 0 else s.h_free
-    s.h = remembered if remembered > 0.0 else _first_step(K, s, m, w)
+    s.h = remembered if remembered > 0.0 else choice.first_step(K, s, m, w)
     return 0
 
 
@@ -122,140 +86,6 @@ def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         return ILL_POSED
     scatter(s, w, w.lam0)
     return 0
-
-
-@inlined
-def _row_rate(s: Any, w: Work) -> float:
-    """Fastest pole of the active rows, 1/s."""
-    fastest = 0.0
-    for j in range(s.na):
-        i = w.idx[j]
-        half = 0.5 * w.law[i, 1]
-        stiffness = w.law[i, 0] + 3.0 * w.law[i, 2] * w.gaps[0, i] ** 2
-        over = half * half - stiffness
-        fastest = max(fastest, half + np.sqrt(over) if over > 0.0 else np.sqrt(stiffness))
-    return float(fastest)
-
-
-@inlined
-def _choose_method(s: Any, w: Work) -> None:
-    """Go implicit where the rows' stability, not accuracy, bounds the explicit step; the cheaper of the two stays."""
-    if s.method == EXPLICIT:
-        if s.hold > 0:
-            s.hold -= 1
-        s.stalled = s.stalled + 1 if s.hs * _row_rate(s, w) > 0.4 * STABILITY_LIMIT else 0
-        if s.implicit and s.hold == 0 and s.stalled >= STALLED_STEPS:
-            s.method, s.have_jacobian = IMPLICIT, 0
-            s.explicit_rate = s.hs / EXPLICIT_COST
-            s.trial_steps, s.trial_rhs, s.trial_t = 0, s.rhs, s.t
-    elif s.method == IMPLICIT:
-        s.trial_steps += 1
-        if s.trial_steps >= TRIAL_STEPS:
-            if s.t - s.trial_t < s.explicit_rate * (s.rhs - s.trial_rhs):
-                s.method, s.hold, s.stalled = EXPLICIT, HOLD_STEPS, 0
-                s.h = s.explicit_rate * EXPLICIT_COST
-            s.trial_steps, s.trial_rhs, s.trial_t = 0, s.rhs, s.t
-
-
-@inlined
-def _grow(s: Any, error: float) -> float:
-    """Factor for the next step from the error of this one, by the order of the method that took it."""
-    order = 8.0 if s.method == EXPLICIT else 4.0
-    most = 6.0 if s.method == EXPLICIT else 4.0
-    if error == 0.0:
-        return most
-    return float(min(most, max(0.25, SAFETY * error ** (-1.0 / order))))
-
-
-@inlined
-def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
-    """Go to the next tick by the low-order method, if the tick is short against the motion and the error allows."""
-    h = s.stop - s.t
-    if s.hold_short > 0:
-        s.hold_short -= 1
-        return False
-    if h > SHORT_PART * min(s.h, s.h_max) or h < 4.0 * machine.ULP * abs(s.t):
-        return False
-    if not bogacki.step(K, s, m, w, h) <= 1.0:
-        s.hold_short = HOLD_SHORT
-        return False
-    s.method, s.end, s.hs = SHORT, bogacki.LAST, h
-    return True
-
-
-@inlined
-def _attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Take one step of the present method within the tolerance; y1 and the end's derivative are there afterwards."""
-    s.have_dense = 0
-    if s.has_control and s.method == EXPLICIT and _short_step(K, s, m, w):
-        return _finish(K, s, m, w)
-    s.end = esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES
-    clipped = False
-    rejected = False
-    ill = 0
-    for _ in range(MAX_REJECTIONS):
-        h = min(s.h, s.h_max)
-        left = s.stop - s.t
-        clipped = h >= left or left - h < 0.01 * h
-        if clipped:
-            h = left
-        if h < 4.0 * machine.ULP * abs(s.t):
-            break
-        error = dop853.step(K, s, m, w, h) if s.method == EXPLICIT else esdirk.step(K, s, m, w, b.mode, h)
-        if 0.0 <= error <= 1.0:
-            s.hs = h
-            proposal = h * min(_grow(s, error), 1.0 if rejected else 6.0)
-            s.h = max(s.h, proposal) if clipped and not rejected else proposal
-            return _finish(K, s, m, w)
-        s.rejected += 1
-        rejected = True
-        if error > 1.0 and error < 1e300:
-            s.h = h * _grow(s, error)
-        else:
-            ill = 1 if error == -1.0 else 2
-            s.h = 0.25 * h
-    if ill == 1:
-        return ILL_POSED
-    return NOT_FINITE if ill == 2 else STEP_TOO_SMALL
-
-
-@inlined
-def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
-    """Evaluate the end of the step: derivative, multipliers, gaps."""
-    n = s.n
-    last = NODES - 1
-    end = s.end
-    t = s.t + s.hs
-    # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
-    if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
-        return ILL_POSED
-    scatter(s, w, w.lams[last])
-    K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
-    for i in range(s.nc):
-        w.lams[0, i] = w.lam0[i]
-        if not (np.isfinite(w.gaps[last, i]) and np.isfinite(w.rates[last, i]) and np.isfinite(w.lams[last, i])):
-            return NOT_FINITE
-    for i in range(2 * n):
-        if not np.isfinite(w.k[end, i]):
-            return NOT_FINITE
-        if abs(w.y1[i]) > FAR:
-            return DIVERGED
-    s.t_old = s.t
-    return 0
-
-
-@inlined
-def _take_arc(K: Any, s: Any, m: Model, w: Work, length: float) -> int:
-    """One step in closed form."""
-    s.method, s.end = EXACT, STAGES
-    s.have_dense = 1
-    s.hs = min(length, s.stop - s.t, s.h_max)
-    exact.begin(K, s, m, w)
-    exact.evaluate(s, w, s.hs, w.y1)
-    s.exact_steps += 1
-    if s.ledger:
-        w.z1[:] = w.z
-    return _finish(K, s, m, w)
 
 
 @inlined
@@ -317,12 +147,12 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     length = exact.plan(s, w, m.unilateral)
     if length > 0.0:
         before = s.method
-        code = _take_arc(K, s, m, w, length)
+        code = stepping.take_arc(K, s, m, w, length)
     else:
         if s.method == EXACT or s.method == SHORT:
             s.method = EXPLICIT
         before = s.method
-        code = _attempt(K, s, m, w, b)
+        code = stepping.attempt(K, s, m, w, b)
     if code != 0:
         return code
     s.steps += 1
@@ -343,7 +173,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _remember_step(s, before)
     record.here(K, s, m, w, b.mode, b.out, b.modes)
     if s.method == EXPLICIT or s.method == IMPLICIT:
-        _choose_method(s, w)
+        choice.choose_method(s, w)
     if at_stop and s.stop < s.t_end:
         _take_inputs(K, s, m, w, b)
         code = _resume(K, s, m, w, b)

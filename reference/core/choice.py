@@ -1,0 +1,83 @@
+"""Which method takes the next step, and how long the step is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import inlined
+from crossbody.reference.core import dop853
+from crossbody.reference.core.dop853_table import STABILITY_LIMIT
+from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work
+
+SAFETY = 0.9
+EXPLICIT_COST = 12.0  # right-hand sides of an explicit step
+STALLED_STEPS = 5  # explicit steps at the stability limit before the implicit method is tried
+TRIAL_STEPS = 12  # implicit steps before the two are compared
+HOLD_STEPS = 400  # explicit steps after a trial that was lost
+
+
+@inlined
+def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
+    """Hairer's guess for the first step from the sizes of y, y' and y''."""
+    size = 2 * s.n
+    d0, d1, d2 = 0.0, 0.0, 0.0
+    for i in range(size):
+        scale = s.atol + s.rtol * abs(w.y[i])
+        d0 += (w.y[i] / scale) ** 2
+        d1 += (w.k[0, i] / scale) ** 2
+    h0 = 1e-6 if d0 < 1e-10 or d1 < 1e-10 else 0.01 * np.sqrt(d0 / d1)
+    for i in range(size):
+        w.ys[i] = w.y[i] + h0 * w.k[0, i]
+    if dop853.derivative(K, s, m, w, s.t + h0, w.ys, dop853.SECOND) != 0:
+        return float(h0)
+    for i in range(size):
+        scale = s.atol + s.rtol * abs(w.y[i])
+        d2 += ((w.k[1, i] - w.k[0, i]) / scale) ** 2
+    steep = max(np.sqrt(d1 / size), np.sqrt(d2 / size) / h0)
+    h1 = max(1e-6, 1e-3 * h0) if steep <= 1e-15 else (0.01 / steep) ** 0.125
+    return float(min(100.0 * h0, h1))
+
+
+@inlined
+def row_rate(s: Any, w: Work) -> float:
+    """Fastest pole of the active rows, 1/s."""
+    fastest = 0.0
+    for j in range(s.na):
+        i = w.idx[j]
+        half = 0.5 * w.law[i, 1]
+        stiffness = w.law[i, 0] + 3.0 * w.law[i, 2] * w.gaps[0, i] ** 2
+        over = half * half - stiffness
+        fastest = max(fastest, half + np.sqrt(over) if over > 0.0 else np.sqrt(stiffness))
+    return float(fastest)
+
+
+@inlined
+def choose_method(s: Any, w: Work) -> None:
+    """Go implicit where the rows' stability, not accuracy, bounds the explicit step; the cheaper of the two stays."""
+    if s.method == EXPLICIT:
+        if s.hold > 0:
+            s.hold -= 1
+        s.stalled = s.stalled + 1 if s.hs * row_rate(s, w) > 0.4 * STABILITY_LIMIT else 0
+        if s.implicit and s.hold == 0 and s.stalled >= STALLED_STEPS:
+            s.method, s.have_jacobian = IMPLICIT, 0
+            s.explicit_rate = s.hs / EXPLICIT_COST
+            s.trial_steps, s.trial_rhs, s.trial_t = 0, s.rhs, s.t
+    elif s.method == IMPLICIT:
+        s.trial_steps += 1
+        if s.trial_steps >= TRIAL_STEPS:
+            if s.t - s.trial_t < s.explicit_rate * (s.rhs - s.trial_rhs):
+                s.method, s.hold, s.stalled = EXPLICIT, HOLD_STEPS, 0
+                s.h = s.explicit_rate * EXPLICIT_COST
+            s.trial_steps, s.trial_rhs, s.trial_t = 0, s.rhs, s.t
+
+
+@inlined
+def grow(s: Any, error: float) -> float:
+    """Factor for the next step from the error of this one, by the order of the method that took it."""
+    order = 8.0 if s.method == EXPLICIT else 4.0
+    most = 6.0 if s.method == EXPLICIT else 4.0
+    if error == 0.0:
+        return most
+    return float(min(most, max(0.25, SAFETY * error ** (-1.0 / order))))

@@ -1,0 +1,122 @@
+"""One step by the method chosen, within the tolerance, or an arc in closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import inlined
+from crossbody.reference.core import bogacki, choice, dop853, esdirk, exact, machine
+from crossbody.reference.core.acceleration import scatter
+from crossbody.reference.core.dop853_table import STAGES
+from crossbody.reference.core.layout import (
+    DIVERGED,
+    EXACT,
+    EXPLICIT,
+    ILL_POSED,
+    IMPLICIT,
+    NODES,
+    NOT_FINITE,
+    SHORT,
+    STEP_TOO_SMALL,
+    Buffers,
+    Model,
+    Work,
+)
+
+FAR = 1e30  # beyond this a motion has diverged
+MAX_REJECTIONS = 60
+SHORT_PART = 0.2  # ticks closer than this part of a high-order step are taken by the low-order method
+HOLD_SHORT = 16  # ticks by the high-order method after one that was not good enough
+
+
+@inlined
+def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
+    """Go to the next tick by the low-order method, if the tick is short against the motion and the error allows."""
+    h = s.stop - s.t
+    if s.hold_short > 0:
+        s.hold_short -= 1
+        return False
+    if h > SHORT_PART * min(s.h, s.h_max) or h < 4.0 * machine.ULP * abs(s.t):
+        return False
+    if not bogacki.step(K, s, m, w, h) <= 1.0:
+        s.hold_short = HOLD_SHORT
+        return False
+    s.method, s.end, s.hs = SHORT, bogacki.LAST, h
+    return True
+
+
+@inlined
+def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
+    """Evaluate the end of the step: derivative, multipliers, gaps."""
+    n = s.n
+    last = NODES - 1
+    end = s.end
+    t = s.t + s.hs
+    # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
+    if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
+        return ILL_POSED
+    scatter(s, w, w.lams[last])
+    K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
+    for i in range(s.nc):
+        w.lams[0, i] = w.lam0[i]
+        if not (np.isfinite(w.gaps[last, i]) and np.isfinite(w.rates[last, i]) and np.isfinite(w.lams[last, i])):
+            return NOT_FINITE
+    for i in range(2 * n):
+        if not np.isfinite(w.k[end, i]):
+            return NOT_FINITE
+        if abs(w.y1[i]) > FAR:
+            return DIVERGED
+    s.t_old = s.t
+    return 0
+
+
+@inlined
+def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Take one step of the present method within the tolerance; y1 and the end's derivative are there afterwards."""
+    s.have_dense = 0
+    if s.has_control and s.method == EXPLICIT and _short_step(K, s, m, w):
+        return _finish(K, s, m, w)
+    s.end = esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES
+    clipped = False
+    rejected = False
+    ill = 0
+    for _ in range(MAX_REJECTIONS):
+        h = min(s.h, s.h_max)
+        left = s.stop - s.t
+        clipped = h >= left or left - h < 0.01 * h
+        if clipped:
+            h = left
+        if h < 4.0 * machine.ULP * abs(s.t):
+            break
+        error = dop853.step(K, s, m, w, h) if s.method == EXPLICIT else esdirk.step(K, s, m, w, b.mode, h)
+        if 0.0 <= error <= 1.0:
+            s.hs = h
+            proposal = h * min(choice.grow(s, error), 1.0 if rejected else 6.0)
+            s.h = max(s.h, proposal) if clipped and not rejected else proposal
+            return _finish(K, s, m, w)
+        s.rejected += 1
+        rejected = True
+        if error > 1.0 and error < 1e300:
+            s.h = h * choice.grow(s, error)
+        else:
+            ill = 1 if error == -1.0 else 2
+            s.h = 0.25 * h
+    if ill == 1:
+        return ILL_POSED
+    return NOT_FINITE if ill == 2 else STEP_TOO_SMALL
+
+
+@inlined
+def take_arc(K: Any, s: Any, m: Model, w: Work, length: float) -> int:
+    """One step in closed form."""
+    s.method, s.end = EXACT, STAGES
+    s.have_dense = 1
+    s.hs = min(length, s.stop - s.t, s.h_max)
+    exact.begin(K, s, m, w)
+    exact.evaluate(s, w, s.hs, w.y1)
+    s.exact_steps += 1
+    if s.ledger:
+        w.z1[:] = w.z
+    return _finish(K, s, m, w)
