@@ -14,9 +14,7 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
 
 
 @kernels.rows
-def rows(
-    t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, H: Array, h: Array, Hdv: Array
-) -> None:
+def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, H: Array, h: Array, Hdv: Array) -> None:
     """No rows."""
 
 
