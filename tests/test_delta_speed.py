@@ -109,3 +109,54 @@ def test_control_update_costs_at_most_ten_microseconds_of_this_machine():
     print(f"control update {1e6 * compiled:.2f} us compiled, {1e6 * python:.2f} us from Python")
     assert compiled < 20 * fixed()
     assert python < 40 * fixed()
+
+
+def mean_error(case, run):
+    """Largest error of the flange against the reference at 1e-13, m."""
+    from crossbody import engines
+    from crossbody.reference.delta import scene
+
+    _, first = np.unique(run.t, return_index=True)
+    exact = engines.load("reference").prepare(case, rtol=1e-13, samples=run.t[first]).run()
+    robot = scene.robot_of(case.parameters)
+    return np.abs(delta.flanges(robot, run.q[first]) - delta.flanges(robot, exact.q)).max()
+
+
+def cheapest(case, name, profile, knob, settings, error):
+    """The coarsest setting whose error is small enough: prepared, and its error."""
+    from crossbody import engines
+
+    for value in settings:
+        run = engines.load(name).prepare(case, profile, **{knob: value})
+        found = mean_error(case, run.run())
+        if found <= error:
+            return run, found
+    raise AssertionError(f"{name}:{profile} does not come below {error:g} m")
+
+
+PEERS = {
+    "pinocchio": ("law", "rtol", (1e-7, 3e-8, 1e-8, 3e-9, 1e-9, 3e-10, 1e-10), 20.0),
+    "mujoco": ("matched", "dt", (1.6e-2, 1.2e-2, 8e-3, 6e-3, 4e-3, 3e-3, 2e-3, 1e-3), 15.0),
+}
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_impulse_at_a_nanometre_is_faster_than_the_peers(name):
+    """Each at the coarsest setting with 1e-9 m achieved, interleaved, the best of several; the reference unsampled."""
+    from crossbody.cases import load
+
+    pytest.importorskip(name)
+    case = load("delta_impulse")
+    profile, knob, settings, factor = PEERS[name]
+    peer, theirs = cheapest(case, name, profile, knob, settings, 1e-9)
+    own, mine = cheapest(case, "reference", "compiled", "rtol", (1e-6, 1e-7, 3e-8, 1e-8, 1e-9), 1e-9)
+    spans = {"own": [], "peer": []}
+    for _ in range(9):
+        spans["own"].append(own.run().wall_s)
+        spans["peer"].append(peer.run().wall_s)
+    ratio = min(spans["peer"]) / min(spans["own"])
+    print(
+        f"{name} {1e3 * min(spans['peer']):.2f} ms ({knob} {peer.settings[knob]:g}, {theirs:.1e} m), reference "
+        f"{1e3 * min(spans['own']):.3f} ms (rtol {own.settings['rtol']:g}, {mine:.1e} m): {ratio:.1f} times"
+    )
+    assert ratio > factor
