@@ -12,7 +12,7 @@ from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Log
 from crossbody.engines._machines import WATCHED, Fired, Machine, Settled, active, first_modes
-from crossbody.engines._quiet import quiet
+from crossbody.reference._quiet import quiet
 
 PER_SOLVE = 100_000
 """Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""
