@@ -10,6 +10,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Index
 from crossbody.reference.core import choice, dense, dop853, events, exact, machine, record, stepping
 from crossbody.reference.core.acceleration import scatter
+from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.layout import (
     DONE,
     EVENTS_FULL,
@@ -101,19 +102,19 @@ def _take_over(s: Any, w: Work) -> None:
     """The end of the whole step becomes the start of the next."""
     last = NODES - 1
     end = s.end
-    w.k[0] = w.k[end]
-    w.kz[0] = w.kz[end]
-    w.lam0[:] = w.lams[last]
-    w.gaps[0] = w.gaps[last]
-    w.rates[0] = w.rates[last]
+    copy(w.k[end], w.k[0])
+    copy(w.kz[end], w.kz[0])
+    copy(w.lams[last], w.lam0)
+    copy(w.gaps[last], w.gaps[0])
+    copy(w.rates[last], w.rates[0])
 
 
 @inlined
 def _move(s: Any, w: Work, t: float) -> None:
     s.t = t
-    w.y[:] = w.y1
+    copy(w.y1, w.y)
     if s.ledger:
-        w.z[:] = w.z1
+        copy(w.z1, w.z)
 
 
 @inlined

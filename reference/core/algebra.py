@@ -13,6 +13,13 @@ from crossbody.reference._kinds import Array, Floats, Index
 RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
 
 
+@inlined
+def copy(source: Array, target: Array) -> None:
+    """Target := source, without the test for overlap that an assignment of slices makes."""
+    for i in range(len(target)):
+        target[i] = source[i]
+
+
 @compiled
 def factor_mass(M: Floats, L: Floats, n: int, k: int) -> int:
     """Cholesky factor of every block; 1 if one is not positive definite."""

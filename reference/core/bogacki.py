@@ -12,6 +12,7 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Floats
+from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.dop853 import begin_watch, derivative, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
 
@@ -50,7 +51,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
         if derivative(K, s, m, w, s.t + _C[stage] * h, w.ys, stage) != 0:
             return -1.0
         watch_multipliers(s, w)
-    w.y1[:] = w.ys
+    copy(w.ys, w.y1)
     if s.ledger:
         _advance(w.z, w.kz, STAGES - 1, h, w.z1)
     return _error(s, w, h)
