@@ -65,7 +65,7 @@ class CompiledRun:
         state = np.zeros(1, layout.STATE)
         values = {
             "n": system.n, "nc": system.nc, "nu": system.inputs, "k": system.mass_block, "nz": self.nz,
-            "ns": system.memory, "nw": system.scratch, "fsm": FSMS.index(options.fsm),
+            "fsm": FSMS.index(options.fsm),
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "has_control": system.control is not None, "rtol": options.rtol,

@@ -58,10 +58,7 @@ def _row_part(s: Any, w: Work, j: int) -> None:
     i = w.idx[j]
     w.r[: s.na] = 0.0
     w.r[j] = 1.0
-    if s.n == 1 and s.na == 1:
-        w.la[0] = 1.0 / (w.G[0, 0] * w.G[0, 0])
-    else:
-        solve_schur(w.G, s.na, w.r, w.la)
+    solve_schur(w.G, s.na, w.r, w.la)
     spring = w.law[i, 0] + 3.0 * w.law[i, 2] * w.ha[j] ** 2
     for a in range(s.n):
         push = 0.0

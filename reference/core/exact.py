@@ -60,15 +60,6 @@ def _half_contact(a0: float, a1: float) -> float:
 
 
 @inlined
-def _multiply_inverse(s: Any, w: Work, x: Array) -> None:
-    """La = G^-1 x for the active rows."""
-    if s.n == 1 and s.na == 1:
-        w.la[0] = x[0] / (w.G[0, 0] * w.G[0, 0])
-    else:
-        solve_schur(w.G, s.na, x, w.la)
-
-
-@inlined
 def _is_linear(s: Any, w: Work) -> bool:
     """Whether the cubic term of every active row is absent, or below the tolerance from here on."""
     for j in range(s.na):
@@ -135,7 +126,7 @@ def begin(K: Any, s: Any, m: Model, w: Work) -> None:
 @inlined
 def _push(s: Any, w: Work, sign: float, out: Array) -> None:
     """Out += sign M^-1 H^T G^-1 r."""
-    _multiply_inverse(s, w, w.r)
+    solve_schur(w.G, s.na, w.r, w.la)
     for j in range(s.na):
         for a in range(s.n):
             out[a] += sign * w.X[j, a] * w.la[j]

@@ -243,5 +243,4 @@ def settle(
         w.lam0[i] = w.lam[i]
         w.gaps[0, i] = w.gap[i]
         w.rates[0, i] = w.rate[i]
-    s.fresh = 1
     return 0
