@@ -28,11 +28,11 @@ from crossbody.cases._outcome import Outcome
 
 if TYPE_CHECKING:
     from crossbody.cases._case import Case, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
-    from crossbody.cases._trajectory import Event, Ledger, Mode, Trajectory
+    from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
 
 _LAZY = {
     **dict.fromkeys(("Case", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"),
-    **dict.fromkeys(("Event", "Ledger", "Mode", "Trajectory"), "_trajectory"),
+    **dict.fromkeys(("Event", "Ledger", "Mode", "Switch", "Trajectory"), "_trajectory"),
 }
 
 __all__ = [
@@ -53,6 +53,7 @@ __all__ = [
     "OutputError",
     "Parameter",
     "SceneError",
+    "Switch",
     "Tier",
     "Trajectory",
     "UnknownName",

@@ -91,6 +91,7 @@ class Law:
         a0 (nc,): 1/s^2.
         a1 (nc,): 1/s.
         a2 (nc,): 1/(m^2 s^2).
+        b0, b1 (nc,): fast constants of COLLISION in the units of a0, a1; zero where a row has one set (spec 1.1).
         unilateral (nc,): False for a constraint that is always on.
     """
 
@@ -98,15 +99,25 @@ class Law:
     a1: Floats
     a2: Floats
     unilateral: NDArray[np.bool_]
+    b0: Floats = field(default_factory=lambda: np.zeros(0))
+    b1: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Check shapes and signs."""
         nc = len(np.atleast_1d(self.a0))
-        for name in ("a0", "a1", "a2"):
-            array = frozen("Law", name, getattr(self, name), (nc,))
+        for name in ("a0", "a1", "a2", "b0", "b1"):
+            given = getattr(self, name)
+            array = frozen("Law", name, np.zeros(nc) if name[0] == "b" and np.size(given) == 0 else given, (nc,))
             if not np.all(np.isfinite(array)) or np.any(array < 0):
                 raise SceneError(f"Law.{name} is {array.tolist()}; it must be finite and at least 0.")
             object.__setattr__(self, name, array)
+        slower = (self.b0 > 0.0) & (self.b0 <= self.a0)
+        if np.any(slower):
+            i = int(np.flatnonzero(slower)[0])
+            raise SceneError(
+                f"Law.b0[{i}] is {self.b0[i]:g}, not above a0[{i}] = {self.a0[i]:g}: "
+                "the constants of COLLISION must be faster than those of CONTACT, or 0 for one set."
+            )
         object.__setattr__(self, "unilateral", frozen("Law", "unilateral", self.unilateral, (nc,), np.bool_))
 
     @property
@@ -207,6 +218,7 @@ class Case:
         inputs: what acts from outside; None for nothing.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
+        discrete: names of the discrete variables that `Trajectory.switches` counts by index.
     """
 
     name: str
@@ -226,6 +238,7 @@ class Case:
     inputs: Inputs | None = None
     claims: tuple[Claim, ...] = ()
     limits: tuple[Limit, ...] = ()
+    discrete: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:

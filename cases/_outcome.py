@@ -16,6 +16,7 @@ class Outcome(StrEnum):
     NOT_FINITE = "not_finite"
     ILL_POSED = "ill_posed"
     MODE_CYCLE = "mode_cycle"
+    LOST = "lost"
     INTERRUPTED = "interrupted"
 
     @property
@@ -38,5 +39,6 @@ _ADVICE = {
     Outcome.NOT_FINITE: "A kernel returned NaN or infinity: look at the state named beside this outcome.",
     Outcome.ILL_POSED: "The active rows or the mass matrix lost rank: the multipliers are not unique here.",
     Outcome.MODE_CYCLE: "The contacts named beside this outcome switch for ever at one instant: their laws contradict.",
+    Outcome.LOST: "The motion left the region in which its controller holds: start closer, or change the controller.",
     Outcome.INTERRUPTED: "The run was interrupted; what was computed until then is kept.",
 }

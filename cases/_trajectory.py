@@ -35,12 +35,30 @@ class Event:
         contact: index of the constraint row.
         before: mode before.
         after: mode after.
+        impulse: impulse of a frozen collision (spec 1.2) at its end, N s; 0 where lam is finite.
     """
 
     t: float
     contact: int
     before: Mode
     after: Mode
+    impulse: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Switch:
+    """One change of a discrete variable of the mechanism or of its controller (a ring change, a controller's mode).
+
+    Attributes:
+        t: instant, s.
+        variable: index in `Case.discrete`.
+        before, after: its values.
+    """
+
+    t: float
+    variable: int
+    before: int
+    after: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +91,7 @@ class Trajectory:
         energy (n, 2): kinetic and potential energy, J.
         mode (n, nc): `Mode` of every row; -1 where the engine has no such notion.
         events: transitions in order of time.
+        switches: changes of the discrete variables in order of time.
         outcome: how the run ended.
         message: where and why, if it did not finish.
         steps: steps accepted.
@@ -89,6 +108,7 @@ class Trajectory:
     energy: Floats
     mode: Bytes
     events: tuple[Event, ...] = ()
+    switches: tuple[Switch, ...] = ()
     outcome: Outcome = Outcome.FINISHED
     message: str = ""
     steps: int = 0

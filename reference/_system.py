@@ -22,7 +22,7 @@ class System:
 
     Attributes:
         n: number of coordinates.
-        dynamics, gaps, rows, energy, power, solve, control: kernels as in `crossbody.reference.kernels`.
+        dynamics, gaps, rows, energy, power, solve, control, watch, switch: kernels as in `crossbody.reference.kernels`.
         parameters: p of the kernels: an array, or names with values in the kernels' order.
         a0, a1, a2 (nc,): slow constants of every row; a number serves all rows (spec 1.1).
         b0, b1, b2 (nc,): fast constants of COLLISION; b0 = 0 where a row has one set only.
@@ -33,6 +33,11 @@ class System:
         scratch: length of w.
         memory: length of the controller's state s.
         tick: sampling period of `control`, s.
+        guards: length of g of `watch`.
+        discrete: discrete variables at the start; they follow the parameters in p, and each change is an event.
+        latched: numbers that `switch` alone writes; they follow the discrete variables in p.
+        span (nc, 2): first coordinate, and one past the last, that a row's H may touch; all of them if not given.
+            With it the cost of a chain grows with its length, not with its square.
         constant_mass: M does not depend on q: it is factored once.
         affine: M and H are constant, f depends on u alone: arcs in closed form are admitted.
 
@@ -48,6 +53,8 @@ class System:
     power: Any = _none.power
     solve: Any = None
     control: Any = None
+    watch: Any = None
+    switch: Any = None
     parameters: ArrayLike | Mapping[str, float] = ()
     a0: ArrayLike = ()
     a1: ArrayLike = ()
@@ -62,6 +69,10 @@ class System:
     scratch: int = 0
     memory: int = 0
     tick: float = 0.0
+    guards: int = 0
+    discrete: ArrayLike = ()
+    latched: int = 0
+    span: ArrayLike | None = None
     constant_mass: bool = False
     affine: bool = False
     p: Floats = field(init=False)
@@ -78,8 +89,12 @@ class System:
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
-        put(self, "p", frozen("System", "parameters", values, (None,)))
+        put(self, "discrete", frozen("System", "discrete", self.discrete, (None,)))
+        state = np.concatenate([self.discrete, np.zeros(self.latched)])
+        constants = frozen("System", "parameters", values, (None,))
+        put(self, "p", frozen("System", "p", np.concatenate([constants, state]), (None,)))
         put(self, "mass_block", self.mass_block or self.n)
+        put(self, "span", self._spans(nc))
         put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
         put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
         self._check_values()
@@ -100,8 +115,20 @@ class System:
         full = np.full(nc, value) if np.ndim(value) == 0 else value
         return frozen("System", name, full, (nc,), dtype)
 
+    def _spans(self, nc: int) -> Index:
+        """Columns that each row may touch, widened to whole blocks of the mass matrix."""
+        whole = [[0, self.n]] * nc if self.span is None else self.span
+        spans: Index = frozen("System", "span", np.reshape(whole, (-1, 2)), (nc, 2), np.int64)
+        if np.any(spans[:, 0] < 0) or np.any(spans[:, 1] > self.n) or np.any(spans[:, 0] >= spans[:, 1]):
+            raise SceneError(f"System.span is {spans.tolist()}; each row needs 0 <= first < last <= {self.n}.")
+        k = self.mass_block or self.n
+        blocks = np.column_stack([spans[:, 0] // k * k, -(-spans[:, 1] // k) * k])
+        whole_blocks: Index = frozen("System", "span", blocks, (nc, 2), np.int64)
+        return whole_blocks
+
     def _check_sizes(self) -> None:
-        for name, low in (("n", 1), ("mass_block", 0), ("inputs", 0), ("scratch", 0), ("memory", 0)):
+        counts = (("n", 1), *((name, 0) for name in ("mass_block", "inputs", "scratch", "memory", "guards", "latched")))
+        for name, low in counts:
             value = getattr(self, name)
             if not isinstance(value, (int, np.integer)) or value < low:
                 raise SceneError(f"System.{name} is {value!r}; it must be a whole number of at least {low}.")

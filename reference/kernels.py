@@ -15,11 +15,18 @@ n coordinates, nc constraint rows, nu inputs, k the size of the blocks on the ma
                                          lam[j] and rates hd[j]; law (nc, 3) = a0, a1, a2; returns 0, or 1 if ill posed;
                                          w is its own scratch: dynamics is not called before it
     control(t, q, v, u, s, p)            optional, called at sampling instants: fills u (nu,), may keep its state in s
+    watch(t, q, v, p, g)                 optional: g (ng,), each positive until it fires by falling to zero
+    switch(t, q, v, p, mode, fired)      optional: writes the discrete variables at the end of p, and may move the mode
+                                         of a row to another; fired is the index in g, START at t = 0, or TOUCHED after
+                                         rows have switched; returns UNCHANGED, CHANGED or LOST (ends the run)
 
 Each is compiled for float64 and complex128, so that derivatives can be checked by complex step: use np functions
 only, and neither abs, hypot, atan2 nor a branch on a complex value. `control` and `solve` are float64 alone.
 
-Gaps must not depend on time (scleronomic): h' = H v.
+Gaps must not depend on time (scleronomic): h' = H v. Discrete variables stand at the end of p, as numbers: what a
+kernel branches on is constant between events. A row that cannot be touched in the present discrete state reports a
+positive gap and no rate. `watch` should leave a dead band (1e-12 of its range) around what it switches, so that a
+variable that just changed does not change back by rounding.
 """
 
 from __future__ import annotations
@@ -27,10 +34,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from numba import types
 from numba.core import types as core_types
 
 from crossbody.reference._cache import compiled
+
+START, TOUCHED = np.array([-1, -2])
+UNCHANGED, CHANGED, LOST = np.arange(3)
 
 _T = types.float64
 _IDX = types.int64[::1]
@@ -52,6 +63,7 @@ def _signatures(scalar: Any) -> dict[str, Any]:
 
 
 _f, _fm = _vectors(types.float64)
+_MODES = types.int8[::1]
 REAL = {
     **_signatures(types.float64),
     "solve": types.int64(_T, _f, _f, _f, _f, _f, _fm, _IDX, types.int64, _f, _f, _f),
@@ -59,6 +71,8 @@ REAL = {
 }
 COMPLEX = _signatures(types.complex128)
 NAMES = tuple(REAL)
+REAL["watch"] = types.void(_T, _f, _f, _f, _f)
+REAL["switch"] = types.int64(_T, _f, _f, _f, _MODES, types.int64)
 
 
 def function_type(name: str) -> core_types.FunctionType:
@@ -82,6 +96,8 @@ energy = _declare("energy")
 power = _declare("power")
 solve = _declare("solve")
 control = _declare("control")
+watch = _declare("watch")
+switch = _declare("switch")
 
 
 def helper(function: Callable[..., Any]) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference._kinds import Array, Bytes, Floats, Index
 
 
 @kernels.gaps
@@ -44,3 +44,14 @@ def solve(
 @kernels.control
 def control(t: float, q: Floats, v: Floats, u: Floats, s: Floats, p: Floats) -> None:
     """Never called."""
+
+
+@kernels.watch
+def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
+    """Nothing to watch."""
+
+
+@kernels.switch
+def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> int:
+    """Never called."""
+    return 0
