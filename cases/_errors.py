@@ -6,6 +6,9 @@
     +-- SceneError          a mechanism whose parts contradict each other (shapes, start, constants)
     +-- EngineUnavailable   an engine whose third-party package is not installed
     +-- CaseUnsupported     an engine that cannot do a case, in the engine's own words
+    +-- FormatUnavailable   a log format whose third-party package is not installed
+    +-- LogFormatError      a log that cannot be read or trusted, with file, row and column
+    +-- ColumnMapError      a column map that says what no map can say, with the path of the key
     +-- OutputError         a folder that cannot be written, or that holds something of somebody else's
 
 Numerical failure is never an exception: it is an `Outcome`.
@@ -14,6 +17,7 @@ Numerical failure is never an exception: it is an `Outcome`.
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
 
 
@@ -51,6 +55,41 @@ class EngineUnavailable(CrossbodyError):  # noqa: N818
 
 class CaseUnsupported(CrossbodyError):  # noqa: N818
     """An engine that cannot do a case; the message is the engine's own sentence."""
+
+
+class FormatUnavailable(CrossbodyError):  # noqa: N818
+    """A log format whose package is not installed; the message names the extra that brings it."""
+
+
+class LogFormatError(CrossbodyError, ValueError):
+    """A log that cannot be read or trusted.
+
+    Args:
+        path: the file or folder.
+        text: what is wrong and what would be valid.
+        row: sample that it begins with, counted from 0; None if it concerns no single sample.
+        column: column or channel that it concerns; empty if none.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], text: str, row: int | None = None, column: str = "") -> None:
+        self.path, self.row, self.column = os.fspath(path), row, column
+        where = [repr(column)[1:-1]] if column else []
+        where += [f"row {row}"] if row is not None else []
+        super().__init__(": ".join([repr(self.path)[1:-1], *([", ".join(where)] if where else []), text]))
+
+
+class ColumnMapError(CrossbodyError, ValueError):
+    """A column map that cannot be followed.
+
+    Args:
+        path: the map's file.
+        key: path of the offending key, for example `$.coordinates.q11.unit`.
+        text: what is wrong and what would be valid.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], key: str, text: str) -> None:
+        self.path, self.key = os.fspath(path), key
+        super().__init__(f"{repr(self.path)[1:-1]}: {repr(key)[1:-1]}: {text}")
 
 
 class OutputError(CrossbodyError, OSError):
