@@ -1,0 +1,150 @@
+"""Exact derivatives of the accelerations and multipliers, by complex step through the kernels.
+
+With the active rows A, the accelerations and multipliers solve
+
+    r(q, v, u; v', lam) = ( M v' - f - H_A^T lam ;  H_A v' + H_A' v + a1 H_A v + a0 h_A + a2 h_A^3 ) = 0
+
+whose derivative by (v', lam) is the saddle matrix K. By the implicit function theorem one real K serves every column:
+d(v', lam) = -K^-1 (dr/dx), where dr/dx at fixed v', lam is the imaginary part of r(x + i s e_k) over s. There is no
+difference of nearly equal numbers, so s = 1e-30 and the derivative is exact to rounding (Squire and Trapp 1998).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crossbody.cases import SceneError
+from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference._system import System
+
+STEP = 1e-30
+ILL_POSED = 1e10
+"""Above this condition of H M^-1 H^T the multipliers, and so their derivatives, are ill posed (spec 3.5)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Point:
+    """Where a mechanism is linearised.
+
+    Attributes:
+        system: the mechanism.
+        t: time, s.
+        q, v (n,), u (nu,): state and inputs.
+        active (na,): the rows that are on.
+    """
+
+    system: System
+    t: float
+    q: Floats
+    v: Floats
+    u: Floats
+    active: Index
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Derivatives:
+    """First derivatives at a point, by x = (q, v) and by u.
+
+    Attributes:
+        vd (n,), lam (na,): accelerations and multipliers there.
+        vd_x (n, 2 n), vd_u (n, nu): of the accelerations.
+        lam_x (na, 2 n), lam_u (na, nu): of the multipliers.
+        gap_x (nc, 2 n), rate_x (nc, 2 n): of every gap and of its rate.
+    """
+
+    vd: Floats
+    lam: Floats
+    vd_x: Floats
+    vd_u: Floats
+    lam_x: Floats
+    lam_u: Floats
+    gap_x: Floats
+    rate_x: Floats
+
+
+def _terms(at: Point, q: Array, v: Array, u: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """M in blocks (n/k, k, k), f, and of the active rows H, h, H' v; in the type of the state."""
+    system, kind, na = at.system, np.result_type(q, v, u), len(at.active)
+    p, w = system.p.astype(kind), np.zeros(system.scratch, kind)
+    blocks, f = np.zeros((system.n, system.mass_block), kind), np.zeros(system.n, kind)
+    H, h, drift = np.zeros((na, system.n), kind), np.zeros(na, kind), np.zeros(na, kind)
+    q, v, u = q.astype(kind), v.astype(kind), u.astype(kind)
+    system.dynamics(at.t, q, v, u, p, blocks, f, w)
+    system.rows(at.t, q, v, p, w, at.active, na, H, h, drift)
+    return blocks.reshape(-1, system.mass_block, system.mass_block), f, H, h, drift
+
+
+def _dense(blocks: Array) -> Array:
+    """The block-diagonal matrix (n, n)."""
+    count, k, _ = blocks.shape
+    M = np.zeros((count, k, count, k), blocks.dtype)
+    each = np.arange(count)
+    M[each, :, each, :] = blocks
+    return M.reshape(count * k, count * k)
+
+
+def _law(at: Point, H: Array, v: Array, h: Array, drift: Array) -> Array:
+    """H' v + a1 h' + a0 h + a2 h^3 of the active rows."""
+    a0, a1, a2 = at.system.alpha[at.active].T
+    return drift + a1 * (H @ v) + (a0 + a2 * h * h) * h
+
+
+def _residual(at: Point, q: Array, v: Array, u: Array, vd: Floats, lam: Floats) -> Array:
+    blocks, f, H, h, drift = _terms(at, q, v, u)
+    inertia = (blocks @ vd.reshape(len(blocks), -1, 1)).ravel()
+    return np.concatenate([inertia - f - lam @ H, H @ vd + _law(at, H, v, h, drift)])
+
+
+def _gaps(at: Point, q: Array, v: Array) -> Array:
+    """Gaps and rates of all rows (2 nc,)."""
+    kind, nc = np.result_type(q, v), at.system.nc
+    h, hd = np.zeros(nc, kind), np.zeros(nc, kind)
+    at.system.gaps(at.t, q.astype(kind), v.astype(kind), at.system.p.astype(kind), h, hd)
+    return np.concatenate([h, hd])
+
+
+def _saddle(at: Point) -> tuple[Floats, Floats, Floats]:
+    """K, and the v' and lam that solve K (v', lam) = (f, -law).
+
+    Raises:
+        SceneError: if the active rows are redundant here, or nothing has a finite value.
+    """
+    blocks, f, H, h, drift = _terms(at, at.q, at.v, at.u)
+    M, na = _dense(blocks), len(at.active)
+    right = np.concatenate([f, -_law(at, H, at.v, h, drift)])
+    if not (np.all(np.isfinite(M)) and np.all(np.isfinite(H)) and np.all(np.isfinite(right))):
+        raise SceneError(f"linearise: the equations have no finite value at q = {at.q.tolist()}, v = {at.v.tolist()}.")
+    if na and not np.linalg.cond(H @ np.linalg.solve(M, H.T)) <= ILL_POSED:
+        raise SceneError(
+            f"linearise: the active rows {at.active.tolist()} are redundant at q = {at.q.tolist()}; "
+            "leave out those that follow from the others."
+        )
+    K = np.block([[M, -H.T], [H, np.zeros((na, na))]])
+    vd, lam = np.split(np.linalg.solve(K, right), [at.system.n])
+    return K, vd, lam
+
+
+def derivatives(at: Point) -> Derivatives:
+    """All first derivatives at a point.
+
+    Raises:
+        SceneError: if the active rows are redundant there, or nothing has a finite value.
+    """
+    n, nu, nc = at.system.n, at.system.inputs, at.system.nc
+    K, vd, lam = _saddle(at)
+    columns, gaps = np.zeros((n + len(lam), 2 * n + nu)), np.zeros((2 * nc, 2 * n))
+    x = np.concatenate([at.q, at.v, at.u]).astype(complex)
+    for k in range(2 * n + nu):
+        moved = x.copy()
+        moved[k] += 1j * STEP
+        q, v, u = np.split(moved, [n, 2 * n])
+        columns[:, k] = _residual(at, q, v, u, vd, lam).imag / STEP
+        if k < 2 * n:
+            gaps[:, k] = _gaps(at, q, v).imag / STEP
+    solved = -np.linalg.solve(K, columns)
+    return Derivatives(
+        vd=vd, lam=lam, vd_x=solved[:n, : 2 * n], vd_u=solved[:n, 2 * n :], lam_x=solved[n:, : 2 * n],
+        lam_u=solved[n:, 2 * n :], gap_x=gaps[:nc], rate_x=gaps[nc:],
+    )  # fmt: skip

@@ -1,0 +1,96 @@
+"""`linearise`: the linear model of a mechanism in a given set of modes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from crossbody.cases import SceneError, UnknownName
+from crossbody.cases._arrays import frozen
+from crossbody.reference._kinds import Floats, Index
+from crossbody.reference._system import System
+from crossbody.reference.linear._derivatives import Derivatives, Point, derivatives
+from crossbody.reference.linear._model import LinearModel
+
+OUTPUTS = ("q", "v", "gap", "lam")
+
+
+def linearise(
+    system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
+    active: Sequence[int] | None = None, *, outputs: Sequence[str] = OUTPUTS, reduce: bool = False,
+    names: Sequence[str] | None = None, t: float = 0.0,
+) -> LinearModel:  # fmt: skip
+    """First-order model dx' = A dx + B du, dy = C dx + D du of v' = M^-1 (f + H_A^T lam) about a state, lam eliminated.
+
+    The derivatives are exact (complex step through the kernels); time is frozen at t. It describes small motions about
+    an equilibrium; about a moving state it is the tangent of the right-hand side there. A sampled controller
+    (`System.control`) is not part of it.
+
+    Args:
+        system: the mechanism with the law of its rows.
+        q: positions (n,). v: velocities (n,), zero if not given. u: inputs (nu,), zero if not given.
+        active: rows that are on, all others are free; those that are always on (not unilateral), if not given.
+        outputs: which of "q", "v", "gap", "lam" make up y, in this order; gap and lam of every row.
+        reduce: hold the active rows at rest (dh = 0, dh' = 0) instead of following their law: a minimal set of states
+            without the law's own poles (Baumgarte's double pole of a closed loop, say).
+        names: of the coordinates (n,); "q[0]", ... if not given.
+        t: time, s.
+
+    Returns:
+        x = (q, v), or the part of it that remains; inputs "u[0]", ...; a velocity is named as its coordinate, primed.
+
+    Raises:
+        SceneError: for a state of another shape, rows that do not exist, that are redundant here, or, with `reduce`,
+            that move.
+        UnknownName: for another output.
+    """
+    at = _point(system, q, v, u, active, t)
+    found = derivatives(at)
+    n, nu = system.n, system.inputs
+    chosen = tuple(f"q[{i}]" for i in range(n)) if names is None else tuple(names)
+    states = (*chosen, *(f"{name}'" for name in chosen))
+    if len(chosen) != n:
+        raise SceneError(f"linearise.names has {len(chosen)} entries; the system has {n} coordinates.")
+    C, D, read = _outputs(system, at.active, found, outputs, states)
+    model = LinearModel(
+        A=np.block([[np.zeros((n, n)), np.eye(n)], [found.vd_x]]), B=np.vstack([np.zeros((n, nu)), found.vd_u]),
+        C=C, D=D, states=states, inputs=tuple(f"u[{i}]" for i in range(nu)), outputs=read,
+    )  # fmt: skip
+    return model.restricted(np.vstack([found.gap_x[at.active], found.rate_x[at.active]])) if reduce else model
+
+
+def _point(
+    system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None, active: Sequence[int] | None, t: float
+) -> Point:
+    rows = np.flatnonzero(np.asarray(system.unilateral) == 0) if active is None else np.asarray(active, dtype=np.int64)
+    if np.any(rows < 0) or np.any(rows >= system.nc) or len(np.unique(rows)) != len(rows):
+        raise SceneError(f"linearise.active is {rows.tolist()}; valid: different rows below {system.nc}.")
+    inputs: Floats = np.array(frozen("linearise", "u", np.zeros(system.inputs) if u is None else u, (system.inputs,)))
+    return Point(
+        system=system, t=t, q=system.checked_state("q", q),
+        v=system.checked_state("v", np.zeros(system.n) if v is None else v), u=inputs, active=rows.astype(np.int64),
+    )  # fmt: skip
+
+
+def _outputs(
+    system: System, active: Index, found: Derivatives, outputs: Sequence[str], states: tuple[str, ...]
+) -> tuple[Floats, Floats, tuple[str, ...]]:
+    """C, D and the names of their rows."""
+    n, nu, nc = system.n, system.inputs, system.nc
+    whole = np.eye(2 * n)
+    lam_x, lam_u = np.zeros((nc, 2 * n)), np.zeros((nc, nu))
+    lam_x[active], lam_u[active] = found.lam_x, found.lam_u
+    known = {
+        "q": (whole[:n], np.zeros((n, nu)), states[:n]),
+        "v": (whole[n:], np.zeros((n, nu)), states[n:]),
+        "gap": (found.gap_x, np.zeros((nc, nu)), tuple(f"gap[{i}]" for i in range(nc))),
+        "lam": (lam_x, lam_u, tuple(f"lam[{i}]" for i in range(nc))),
+    }
+    for name in outputs:
+        if name not in known:
+            raise UnknownName("output of linearise", name, known)
+    parts = [known[name] for name in outputs]
+    C, D = np.vstack([part[0] for part in parts]), np.vstack([part[1] for part in parts])
+    return C, D, tuple(name for part in parts for name in part[2])
