@@ -1,0 +1,93 @@
+"""What touching balls on a line do at one instant, under the two frozen rules (spec 1.2).
+
+    sequential     the most approaching contact collides alone, then the next, until none approaches
+    simultaneous   all at once: impulses J >= 0, h'+ + e h'- >= 0, and J is 0 where that is not 0 (Newton's law of
+                   impact as a linear complementarity problem; Moreau 1988)
+
+Both are exact: a collision that takes no time moves nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import nnls
+
+from crossbody.cases._arrays import Floats
+
+Touching = NDArray[np.bool_]
+Impact = Callable[[Floats, Floats, Touching, float], Iterator[tuple[int, float]]]
+
+SLOW = 1e-12
+"""A gap that closes slower than this part of the fastest ball stands still; equal rates are ties within it."""
+
+
+def sequential(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[tuple[int, float]]:
+    """(row, impulse) of each collision in turn; v (n,) is moved on in place.
+
+    Args:
+        masses (n,): kg.
+        v (n,): speeds, m/s.
+        touching (n - 1,): which neighbours touch.
+        e: restitution.
+    """
+    slow = SLOW * float(np.max(np.abs(v), initial=0.0))
+    while True:
+        rates = np.where(touching, np.diff(v), np.inf)
+        worst = float(rates.min())
+        if worst >= -slow:
+            return
+        row = int(np.argmax(rates <= worst + slow))
+        yield row, _collide(masses, v, row, e)
+
+
+def _collide(masses: Floats, v: Floats, row: int, e: float) -> float:
+    """One collision of two balls; its impulse, N s."""
+    a, b = masses[row : row + 2]
+    impulse = (1.0 + e) * a * b / (a + b) * (v[row] - v[row + 1])
+    v[row] -= impulse / a
+    v[row + 1] += impulse / b
+    return float(impulse)
+
+
+def simultaneous(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[tuple[int, float]]:
+    """(row, impulse) of all that press at once, again if some approach then; arguments as of `sequential`."""
+    slow = SLOW * float(np.max(np.abs(v), initial=0.0))
+    rows = np.flatnonzero(touching)
+    while len(rows) and float(np.diff(v)[rows].min()) < -slow:
+        impulses = pushes(delassus(masses)[np.ix_(rows, rows)], (1.0 + e) * np.diff(v)[rows])
+        for row, impulse in zip(rows.tolist(), impulses.tolist(), strict=True):
+            v[row] -= impulse / masses[row]
+            v[row + 1] += impulse / masses[row + 1]
+            if impulse > 0.0:
+                yield row, impulse
+
+
+def delassus(masses: Floats) -> Floats:
+    """G = H M^-1 H^T (n - 1, n - 1) of a row of balls, 1/kg: tridiagonal."""
+    inverse = 1.0 / masses
+    off = np.diag(-inverse[1:-1], 1)
+    return np.diag(inverse[:-1] + inverse[1:]) + off + off.T
+
+
+def pushes(G: Floats, b: Floats) -> Floats:
+    """The solution x (k,) of 0 <= x, G x + b >= 0, x . (G x + b) = 0, G (k, k) positive definite.
+
+    If not all push, the set that does is found by non-negative least squares on the Cholesky factor, in finitely many
+    steps.
+    """
+    x = np.linalg.solve(G, -b)
+    if x.min() >= 0.0:
+        return x
+    R = cholesky(G)
+    active = nnls(R, solve_triangular(R, -b, trans="T"))[0] > 0.0
+    x[:] = 0.0
+    if active.any():
+        x[active] = np.linalg.solve(G[np.ix_(active, active)], -b[active])
+    return x
+
+
+RULES: dict[str, Impact] = {"sequential": sequential, "simultaneous": simultaneous}
