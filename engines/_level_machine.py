@@ -1,12 +1,15 @@
-"""The level machine for one set of constants (spec 1.2), in plain Python: independent of the compiled core.
+"""The level machine (spec 1.2), in plain Python: independent of the compiled core.
 
-    FREE -> CONTACT       h <= 0 and (h' < 0 or h < 0), or at rest on the surface with a free h'' < 0
-    CONTACT -> BALLISTIC  lam < 0 and h <= 0
-    CONTACT -> FREE       lam < 0 and h > 0
-    BALLISTIC -> FREE     h > 0
-    BALLISTIC -> CONTACT  h <= 0 and h' < 0 and the lam that it would have is > 0
+    FREE -> active        h <= 0 and (h' < 0 or h < 0); at rest on the surface if it would press
+    active -> BALLISTIC   lam < 0 and h <= 0            active -> FREE        lam < 0 and h > 0
+    BALLISTIC -> FREE     h > 0                         BALLISTIC -> active   h <= 0, h' < 0, lam would be > 0
+    COLLISION -> CONTACT  b1 |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
 
-Velocities are continuous: every row follows its law in real time (for several contacts the rule `resolved`).
+active is COLLISION for a row with two sets of constants, else CONTACT; out of COLLISION, BALLISTIC is
+COLLISION_SEPARATION. Velocities are continuous: every row follows its law in real time (the rule `resolved`).
+
+h' counts as zero below 1e-9 of the largest rate seen, lam as zero below what rounding makes of it. A gap below -1e-9 m
+that does not close was started in penetration: it is active if it would press, else BALLISTIC.
 """
 
 from __future__ import annotations
@@ -14,100 +17,144 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Modes
-from crossbody.engines._machines import WATCHED, Fired, Rows, Settled, active
+from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Passed, Rows, Settled, active, shared, switched
 
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
-GAP, PUSH = 0, 1
-"""The two functions watched of a row."""
+COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
+GAP, PUSH, SPENT = 0, 1, 2
+"""The functions watched of a row: touch or leave; turn, release or catch; hand-over."""
+SLOW, DEEP, EPS = 1e-9, 1e-9, 0.01
 
 
-@dataclass(frozen=True, slots=True)
-class Instant:
-    """One instant while it is settled: the state, gaps with located zeros set to 0, and what has switched so far."""
+@dataclass(slots=True)
+class View:
+    """One instant under one set of modes; all (nc,)."""
 
-    q: Floats
-    v: Floats
-    h: list[float]
-    hd: list[float]
-    fired: Fired
-    switched: set[int]
+    h: Floats
+    hd: Floats
+    lam: Floats
+    noise: Floats
+    presses: NDArray[np.bool_]
 
 
 class LevelMachine:
-    """Guards on levels, evaluated until nothing changes."""
+    """Guards on levels, evaluated until nothing changes.
+
+    One run uses one machine: it remembers the largest rate that it saw, and which free gaps are closed.
+    """
 
     def __init__(self, rows: Rows) -> None:
         self.rows = rows
+        self.own = switched(rows)
+        self.slow = 0.0
+        self._closed: set[int] = set()
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
-        """FREE: h and h' (whose zero is where a dip is deepest); CONTACT: lam; BALLISTIC: h and max(h', -lam)."""
-        h, hd = self.rows.gaps(q, v)
-        on = active(modes)
-        lam = self.rows.accelerate(q, v, on)[1] if CONTACT in modes else None
-        for i, mode in enumerate(modes):
-            gap = push = 1.0
+        """FREE: h and h' (whose zero is where a dip is deepest); active: lam; BALLISTIC: -h, and the catch."""
+        rows = self.rows
+        h, hd = rows.gaps(q, v)
+        vd, lam = rows.accelerate(q, v, modes) if any(modes) else (None, None)
+        out[:] = 1.0
+        for i in self.own:
+            mode, at = modes[i], WATCHED * i
             if mode == FREE:
-                gap, push = h[i], hd[i]
-            elif mode == CONTACT and lam is not None:
-                push = lam[i]
-            elif mode == BALLISTIC:
-                gap, push = h[i], max(hd[i], -self._would_push(q, v, on, i))
-            out[WATCHED * i : WATCHED * i + 2] = gap, push
+                out[at + GAP] = max(h[i], hd[i] + self.slow) if i in self._closed else h[i]
+                out[at + PUSH] = hd[i]
+            elif mode in ACTIVE and lam is not None:
+                out[at + PUSH] = lam[i]
+                out[at + SPENT] = self._left(q, v, modes, lam, i) if mode == COLLISION else 1.0
+            elif vd is not None:
+                out[at + GAP] = -h[i]
+                out[at + PUSH] = max(hd[i] + self.slow, -rows.pressure(q, v, vd)[0][i])
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = frozenset()) -> Settled:
         """See `crossbody.engines._machines.Machine`."""
-        h, hd = (x.tolist() for x in self.rows.gaps(q, v))
-        for i, which in fired:
-            if which == GAP:
-                h[i] = 0.0
-        at = Instant(q, v, h, hd, fired, set())
-        seen, passed = {modes}, []
-        while (after := self._once(at, modes)) != modes:
-            passed += [(i, b, a) for i, (b, a) in enumerate(zip(modes, after, strict=True)) if a != b]
-            at.switched.update(i for i, _, _ in passed)
-            modes = after
+        h, hd = (x.copy() for x in self.rows.gaps(q, v))
+        self.slow = max(self.slow, SLOW * float(np.abs(hd[list(self.own)]).max(initial=0.0)))
+        modes, passed = self._fire(h, modes, fired)
+        h[[i for i, which in fired if which == GAP]] = 0.0
+        modes, more, cycle = self._iterate(q, v, h, hd, modes)
+        self._closed = {i for i in self.own if h[i] <= 0.0}
+        return Settled(modes, v, (*passed, *more), cycle=cycle)
+
+    def _fire(self, h: Floats, modes: Modes, fired: Fired) -> tuple[Modes, list[Passed]]:
+        """Make the transitions that were located, never deciding them again from a value at round-off."""
+        after, passed = list(modes), []
+        for i, which in sorted(fired):
+            mode = modes[i]
+            if mode in ACTIVE:
+                after[i] = CONTACT if which == SPENT else self._released(mode, float(h[i]))
+            elif mode == FREE:
+                after[i] = self._activated(i) if which == GAP else FREE
+            else:
+                after[i] = FREE if which == GAP else self._activated(i)
+            if after[i] != mode:
+                passed.append((i, mode, after[i], 0.0))
+        return shared(self.rows, after), passed
+
+    def _iterate(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> tuple[Modes, list[Passed], bool]:
+        """All rows together; one at a time once a set of modes has repeated; a cycle if that repeats too."""
+        seen, passed, one_by_one = {modes}, list[Passed](), False
+        while True:
+            wanted = self._wanted(self._look(q, v, h, hd, modes), modes)
+            moved = [i for i in self.own if wanted[i] != modes[i]][: 1 if one_by_one else None]
+            if not moved:
+                return modes, passed, False
+            passed += [(i, modes[i], wanted[i], 0.0) for i in moved]
+            modes = shared(self.rows, [wanted[i] if i in moved else mode for i, mode in enumerate(modes)])
             if modes in seen:
-                return Settled(modes, v, tuple(passed), cycle=True)
+                if one_by_one:
+                    return modes, passed, True
+                one_by_one = True
+                seen.clear()
             seen.add(modes)
-        return Settled(modes, v, tuple(passed))
 
-    def _once(self, at: Instant, modes: Modes) -> Modes:
-        """Every row switched once by the guards that hold now."""
-        vd, lam = self.rows.accelerate(at.q, at.v, active(modes))
+    def _look(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> View:
+        vd, lam = self.rows.accelerate(q, v, modes)
+        press, noise = self.rows.pressure(q, v, vd)
+        return View(h, hd, lam, noise / np.diag(self.rows.delassus(q)), press > noise)
+
+    def _wanted(self, view: View, modes: Modes) -> list[int]:
+        """Where every row belongs by the guards that hold now."""
         after = list(modes)
-        for i, mode in enumerate(modes):
-            if mode == FREE and self._touches(at, vd, i):
-                after[i] = CONTACT
-            elif mode == CONTACT and self._released(at, lam, i):
-                after[i] = FREE if at.h[i] > 0.0 else BALLISTIC
-            elif mode == BALLISTIC:
-                after[i] = self._from_ballistic(at, modes, i)
-        return tuple(after)
+        for i in self.own:
+            if modes[i] in ACTIVE:
+                pulls = view.lam[i] < -view.noise[i]
+                after[i] = self._released(modes[i], float(view.h[i])) if pulls else modes[i]
+            else:
+                after[i] = self._inactive(view, modes[i], i)
+        return after
 
-    def _touches(self, at: Instant, vd: Floats, i: int) -> bool:
-        h, hd = at.h[i], at.hd[i]
-        if h == 0.0 and hd == 0.0:
-            return bool(self.rows.gap_acceleration(at.q, at.v, vd)[i] < 0.0)
-        return h < 0.0 or (h == 0.0 and hd < 0.0)
-
-    def _released(self, at: Instant, lam: Floats, i: int) -> bool:
-        """Lam below zero; a row that was switched on at this very instant while closing is not let go on round-off."""
-        if i in at.switched:
-            return bool(lam[i] < 0.0) and at.hd[i] >= 0.0
-        return bool(lam[i] < 0.0) or (i, PUSH) in at.fired
-
-    def _from_ballistic(self, at: Instant, modes: Modes, i: int) -> int:
-        if at.h[i] > 0.0 or ((i, GAP) in at.fired and at.hd[i] >= 0.0):
+    def _inactive(self, view: View, mode: int, i: int) -> int:
+        h, hd, presses = view.h[i], view.hd[i], view.presses[i]
+        if h > 0.0:
             return FREE
-        if i in at.switched or not at.hd[i] < 0.0:
-            return BALLISTIC
-        would = self._would_push(at.q, at.v, active(modes), i)
-        return CONTACT if would > 0.0 or (i, PUSH) in at.fired else BALLISTIC
+        closing = hd < -self.slow
+        if mode != FREE:
+            return self._activated(i) if closing and presses else mode
+        if closing:
+            return self._activated(i)
+        if h < -DEEP:
+            return self._activated(i) if presses else BALLISTIC
+        return self._activated(i) if hd <= self.slow and presses else FREE
 
-    def _would_push(self, q: Floats, v: Floats, on: tuple[int, ...], i: int) -> float:
-        return float(self.rows.accelerate(q, v, sorted((*on, i)))[1][i])
+    def _activated(self, i: int) -> int:
+        return COLLISION if self.rows.fast[i] else CONTACT
+
+    def _released(self, mode: int, h: float) -> int:
+        if h > 0.0:
+            return FREE
+        return SEPARATED if mode == COLLISION else BALLISTIC
+
+    def _left(self, q: Floats, v: Floats, modes: Modes, lam: Floats, i: int) -> float:
+        """What is left of the elastic part of lam before COLLISION hands over to CONTACT, m/s^2."""
+        on = active(modes)
+        inverse = np.linalg.inv(self.rows.delassus(q)[np.ix_(on, on)])
+        j = on.index(i)
+        return float(self.rows.elastic(q, v)[i] - EPS * max(lam[i], 0.0) / inverse[j, j])

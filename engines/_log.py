@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Event, Mode, Outcome, Trajectory
+from crossbody.cases import Event, Mode, Outcome, Switch, Trajectory
 from crossbody.cases._arrays import Floats
 
 Observe = Callable[[Floats, Floats], tuple[Floats, Floats]]
@@ -25,6 +25,7 @@ class Log:
         lam: multipliers, N: a number, or one a row.
         mode: modes of the rows.
         events: transitions, in order.
+        switches: changes of discrete variables, in order.
     """
 
     def __init__(self) -> None:
@@ -32,6 +33,7 @@ class Log:
         self.lam: list[Any] = []
         self.mode: list[Modes] = []
         self.events: list[Event] = []
+        self.switches: list[Switch] = []
 
     def add(self, t: float, q: Floats, v: Floats, lam: Any, mode: Modes) -> None:
         """Append one instant; q and v are kept, not copied."""
@@ -75,6 +77,7 @@ class Log:
             energy=energy,
             mode=np.reshape(np.array(self.mode, np.int8), gap.shape),
             events=tuple(self.events),
+            switches=tuple(self.switches),
             outcome=outcome,
             message=message,
             steps=steps,

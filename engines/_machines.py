@@ -12,12 +12,14 @@ from crossbody.cases import Event, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Modes
 
-WATCHED = 2
-"""Functions watched for every row."""
-ACTIVE = (Mode.CONTACT, Mode.BILATERAL)
+WATCHED = 3
+"""Functions watched for every row; each is positive until it fires."""
+ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
 """Modes in which a row carries a multiplier."""
 Fired = frozenset[tuple[int, int]]
 """(row, which of its watched functions) that reached zero at this instant."""
+Passed = tuple[int, int, int, float]
+"""One transition: row, mode before, mode after, impulse in N s (0 where lam is finite)."""
 
 
 class Rows(Protocol):
@@ -26,21 +28,36 @@ class Rows(Protocol):
     Attributes:
         nc: number of rows.
         unilateral: which of them a machine may switch.
+        follows: index of the row whose mode this one shares (a slip row follows its normal row); -1 for none.
+        fast: which of them have constants of their own in COLLISION.
     """
 
     nc: int
     unilateral: Sequence[bool]
+    follows: Sequence[int]
+    fast: Sequence[bool]
 
     def gaps(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Gap, m, and its rate, m/s, of every row (nc,)."""
         ...
 
-    def accelerate(self, q: Floats, v: Floats, active: Sequence[int]) -> tuple[Floats, Floats]:
+    def accelerate(self, q: Floats, v: Floats, modes: Modes) -> tuple[Floats, Floats]:
         """Acceleration (nv,) and multipliers (nc,), 0 where not active."""
         ...
 
-    def gap_acceleration(self, q: Floats, v: Floats, vd: Floats) -> Floats:
-        """H'' = H v' + H' v of every row (nc,), m/s^2."""
+    def pressure(self, q: Floats, v: Floats, vd: Floats) -> tuple[Floats, Floats]:
+        """-(h'' + law) of every row (nc,) at acceleration vd, and what rounding may make of it (nc,), m/s^2.
+
+        A row that is not active would push if it were, exactly where this is positive.
+        """
+        ...
+
+    def delassus(self, q: Floats) -> Floats:
+        """G = H M^-1 H^T (nc, nc)."""
+        ...
+
+    def elastic(self, q: Floats, v: Floats) -> Floats:
+        """b1 |h'| + b0 |h| of every row (nc,), m/s^2."""
         ...
 
 
@@ -51,18 +68,18 @@ class Settled:
     Attributes:
         modes: modes behind the instant.
         v (nv,): velocities behind it (those before it, unless something was struck).
-        passed: every transition as (row, before, after), in order.
+        passed: every transition, in order.
         cycle: whether the modes repeated: they never settle.
     """
 
     modes: Modes
     v: Floats
-    passed: tuple[tuple[int, int, int], ...]
+    passed: tuple[Passed, ...]
     cycle: bool = False
 
     def events(self, t: float) -> list[Event]:
         """The transitions as events at time t, s."""
-        return [Event(t=t, contact=i, before=Mode(b), after=Mode(a)) for i, b, a in self.passed]
+        return [Event(t=t, contact=i, before=Mode(b), after=Mode(a), impulse=p) for i, b, a, p in self.passed]
 
 
 class Machine(Protocol):
@@ -71,7 +88,7 @@ class Machine(Protocol):
     rows: Rows
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
-        """Fill out (nc * WATCHED,) with functions whose zeros are where the machine must look."""
+        """Fill out (nc * WATCHED,) with functions that are positive until the machine must look."""
         ...
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = ...) -> Settled:
@@ -82,6 +99,16 @@ class Machine(Protocol):
 def first_modes(rows: Rows) -> Modes:
     """Every switched row FREE, every other BILATERAL."""
     return tuple(int(Mode.FREE if u else Mode.BILATERAL) for u in rows.unilateral)
+
+
+def switched(rows: Rows) -> tuple[int, ...]:
+    """The rows that a machine decides about: those that follow another are moved with it."""
+    return tuple(i for i in range(rows.nc) if rows.unilateral[i] and rows.follows[i] < 0)
+
+
+def shared(rows: Rows, modes: Sequence[int]) -> Modes:
+    """The modes with every row that follows another in that one's mode."""
+    return tuple(mode if leader < 0 else modes[leader] for mode, leader in zip(modes, rows.follows, strict=True))
 
 
 def active(modes: Modes) -> tuple[int, ...]:

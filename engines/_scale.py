@@ -1,41 +1,22 @@
-"""Sizes of a scene, for guards against divergence and for steps that resolve its law."""
+"""Time steps that resolve a law."""
 
 from __future__ import annotations
 
 import math
 
-from crossbody.cases import Case
+import numpy as np
+
+from crossbody.cases import Law
 
 
-def fall_depth(case: Case) -> float:
-    """How far below its start a body could be at t_end with nothing in its way, m: |v0| t + g t^2 / 2.
+def resolving_step(law: Law, depth: float = 0.0, steps: int = 20) -> float:
+    """A time step with that many steps in half a period of the fastest row, s (spec 4.2). inf without a law.
 
-    A contact that only pushes cannot bring a body deeper than free fall.
+    Args:
+        law: constants of every row; the fast ones count too.
+        depth: penetration at which the cubic part is linearised, m: w^2 = a0 + 3 a2 d^2. a1 bounds the step as well.
+        steps: in half a period.
     """
-    return abs(float(case.v0[0])) * case.t_end + 0.5 * abs(case.number("gravity")) * case.t_end**2
-
-
-def energy_per_mass(case: Case) -> float:
-    """Energy that one contact's scene starts with, per unit mass, J/kg: motion, height and law (spec 1.4)."""
-    h, v = float(case.q0[0]), float(case.v0[0])
-    a0, a2 = float(case.law.a0[0]), float(case.law.a2[0])
-    stored = 0.5 * a0 * h * h + 0.25 * a2 * h**4 if (h < 0 or not case.law.unilateral[0]) else 0.0
-    return 0.5 * v * v + abs(case.number("gravity") * h) + stored
-
-
-def deepest(case: Case) -> float:
-    """Depth at which a0 d^2/2 + a2 d^4/4 holds the energy that the scene starts with, m."""
-    e, a0, a2 = energy_per_mass(case), float(case.law.a0[0]), float(case.law.a2[0])
-    bounds = [math.sqrt(2 * e / a0)] if a0 > 0 else []
-    bounds += [(4 * e / a2) ** 0.25] if a2 > 0 else []
-    return min(bounds, default=0.0)
-
-
-def resolving_step(case: Case, steps: int = 20) -> float:
-    """A time step with that many steps in half a period of the law at its deepest point, s (spec 4.2).
-
-    The frequency is that of the law linearised there: w^2 = a0 + 3 a2 d^2; a1 bounds it as well. inf without a law.
-    """
-    a0, a1, a2 = (float(a[0]) for a in (case.law.a0, case.law.a1, case.law.a2))
-    rate = max(math.sqrt(a0 + 3 * a2 * deepest(case) ** 2), a1)
+    stiffness = np.maximum(law.a0 + 3 * law.a2 * depth**2, law.b0)
+    rate = float(np.max(np.maximum(np.sqrt(stiffness), np.maximum(law.a1, law.b1)), initial=0.0))
     return math.pi / rate / steps if rate > 0 else math.inf

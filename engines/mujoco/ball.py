@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
-from crossbody.engines import _scale
+from crossbody.engines import _ball_scale, _scale
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._audit import audit
 from crossbody.engines.mujoco._direct import direct_solref, without_regularisation
@@ -27,7 +27,7 @@ FAR = 1e10
 
 def default_step(case: Case, profile: str) -> float:
     """Time step when none is given, s: MuJoCo's own, or one that resolves the law at its deepest point."""
-    return 2e-3 if profile == "default" else min(1e-3, _scale.resolving_step(case))
+    return 2e-3 if profile == "default" else min(1e-3, _scale.resolving_step(case.law, _ball_scale.deepest(case)))
 
 
 def build(case: Case, profile: str, dt: float) -> Scene:
@@ -104,9 +104,9 @@ def _modes(data: Any) -> Callable[[], Modes]:
 def _guard(case: Case, data: Any) -> Callable[[], bool]:
     """Finite, not deeper than free fall, and not 100 times faster than all energy at hand explains."""
     height, speed = data.qpos.item, data.qvel.item
-    fall = _scale.fall_depth(case) * (1 + 1e-9)
+    fall = _ball_scale.fall_depth(case) * (1 + 1e-9)
     floor = float(case.q0[0]) - fall if case.law.unilateral[0] else -math.inf
-    rise = 2 * _scale.energy_per_mass(case) + (case.number("gravity") * case.t_end) ** 2
+    rise = 2 * _ball_scale.energy_per_mass(case) + (case.number("gravity") * case.t_end) ** 2
     fastest = 100.0 * math.sqrt(rise)
     return lambda: floor <= height(0) < math.inf and -fastest <= speed(0) <= fastest
 
@@ -129,7 +129,7 @@ def _match(scene: Scene, case: Case, dt: float) -> None:
         return
     # A row must outlive the floor by a step, or the stages of the step that leaves it see different equations.
     # The engine counts positions from the margin: the hook takes a0 margin out again.
-    reach = 4 * dt * math.sqrt(2 * _scale.energy_per_mass(case) + (case.number("gravity") * dt) ** 2)
+    reach = 4 * dt * math.sqrt(2 * _ball_scale.energy_per_mass(case) + (case.number("gravity") * dt) ** 2)
     scene.hook = _cubic(data, a2, a0 * reach)
 
     def arm(modes: Modes) -> None:

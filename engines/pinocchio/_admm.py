@@ -9,6 +9,7 @@ theta = 1/2, exact in free flight; 1 if a row is always on, or its position woul
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Log, Modes
 from crossbody.engines._machines import first_modes
-from crossbody.engines.pinocchio._rows import PinRows
+from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 
 FREE, CONTACT, BILATERAL = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BILATERAL)
 WORST = 1e-6
@@ -35,7 +36,9 @@ class TimeStepper:
         outcome, message: how it ended.
     """
 
-    def __init__(self, rows: PinRows, points: list[Any], e: list[float], tol: float, log: Log, max_steps: int) -> None:
+    def __init__(
+        self, rows: PinRows, points: Sequence[Any], e: list[float], tol: float, log: Log, max_steps: int
+    ) -> None:
         self.rows, self.points, self.e, self.log, self.max_steps = rows, points, e, log, max_steps
         self.settings = pin.ADMMSolverSettings()
         self.settings.max_iterations = 1000
@@ -73,15 +76,13 @@ class TimeStepper:
     def _step(self, q: Floats, v: Floats, closed: list[int], dt: float) -> tuple[Floats, Floats]:
         """Velocity behind the step, and the impulse of every row (nc,), N s."""
         rows, p = self.rows, np.zeros(self.rows.nc)
-        free = v + dt * rows.accelerate(q, v, ())[0]
+        free = v + dt * rows.accelerate(q, v, (FREE,) * rows.nc)[0]
         if not closed:
             return free, p
         J = rows.jacobian(q)
         offset = np.array([self._offset(q, v, J, i, dt) for i in closed])
         p[closed] = self._impulses(q, J[closed] @ free + offset, closed)
-        M = pin.crba(rows.model, rows.data, q)
-        M = np.triu(M) + np.triu(M, 1).T
-        new = free + np.linalg.solve(M, J.T @ p)
+        new = free + np.linalg.solve(mass_matrix(rows.model, rows.data, q), J.T @ p)
         gap_rate = J[closed] @ new + offset
         self._check(p[closed], gap_rate, closed)
         return new, p
@@ -92,8 +93,9 @@ class TimeStepper:
         if rows.unilateral[i]:
             return self.e[i] * hd
         h = float(rows.heights(q)[i])
-        k = float(rows.a0[i] + rows.a2[i] * h * h)
-        return (k * dt * h - hd) / (1.0 + float(rows.a1[i]) * dt + k * dt * dt)
+        a0, a1, a2 = rows.slow[:, i].tolist()
+        k = a0 + a2 * h * h
+        return (k * dt * h - hd) / (1.0 + a1 * dt + k * dt * dt)
 
     def _impulses(self, q: Floats, g: Floats, closed: list[int]) -> Floats:
         """Solve 0 <= p perp G p + g >= 0 (or G p + g = 0) with a Delassus operator made anew: ADMM changes it."""

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
-from crossbody.engines.pinocchio._rows import PinRows
+from crossbody.cases import Case, Mode
+from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 
 
 def audit(case: Case, rows: PinRows, constants: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -20,19 +19,15 @@ def audit(case: Case, rows: PinRows, constants: Mapping[str, Any]) -> Mapping[st
     """
     model, data = rows.model, rows.data
 
-    def M(q: Floats) -> Floats:
-        upper = np.triu(pin.crba(model, data, q))
-        full: Floats = upper + np.triu(upper, 1).T
-        return full
-
+    on = (int(Mode.CONTACT),) * rows.nc
     return {
         "masses": np.array([inertia.mass for inertia in model.inertias[1:]]),
         "gravity": float(np.linalg.norm(model.gravity.linear)),
         "constants": constants,
         "q0": case.q0,
         "v0": case.v0,
-        "M": M,
+        "M": lambda q: mass_matrix(model, data, q),
         "bias": lambda q, v: np.array(pin.nonLinearEffects(model, data, q, v)),
         "H": rows.jacobian,
-        "lam": lambda q, v: rows.accelerate(q, v, range(rows.nc))[1],
+        "lam": lambda q, v: rows.accelerate(q, v, on)[1],
     }

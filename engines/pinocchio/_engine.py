@@ -14,7 +14,7 @@ import sksundae
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory, _registry
 from crossbody.cases._arrays import Floats
-from crossbody.engines import _scale, _settings
+from crossbody.engines import _settings
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines.pinocchio._admm import TimeStepper
@@ -86,11 +86,12 @@ class PinocchioRun:
         start = perf_counter()
         solver, counts = self.integrate(log)
         wall = perf_counter() - start
-        return log.trajectory(self.scene.observe, solver.outcome, solver.message, solver.steps, wall, counts)
+        chart = self.scene.chart
+        return log.trajectory(self.scene.observe, solver.outcome, solver.message, solver.steps, wall, counts, chart)
 
     def audit(self) -> Mapping[str, Any]:
         """The physics read back from the model."""
-        return audit(self.case, self.scene.rows, self.constants)
+        return {**audit(self.case, self.scene.rows, self.constants), **self.scene.audit}
 
 
 class Pinocchio:
@@ -181,29 +182,34 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
     }
 
 
-def _absolute(case: Case, rtol: float) -> Floats:
-    """Absolute tolerances (2 n,): rtol of how far and how fast the scene moves, or how deep its contacts give."""
-    speed = np.sqrt(2 * _scale.energy_per_mass(case)) or 1.0
-    depth = _scale.deepest(case) or float(np.abs(case.q0).max()) or 1.0
-    n = len(case.q0)
-    return rtol * np.concatenate((np.full(n, depth), np.full(n, speed)))
+def _absolute(scene: Scene, rtol: float) -> Floats:
+    """Absolute tolerances (2 n,): rtol of how far and how fast the scene moves."""
+    n = scene.rows.model.nv
+    return rtol * np.concatenate([np.broadcast_to(size, (n,)) for size in scene.sizes])
+
+
+def _start(case: Case, scene: Scene) -> tuple[Floats, Floats]:
+    return scene.start or (case.q0, case.v0)
 
 
 def _law(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
-    return _flowing(LevelMachine(scene.rows), case, used)
+    return _flowing(lambda: LevelMachine(scene.rows), case, scene, used)
 
 
 def _impulse(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
     e = [float(used["restitution"])] * scene.rows.nc
-    return _flowing(ImpulseMachine(scene.rows.rigid(), case.law.a0, e), case, used)
+    rows = scene.rows.rigid()
+    return _flowing(lambda: ImpulseMachine(rows, case.law.a0, e), case, scene, used)
 
 
-def _flowing(machine: Any, case: Case, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
+def _flowing(
+    machine: Callable[[], Any], case: Case, scene: Scene, used: Mapping[str, Any]
+) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
     rtol, method, limit = float(used["rtol"]), str(used.get("method", "Adams")), int(used["max_steps"])
 
     def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
-        flow = Flow(machine, log, rtol, _absolute(case, rtol), method, limit)
-        flow.run(case.q0, case.v0, case.t_end)
+        flow = Flow(machine(), log, rtol, _absolute(scene, rtol), method, limit, scene.world)
+        flow.run(*_start(case, scene), case.t_end)
         return flow, {"rhs": flow.rhs}
 
     return integrate
@@ -214,7 +220,7 @@ def _admm(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], 
 
     def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
         stepper = TimeStepper(scene.rows, scene.points, e, float(used["tol"]), log, int(used["max_steps"]))
-        stepper.run(case.q0, case.v0, case.t_end, float(used["dt"]))
+        stepper.run(*_start(case, scene), case.t_end, float(used["dt"]))
         return stepper, {"iterations": stepper.iterations, "unsolved": stepper.unsolved}
 
     return integrate

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._closed_forms import damping_ratio
 from crossbody.cases._closed_forms import restitution as restitution_at
 from crossbody.engines._log import Modes
-from crossbody.engines._machines import WATCHED, Fired, Settled, active
+from crossbody.engines._machines import WATCHED, Fired, Passed, Settled, active
 from crossbody.engines.pinocchio._rows import PinRows
 
 FREE, CONTACT, COLLISION = int(Mode.FREE), int(Mode.CONTACT), int(Mode.COLLISION)
@@ -46,21 +47,21 @@ class ImpulseMachine:
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
         """FREE: h and h'; CONTACT: lam."""
         h, hd = self.rows.gaps(q, v)
-        lam = self.rows.accelerate(q, v, active(modes))[1] if CONTACT in modes else None
+        lam = self.rows.accelerate(q, v, modes)[1] if CONTACT in modes else None
         for i, mode in enumerate(modes):
             pair = (h[i], hd[i]) if mode == FREE else (1.0, lam[i] if lam is not None else 1.0)
-            out[WATCHED * i : WATCHED * i + 2] = pair
+            out[WATCHED * i : WATCHED * i + 3] = (*pair, 1.0)
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = frozenset()) -> Settled:
         """Release what pulls, then strike or hold what touches."""
-        passed: list[tuple[int, int, int]] = []
+        passed: list[Passed] = []
         now = list(modes)
-        lam = self.rows.accelerate(q, v, active(modes))[1]
+        lam = self.rows.accelerate(q, v, modes)[1]
         for i, mode in enumerate(modes):
             if mode == CONTACT and (lam[i] < 0.0 or (i, PUSH) in fired):
                 now[i] = FREE
-                passed.append((i, CONTACT, FREE))
-        released = {i for i, _, _ in passed}
+                passed.append((i, CONTACT, FREE, 0.0))
+        released = {i for i, *_ in passed}
         touching = [i for i, h in enumerate(self.rows.gaps(q, v)[0]) if h <= 0.0 or (i, GAP) in fired]
         for _ in range(1000 * len(modes)):
             i, approach = self._next(q, v, now, touching)
@@ -69,7 +70,9 @@ class ImpulseMachine:
             v, after = self._hit(q, v, now, i, approach) if approach > 0.0 else (v, CONTACT)
             if i in released and after == CONTACT and approach <= 0.0:
                 break
-            passed += [(i, FREE, COLLISION), (i, COLLISION, after)] if approach > 0.0 else [(i, FREE, CONTACT)]
+            passed += (
+                [(i, FREE, COLLISION, 0.0), (i, COLLISION, after, 0.0)] if approach > 0.0 else [(i, FREE, CONTACT, 0.0)]
+            )
             now[i] = after
         else:
             return Settled(tuple(now), v, tuple(passed), cycle=True)
@@ -87,7 +90,7 @@ class ImpulseMachine:
         return best, speed
 
     def _press(self, q: Floats, v: Floats, now: list[int], i: int) -> float:
-        vd, _ = self.rows.accelerate(q, v, active(tuple(now)))
+        vd, _ = self.rows.accelerate(q, v, tuple(now))
         return -float(self.rows.gap_acceleration(q, v, vd)[i])
 
     def _hit(self, q: Floats, v: Floats, now: list[int], i: int, approach: float) -> tuple[Floats, int]:

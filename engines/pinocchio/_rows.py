@@ -8,11 +8,18 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases import Law
+from crossbody.cases import Law, Mode
 from crossbody.cases._arrays import Floats
+from crossbody.engines._log import Modes
+from crossbody.engines._machines import active
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
+Forces = Callable[[Floats, Floats, Floats], None]
+"""(q, v, tau): writes the generalised forces tau (nv,) beside gravity and the rows, N or N m."""
+ULP = 2.3e-16
+ROUNDING = 1e-13
+"""Part of the largest term of a sum that rounding may make of the sum."""
 
 
 def by_forward_dynamics(model: Any, data: Any, tau: Floats) -> Solve:
@@ -32,8 +39,7 @@ def by_dense_kkt(model: Any, data: Any, tau: Floats) -> Solve:
     def solve(q: Floats, v: Floats, J: Floats, gamma: Floats) -> tuple[Floats, Floats]:
         size = nv + len(gamma)
         K, right = np.zeros((size, size)), np.empty(size)
-        upper = np.triu(pin.crba(model, data, q))
-        K[:nv, :nv] = upper + np.triu(upper, 1).T
+        K[:nv, :nv] = mass_matrix(model, data, q)
         K[nv:, :nv], K[:nv, nv:] = J, J.T
         right[:nv] = tau - pin.nonLinearEffects(model, data, q, v)
         right[nv:] = -gamma
@@ -46,16 +52,25 @@ def by_dense_kkt(model: Any, data: Any, tau: Floats) -> Solve:
 ALGEBRA = {"forwardDynamics": by_forward_dynamics, "kkt": by_dense_kkt}
 
 
+def mass_matrix(model: Any, data: Any, q: Floats) -> Floats:
+    """M(q) (nv, nv); crba fills the upper triangle alone."""
+    upper = np.triu(pin.crba(model, data, q))
+    full: Floats = upper + np.triu(upper, 1).T
+    return full
+
+
 class PinRows:
-    """Rows of a mechanism; see `crossbody.engines._machines.Rows`. The engine's coordinates are the case's.
+    """Rows of a mechanism; see `crossbody.engines._machines.Rows`.
 
     Attributes:
         model, data: Pinocchio's.
         tau (nv,): generalised forces beside gravity and the rows, N or N m.
+        forces: writes tau for a state; None where tau is constant between changes of the inputs.
         jacobian: q -> H (nc, nv).
         heights: q -> h (nc,), m.
         drift: (q, v) -> H' v (nc,), m/s^2.
         law: constants of every row.
+        follows: index of the row whose mode each one shares; -1 for none.
     """
 
     def __init__(
@@ -66,18 +81,25 @@ class PinRows:
         drift: Callable[[Floats, Floats], Floats],
         law: Law,
         algebra: str = "forwardDynamics",
+        follows: Sequence[int] = (),
+        forces: Forces | None = None,
     ) -> None:
         self.model, self.data = model, model.createData()
-        self.jacobian, self.heights, self.drift = jacobian, heights, drift
+        self.jacobian, self.heights, self.drift, self.forces = jacobian, heights, drift, forces
         self.nc, self.unilateral = len(law.a0), law.unilateral.tolist()
+        self.follows = tuple(follows) or (-1,) * self.nc
         self.tau = np.zeros(model.nv)
-        self.a0, self.a1, self.a2 = law.a0, law.a1, law.a2
-        self._sets: dict[tuple[int, ...], Any] = {}
+        self.slow = np.stack((law.a0, law.a1, law.a2))
+        self.fast = (law.b0 > 0.0).tolist()
+        quick = np.stack((law.b0, law.b1, np.zeros(self.nc)))
+        self.entered = np.where(law.b0 > 0.0, quick, self.slow)  # what a row has that is just entered
+        self._sets: dict[Modes, Any] = {}
         self.solve = ALGEBRA[algebra](model, self.data, self.tau)
 
     def rigid(self) -> PinRows:
         """The same rows with h'' = 0 instead of the law."""
-        self.a0 = self.a1 = self.a2 = np.zeros(self.nc)
+        self.slow = self.entered = np.zeros((3, self.nc))
+        self.fast = [False] * self.nc
         self._sets.clear()
         return self
 
@@ -90,11 +112,33 @@ class PinRows:
         total: Floats = self.jacobian(q) @ vd + self.drift(q, v)
         return total
 
-    def accelerate(self, q: Floats, v: Floats, active: Sequence[int]) -> tuple[Floats, Floats]:
+    def pressure(self, q: Floats, v: Floats, vd: Floats) -> tuple[Floats, Floats]:
+        """-(h'' + law) of every row if it were entered now (nc,), and its rounding (nc,), m/s^2."""
+        (h, hd), (a0, a1, a2) = self.gaps(q, v), self.entered
+        hdd, spring, damper = self.gap_acceleration(q, v, vd), (a0 + a2 * h * h) * h, a1 * hd
+        state = 8 * ULP * (a0 * np.abs(q).max() + a1 * np.abs(v).max())
+        noise: Floats = ROUNDING * (np.abs(hdd) + np.abs(spring) + np.abs(damper)) + state
+        return -(hdd + spring + damper), noise
+
+    def delassus(self, q: Floats) -> Floats:
+        """G = H M^-1 H^T (nc, nc)."""
+        H = self.jacobian(q)
+        G: Floats = H @ np.linalg.solve(mass_matrix(self.model, self.data, q), H.T)
+        return G
+
+    def elastic(self, q: Floats, v: Floats) -> Floats:
+        """b1 |h'| + b0 |h| of every row (nc,), m/s^2."""
+        h, hd = self.gaps(q, v)
+        part: Floats = self.entered[1] * np.abs(hd) + self.entered[0] * np.abs(h)
+        return part
+
+    def accelerate(self, q: Floats, v: Floats, modes: Modes) -> tuple[Floats, Floats]:
         """Acceleration (nv,) and multipliers (nc,)."""
-        if not active:
+        if self.forces is not None:
+            self.forces(q, v, self.tau)
+        rows, a0, a1, a2 = self._chosen(modes)
+        if rows is None:
             return pin.aba(self.model, self.data, q, v, self.tau), np.zeros(self.nc)
-        rows, a0, a1, a2 = self._chosen(active)
         J, h = self.jacobian(q)[rows], self.heights(q)[rows]
         gamma = self.drift(q, v)[rows] + a1 * J.dot(v) + (a0 + a2 * h * h) * h
         vd, part = self.solve(q, v, J, gamma)
@@ -104,13 +148,15 @@ class PinRows:
         lam[rows] = part
         return vd, lam
 
-    def _chosen(self, active: Sequence[int]) -> Any:
-        """The index of the active rows and their constants; made once for every set."""
-        key = tuple(active)
-        if key not in self._sets:
-            rows = slice(None) if len(key) == self.nc else list(key)
-            self._sets[key] = (rows, self.a0[rows], self.a1[rows], self.a2[rows])
-        return self._sets[key]
+    def _chosen(self, modes: Modes) -> Any:
+        """The index of the active rows and the constants of their modes; made once for every set of modes."""
+        found = self._sets.get(modes)
+        if found is None:
+            on = list(active(modes))
+            rows = None if not on else slice(None) if len(on) == self.nc else on
+            law = np.where([m == Mode.COLLISION for m in modes], self.entered, self.slow)
+            found = self._sets[modes] = (rows, *law[:, on])
+        return found
 
     def strike(self, q: Floats, v: Floats, struck: Sequence[int], e: float) -> Floats:
         """Velocities behind an impact of the rows `struck` with restitution e (spec 4.3)."""

@@ -2,23 +2,63 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from crossbody.engines._log import Observe
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.engines._log import Chart, Observe
 from crossbody.engines.pinocchio._rows import PinRows
+
+
+def _nothing(_t: float, _q: Floats, _v: Floats) -> None:
+    """No input changes."""
+
+
+def _finite(q: Floats, v: Floats) -> bool:
+    return bool(np.isfinite(q).all() and np.isfinite(v).all())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """What acts on the rows from outside, in the engine's coordinates.
+
+    Attributes:
+        instants: when the inputs change, s, increasing.
+        change: (t, q, v) puts in force what acts from such an instant on.
+        reset: back to the start: no input, no memory.
+        safe: (q, v) -> whether the state is one that the scene can reach.
+    """
+
+    instants: Sequence[float] = ()
+    change: Callable[[float, Floats, Floats], None] = _nothing
+    reset: Callable[[], None] = lambda: None
+    safe: Callable[[Floats, Floats], bool] = _finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """A model and its rows; the engine's coordinates are the case's.
+    """A model and its rows.
 
     Attributes:
         rows: gaps, accelerations and multipliers.
         points: every row as a constraint of Pinocchio with three components, the normal last (profile admm).
-        observe: gaps and energies of many states.
+        observe: gaps and energies of many states, in the case's coordinates.
+        sizes: how far the coordinates move (or how deep contacts give), and how fast: numbers, or one a coordinate
+            (n,). Times rtol they are the absolute tolerances.
+        start: q and v at the start in the engine's coordinates; None where they are the case's.
+        chart: positions and velocities of the engine -> those of the case; None where they are the same.
+        world: what acts from outside.
+        audit: more for the parity audit, or instead of what is read from `rows`.
     """
 
     rows: PinRows
-    points: list[Any]
+    points: Sequence[Any] = ()
     observe: Observe
+    sizes: tuple[float | Floats, float | Floats]
+    start: tuple[Floats, Floats] | None = None
+    chart: Chart | None = None
+    world: World = field(default_factory=World)
+    audit: dict[str, Any] = field(default_factory=dict)

@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
+from crossbody.engines import _ball_scale
 from crossbody.engines.pinocchio._rows import PinRows
 from crossbody.engines.pinocchio._scene import Scene
 
@@ -23,7 +24,7 @@ def build(case: Case, algebra: str) -> Scene:
     rows = PinRows(
         model, jacobian=lambda q: one, heights=lambda q: q, drift=lambda q, v: zero, law=case.law, algebra=algebra
     )
-    return Scene(rows=rows, points=[_point(model, joint, case)], observe=_observer(rows))
+    return Scene(rows=rows, points=[_point(model, joint, case)], observe=_observer(rows), sizes=_ball_scale.sizes(case))
 
 
 def _point(model: Any, joint: int, case: Case) -> Any:
