@@ -1,0 +1,127 @@
+"""How a log is read: one module a format, found by what the file begins with.
+
+A format is a module here with these public names; its third-party library is imported by `open_log` only:
+
+    SUFFIXES                     endings of its files, for messages and for the choice between formats
+    Options                      a msgspec.Struct: what `[options]` of a column map may say to it
+    recognises(path, head)       whether the file (or folder) is one of this format; head is its first 4096 bytes
+    open_log(path, options)      a `Reader`
+"""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from crossbody.cases import FormatUnavailable, LogFormatError, _registry
+from crossbody.hw.formats._contract import Column, Group, Reader
+
+__all__ = ["Column", "Group", "Reader", "load", "names", "open_log", "recognise", "summary"]
+
+HEAD = 4096
+
+
+def names() -> tuple[str, ...]:
+    """Names of all formats, readable here or not; imports none of them."""
+    return _registry.plugin_names(__name__, list(__path__))
+
+
+def summary(name: str) -> str:
+    """What a format is, in one line; imports nothing."""
+    return _registry.summary(__name__, list(__path__), name)
+
+
+def load(name: str) -> ModuleType:
+    """The module of a format.
+
+    Raises:
+        UnknownName: if there is no such format; the message lists the names.
+        FormatUnavailable: if a package is not installed.
+    """
+    try:
+        return _registry.load_plugin("log format", __name__, list(__path__), name)
+    except ModuleNotFoundError as error:
+        raise unavailable(f"Log format {name!r}", error) from None
+
+
+def unavailable(who: str, error: ModuleNotFoundError) -> FormatUnavailable:
+    """The error for an absent package; a broken import of our own stays loud."""
+    package = (error.name or "").partition(".")[0]
+    if package in ("", "crossbody"):
+        raise error
+    return FormatUnavailable(
+        f"{who} needs the package {package!r}, which is not installed: pip install 'crossbody[logs]' brings it."
+    )
+
+
+def recognise(path: Path) -> str:
+    """Name of the format that a file or folder is written in.
+
+    Raises:
+        LogFormatError: if it is absent, empty, no file, or of no known format.
+    """
+    head = _head(path)
+    found = [name for name in names() if load(name).recognises(path, head)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise LogFormatError(path, f"could be {' or '.join(found)}; say which by `format` in the column map.")
+    if path.is_dir():
+        raise LogFormatError(path, "is a folder; name a file, or the folder of a ROS 2 bag (with its metadata.yaml).")
+    promised = [name for name in names() if path.suffix.lower() in load(name).SUFFIXES]
+    if promised:
+        raise LogFormatError(path, f"does not begin as a {'/'.join(promised)} file does: damaged, or not what it says.")
+    known = ", ".join(f"{name} ({' '.join(load(name).SUFFIXES)})" for name in names())
+    raise LogFormatError(path, f"is in no known log format (it begins with {head[:8].hex(' ')}). Known: {known}.")
+
+
+def _head(path: Path) -> bytes:
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            return b""
+        if not stat.S_ISREG(mode):
+            raise LogFormatError(path, "is a device or a pipe; name a file.")
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
+    if not head:
+        raise LogFormatError(path, "is empty.")
+    return head
+
+
+def _unreadable(path: Path, error: Exception) -> Exception:
+    if isinstance(error, LogFormatError):
+        return error
+    reason = getattr(error, "strerror", None) or str(error)
+    return LogFormatError(path, f"cannot be read: {reason}.")
+
+
+def open_log(path: Path, name: str | None = None, options: Any = None) -> Reader:
+    """Open a log for reading.
+
+    Args:
+        path: file, or folder for formats that are one.
+        name: the format; recognised by the file's beginning if not given.
+        options: the format's own `Options`; its defaults if not given.
+
+    Raises:
+        LogFormatError: if it cannot be read as that format.
+        FormatUnavailable: if the format's package is not installed.
+        UnknownName: for a format that does not exist.
+    """
+    if name is not None:
+        _head(path)
+    module = load(name or recognise(path))
+    try:
+        reader: Reader = module.open_log(path, module.Options() if options is None else options)
+    except ModuleNotFoundError as error:
+        raise unavailable(f"Log format {module.__name__.rpartition('.')[2]!r}", error) from None
+    if not reader.groups:
+        reader.close()
+        why = next((f" ({column} {text})" for column, text in reader.refused.items()), "")
+        raise LogFormatError(path, f"holds no column of numbers{why}.")
+    return reader

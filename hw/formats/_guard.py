@@ -1,0 +1,51 @@
+"""The border to the libraries that parse foreign bytes: whatever they raise on damage becomes one sentence."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+
+from crossbody.cases import CrossbodyError, LogFormatError
+
+LENGTH = 160  # of a library's own words
+
+
+@contextmanager
+def parsing(path: Path, what: str, row: int | None = None, column: str = "") -> Iterator[None]:
+    """Run calls into a parser.
+
+    Damaged input makes these libraries raise anything (struct.error, KeyError, zlib.error, OverflowError, ...), so
+    everything but an absent package and our own errors is taken as the file's fault; the cause stays chained.
+
+    Args:
+        path: the log.
+        what: what the parser took it for, for example "MAT file".
+        row: row that is being read, if one is.
+        column: column that is being read, if one is.
+
+    Raises:
+        LogFormatError: for whatever the parser raised.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a parser's doubts about the file are its exceptions' business
+            yield
+    except (CrossbodyError, ModuleNotFoundError):
+        raise
+    except Exception as error:
+        raise LogFormatError(path, f"is not a readable {what}: {words(error)}.", row, column) from error
+
+
+def words(error: BaseException) -> str:
+    """A library's message on one line, printable and short."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    text = repr(text)[1:-1] if not text.isprintable() else text
+    return (text if len(text) <= LENGTH else text[:LENGTH] + " ...").rstrip(".")
+
+
+def library(package: str) -> str:
+    """Name and version of the package that reads, for provenance."""
+    return f"{package} {version(package)}"

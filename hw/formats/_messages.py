@@ -1,0 +1,158 @@
+"""Messages as rows: the numbers in a message become the columns of its topic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats._contract import Block, Column, Group
+from crossbody.hw.formats._names import WIDEST
+
+BLOCK_MESSAGES = 8192
+DEEPEST = 12  # levels of nesting
+STAMP = ({"sec", "nanosec"}, {"sec", "nsec"}, {"secs", "nsecs"})
+Way = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leaf:
+    """One number in a message.
+
+    Attributes:
+        name: name of the column, `joints.position[2]`.
+        path: keys and indices that lead there.
+        type: numpy name of its type; a stamp of seconds and nanoseconds is one int64.
+        stamp: whether it is such a stamp.
+    """
+
+    name: str
+    path: Way
+    type: str
+    stamp: bool = False
+
+    @property
+    def column(self) -> Column:
+        """The column that it gives."""
+        return Column(name=self.name, type=self.type, unit="ns" if self.stamp else "")
+
+
+def topic_group(topic: str, rows: int, message: Any, clocks: Sequence[str]) -> tuple[Group, dict[str, Leaf]]:
+    """The columns of a topic, from its first message.
+
+    Args:
+        topic: name of the topic, the group's name.
+        rows: number of its messages.
+        message: the decoded message.
+        clocks: times that the file keeps beside each message, ns, for example ("log_time",).
+
+    Returns:
+        The group, and the leaf of every column but the clocks.
+    """
+    leaves = {leaf.name: leaf for leaf in _leaves(message, topic, ())}
+    times = tuple(Column(name=f"{topic}.{clock}", type="int64", unit="ns") for clock in clocks)
+    return Group(name=topic, rows=rows, columns=(*times, *(leaf.column for leaf in leaves.values()))), leaves
+
+
+def _members(value: Any) -> Mapping[str, Any] | None:
+    """The named members of a decoded message of any of the libraries; None if it has none."""
+    if isinstance(value, Mapping):
+        return value
+    names = getattr(value, "__slots__", None) or getattr(value, "__dict__", None)
+    if names is None or isinstance(value, (str, bytes, np.ndarray, np.generic, int, float)):
+        return None
+    return {name: getattr(value, name) for name in names if not str(name).startswith("_")}
+
+
+def _leaves(value: Any, name: str, path: Way) -> Iterator[Leaf]:
+    if len(path) > DEEPEST:
+        return
+    kind = _number(value)
+    members = None if kind else _members(value)
+    if kind:
+        yield Leaf(name=name, path=path, type=kind)
+    elif members is not None and set(members) in STAMP:
+        yield Leaf(name=name, path=path, type="int64", stamp=True)
+    elif members is not None:
+        for key, member in members.items():
+            yield from _leaves(member, f"{name}.{key}", (*path, str(key)))
+    elif isinstance(value, (list, tuple, np.ndarray)) and len(value) <= WIDEST:
+        for i, member in enumerate(value):
+            yield from _leaves(member, f"{name}[{i}]", (*path, i))
+
+
+def _number(value: Any) -> str:
+    """Numpy name of a number's type; empty if it is none."""
+    if isinstance(value, (bool, np.bool_)):
+        return "bool"
+    if isinstance(value, np.generic):
+        return value.dtype.name if value.dtype.kind in "fiu" else ""
+    return "int64" if isinstance(value, int) else "float64" if isinstance(value, float) else ""
+
+
+def _at(message: Any, leaf: Leaf) -> Any:
+    value = message
+    for key in leaf.path:
+        value = value[key] if isinstance(key, int) or isinstance(value, Mapping) else getattr(value, key)
+    if leaf.stamp:
+        whole, part = (_members(value) or {}).values()
+        return int(whole) * 1_000_000_000 + int(part)
+    return value if value is not None else math.nan
+
+
+def rows_of(
+    path: Path, messages: Iterable[tuple[Mapping[str, int], Callable[[], Any]]], group: Group,
+    leaves: Mapping[str, Leaf], columns: Sequence[str],
+) -> Iterator[Block]:  # fmt: skip
+    """Blocks out of a topic's messages.
+
+    Args:
+        path: the log, for messages of errors.
+        messages: for each, its clocks (column -> ns) and a function that decodes it.
+        group: the topic's columns.
+        leaves: where a message holds each.
+        columns: the wanted ones.
+
+    Raises:
+        LogFormatError: at a message that lacks one of the columns, or if there are fewer messages than announced.
+    """
+    types = {column.name: column.type for column in group.columns}
+    row = 0
+    kept: dict[str, list[Any]] = {name: [] for name in columns}
+    fields = [name for name in columns if name in leaves]
+    for clocks, decode in messages:
+        message = decode() if fields else None
+        for name in columns:
+            kept[name].append(_value(path, row, message, leaves[name]) if name in leaves else clocks[name])
+        row += 1
+        if row % BLOCK_MESSAGES == 0:
+            yield _arrays(path, kept, types, row)
+            kept = {name: [] for name in columns}
+    if row % BLOCK_MESSAGES:
+        yield _arrays(path, kept, types, row)
+    if group.rows is not None and row != group.rows:
+        raise LogFormatError(path, f"announces {group.rows} messages on {group.name!r} and holds {row}: cut off?", row)
+
+
+def _value(path: Path, row: int, message: Any, leaf: Leaf) -> Any:
+    try:
+        return _at(message, leaf)
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError):
+        raise LogFormatError(path, "the message lacks this number.", row, leaf.name) from None
+
+
+def _arrays(path: Path, kept: dict[str, list[Any]], types: Mapping[str, str], row: int) -> Block:
+    block: Block = {}
+    for name, values in kept.items():
+        try:
+            whole = types[name].startswith(("int", "uint")) and all(isinstance(v, (int, np.integer)) for v in values)
+            block[name] = np.array(values, dtype=types[name] if whole else np.float64)
+        except (TypeError, ValueError, OverflowError):
+            first = next(i for i, v in enumerate(values) if not _number(v))
+            raise LogFormatError(path, "the message holds no number here.", row - len(values) + first, name) from None
+    return block

@@ -1,0 +1,81 @@
+"""What ROS 1 and ROS 2 bags share: topics as groups, by rosbags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from crossbody.hw.formats._contract import Block, Group
+from crossbody.hw.formats._guard import library, parsing, words
+from crossbody.hw.formats._messages import Leaf, rows_of, topic_group
+
+CLOCKS = ("log_time",)
+
+
+class RosbagReader:
+    """Numbers in the messages of every topic whose type is known.
+
+    A ROS 1 bag and most ROS 2 bags carry the definitions of their messages; where one does not, those of ROS 2
+    Humble are taken, and a topic of an unknown type is refused.
+
+    Args:
+        path: the bag.
+        what: name of the format, for messages.
+    """
+
+    def __init__(self, path: Path, what: str) -> None:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+
+        self._path, self._what = path, what
+        self.library = library("rosbags")
+        self.refused: dict[str, str] = {}
+        self._leaves: dict[str, Mapping[str, Leaf]] = {}
+        with parsing(path, what):
+            self._bag = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            self._bag.open()
+        try:
+            with parsing(path, what):
+                self.groups = tuple(self._topics())
+        except BaseException:
+            self.close()
+            raise
+
+    def _topics(self) -> Iterator[Group]:
+        for topic, about in sorted(self._bag.topics.items()):
+            if not about.msgcount:
+                continue
+            connection, _, data = next(self._bag.messages(self._of(topic)))
+            try:
+                message = self._bag.deserialize(data, connection.msgtype)
+            except KeyError as error:
+                self.refused[topic] = f"has messages of a type that the bag does not define ({words(error)})"
+                continue
+            group, self._leaves[topic] = topic_group(topic, about.msgcount, message, CLOCKS)
+            yield group
+
+    def _of(self, topic: str) -> list[Any]:
+        return [connection for connection in self._bag.connections if connection.topic == topic]
+
+    def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
+        """See `Reader`."""
+        found = rows_of(self._path, self._rows(group.name), group, self._leaves[group.name], columns)
+        while True:
+            with parsing(self._path, self._what):
+                block = next(found, None)
+            if block is None:
+                return
+            yield block
+
+    def _rows(self, topic: str) -> Iterator[tuple[Mapping[str, int], Callable[[], Any]]]:
+        for connection, time, data in self._bag.messages(self._of(topic)):
+            kind = connection.msgtype
+            yield (
+                {f"{topic}.log_time": time},
+                lambda data=data, kind=kind: self._bag.deserialize(data, kind),  # type: ignore[misc]
+            )
+
+    def close(self) -> None:
+        """See `Reader`."""
+        self._bag.close()

@@ -1,0 +1,112 @@
+"""MATLAB files up to version 7 (MAT v5), by scipy; objects are refused, never built."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats._contract import Block, Group
+from crossbody.hw.formats._grouping import Table, cut, grouped, layout, place
+from crossbody.hw.formats._guard import library, parsing
+
+SUFFIXES = (".mat",)
+NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
+HINT = "save plain arrays or structs instead (a timetable: its columns; an object: struct(object))"
+LARGEST = 1 << 31  # bytes of one variable, the format's own limit
+
+
+class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Nothing to choose."""
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether the file begins as MAT v5 does."""
+    return head.startswith(b"MATLAB 5.0 MAT-file") or (head[124:128] in (b"\x00\x01IM", b"\x01\x00MI"))
+
+
+def open_log(path: Path, options: Options) -> MatReader:
+    """Open a MAT v5 file."""
+    return MatReader(path)
+
+
+class MatReader:
+    """Numeric arrays, also those in structs; `s.signals.values[1]` is the second column of that field."""
+
+    def __init__(self, path: Path) -> None:
+        from scipy.io import whosmat
+
+        self._path = path
+        self.library = library("scipy")
+        self.refused: dict[str, str] = {}
+        self._tables: list[Table] = []
+        with parsing(path, "MAT file"):
+            listed = whosmat(path)
+        for name, shape, kind in listed:
+            self._list(str(name), tuple(map(int, shape)), str(kind))
+        self.groups = grouped(self._tables)
+
+    def _list(self, name: str, shape: tuple[int, ...], kind: str) -> None:
+        if kind == "struct":
+            self._walk(name, name, self._load([name])[name])
+        elif kind not in NUMBERS:
+            self.refused[name] = f"is a MATLAB {kind}: {HINT}"
+        else:
+            self._add(name, name, shape, np.dtype({"double": "f8", "single": "f4", "logical": "u1"}.get(kind, kind)))
+
+    def _add(self, key: str, name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
+        found = layout(shape)
+        if found is None:
+            self.refused[name] = f"has shape {tuple(shape)}, which is no table"
+            return
+        rows, width, axis = found
+        self._tables.append(Table(key=key, name=name, type=dtype.name, rows=rows, width=width, axis=axis))
+
+    def _walk(self, key: str, name: str, value: Any) -> None:
+        """List the fields of a struct; anything but structs and numbers is refused by name."""
+        if isinstance(value, np.ndarray) and value.dtype.names and value.size == 1 and type(value) is np.ndarray:
+            for field in value.dtype.names:
+                self._walk(key, f"{name}.{field}", value.flat[0][field])
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+            self._add(key, name, value.shape, value.dtype)
+        else:
+            self.refused[name] = f"is a MATLAB {_kind(value)}: {HINT}"
+
+    def _load(self, variables: Sequence[str]) -> dict[str, Any]:
+        from scipy.io import loadmat
+
+        with parsing(self._path, "MAT file"):
+            found: dict[str, Any] = loadmat(self._path, variable_names=list(variables), mat_dtype=False)
+        return found
+
+    def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
+        """See `Reader`. A MAT variable can only be read whole, so the wanted ones are in memory together."""
+        wanted = {name: place(self._tables, name) for name in columns}
+        loaded = self._load(sorted({table.key for table, _ in wanted.values()}))
+        arrays = {name: (self._inside(loaded, table), table, i) for name, (table, i) in wanted.items()}
+        yield from cut(arrays, group.rows or 0)
+
+    def _inside(self, loaded: dict[str, Any], table: Table) -> Any:
+        value = loaded[table.key]
+        for field in table.name.split(".")[1:]:
+            value = value.flat[0][field]
+        if value.ndim == 2 and table.width is None:
+            value = value.reshape(-1)
+        if len(value.reshape(-1)) < table.rows:
+            raise LogFormatError(self._path, f"has {value.size} of {table.rows} numbers.", column=table.name)
+        return value
+
+    def close(self) -> None:
+        """See `Reader`."""
+
+
+def _kind(value: Any) -> str:
+    kinds = {"MatlabObject": "object", "MatlabOpaque": "object", "MatlabFunction": "function handle"}
+    if type(value).__name__ in kinds:
+        return kinds[type(value).__name__]
+    array = np.asarray(value)
+    return "struct array" if array.dtype.names else "cell array" if array.dtype == object else "char array"

@@ -1,0 +1,38 @@
+"""MATLAB files of version 7.3, by h5py; objects are refused, never built."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from crossbody.hw.formats._hdf import SIGNATURE, HdfReader
+
+SUFFIXES = (".mat",)
+NUMBERS = {b"double", b"single", b"logical", *(f"{s}int{n}".encode() for s in ("", "u") for n in (8, 16, 32, 64))}
+
+
+class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Nothing to choose."""
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether the file begins as MAT v7.3 does: MATLAB's text, then HDF5."""
+    return head.startswith(b"MATLAB 7.3 MAT-file") and head[512:520] == SIGNATURE
+
+
+def open_log(path: Path, options: Options) -> MatReader:
+    """Open a MAT v7.3 file; columns are named as in MATLAB, `s.angle[0]`."""
+    return MatReader(path, "MAT v7.3 file", ".")
+
+
+class MatReader(HdfReader):
+    """HDF5 that tells the MATLAB class of every dataset."""
+
+    def why_not(self, item: Any) -> str:
+        """Why a variable is no column of numbers; empty if it may be one."""
+        kind = item.attrs.get("MATLAB_class", b"double")
+        if kind not in NUMBERS or "MATLAB_object_decode" in item.attrs:
+            return f"is a MATLAB {bytes(kind).decode('utf-8', 'replace')}: save plain arrays or structs instead"
+        return "holds nothing" if "MATLAB_empty" in item.attrs else super().why_not(item)

@@ -1,0 +1,116 @@
+"""ASAM MDF 4 (and 3) measurement files, by asammdf."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats._contract import Block, Column, Group
+from crossbody.hw.formats._grouping import spans
+from crossbody.hw.formats._guard import library, parsing
+
+SUFFIXES = (".mf4", ".mdf", ".dat")
+WHAT = "MDF file"
+
+
+class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Nothing to choose."""
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether the file begins as MDF does."""
+    return head.startswith((b"MDF     ", b"UnFinMF "))
+
+
+def open_log(path: Path, options: Options) -> MdfReader:
+    """Open an MDF file; a name that several groups use is preceded by the group's index, `1/speed`."""
+    with path.open("rb") as file:
+        if file.read(8) == b"UnFinMF ":
+            raise LogFormatError(
+                path, "was never closed by its recorder (unfinalised MDF): let the recorder repair it."
+            )
+    return MdfReader(path)
+
+
+class MdfReader:
+    """Numeric channels, in blocks of rows."""
+
+    def __init__(self, path: Path) -> None:
+        from asammdf import MDF
+
+        self._path = path
+        self.library = library("asammdf")
+        self.refused: dict[str, str] = {}
+        self._place: dict[str, tuple[int, int]] = {}
+        with parsing(path, WHAT):
+            self._file = MDF(path, raise_on_multiple_occurrences=False)
+        try:
+            with parsing(path, WHAT):
+                self.groups = tuple(g for i in range(len(self._file.groups)) if (g := self._group(i)).columns)
+        except BaseException:
+            self.close()
+            raise
+
+    def _group(self, index: int) -> Group:
+        group = self._file.groups[index]
+        rows = int(group.channel_group.cycles_nr)
+        self._check_size(group, rows, index)
+        columns = [self._column(index, i, channel, rows) for i, channel in enumerate(group.channels)]
+        return Group(name=f"{index}", rows=rows, columns=tuple(c for c in columns if c is not None))
+
+    def _check_size(self, group: Any, rows: int, index: int) -> None:
+        """A cut file announces more rows than its blocks can hold."""
+        stored = sum(block.original_size for block in group.get_data_blocks())
+        width = int(group.channel_group.samples_byte_nr)
+        if rows and width and stored < rows * width:
+            raise LogFormatError(
+                self._path,
+                f"announces {rows} rows in group {index} and holds {stored // width}: cut off?",
+                stored // width,
+            )
+
+    def _column(self, index: int, i: int, channel: Any, rows: int) -> Column | None:
+        once = len(self._file.channels_db.get(channel.name, ())) <= 1
+        name = channel.name if once else f"{index}/{channel.name}"
+        self._place[name] = index, i
+        if not rows:
+            return None
+        try:
+            sample = self._get(name, 0, 1)
+        except Exception as error:  # asammdf raises anything at a damaged channel; the others may be whole
+            self.refused[name] = f"cannot be decoded ({error})"
+            return None
+        if sample.ndim != 1 or sample.dtype.kind not in "fiub":
+            self.refused[name] = f"holds {sample.dtype}, not numbers"
+            return None
+        return Column(name=name, type=sample.dtype.name, unit=channel.unit or "")
+
+    def _get(self, name: str, start: int, stop: int) -> NDArray[Any]:
+        group, index = self._place[name]
+        values, invalid = self._file.get(
+            group=group, index=index, samples_only=True, record_offset=start, record_count=stop - start
+        )
+        found = np.asarray(values)
+        return np.where(invalid, np.nan, found) if invalid is not None and np.any(invalid) else found
+
+    def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
+        """See `Reader`. A channel that the file marks invalid is NaN."""
+        for start, stop in spans(group.rows or 0):
+            block: Block = {}
+            for name in columns:
+                with parsing(self._path, WHAT, start, name):
+                    block[name] = self._get(name, start, stop)
+                if len(block[name]) != stop - start:
+                    at = start + len(block[name])
+                    raise LogFormatError(self._path, f"ends before its {group.rows} rows: cut off?", at, name)
+            yield block
+
+    def close(self) -> None:
+        """See `Reader`."""
+        self._file.close()
