@@ -7,18 +7,13 @@ from collections.abc import Iterator, Mapping
 
 from crossbody.cases import _maze_closed_forms as cf
 from crossbody.cases._case import Claim, Tier, Value
-from crossbody.cases._maze_geometry import Maze
+from crossbody.cases._maze_geometry import Maze, tilted_gravity
 
 
 def claims(variant: str, p: Mapping[str, Value], maze: Maze) -> tuple[Claim, ...]:
     """What holds for the parameters of a variant."""
     made = {"inside": _swing, "free": _swing, "outside": _leave, "solve": _solved}
     return tuple(made[variant](p, maze)) if variant in made else ()
-
-
-def tilted_gravity(p: Mapping[str, Value]) -> float:
-    """Gravity in the plane of the maze, m/s^2."""
-    return float(p["gravity"]) * math.sin(math.radians(float(p["tip"])))
 
 
 def _effective_mass(p: Mapping[str, Value], R: float) -> float:

@@ -194,7 +194,29 @@ def _check_passages(maze: Maze) -> None:
             )
 
 
-def spacing(maze: Maze) -> tuple[float, ...]:
+def start(maze: Maze, p: Mapping[str, Value]) -> tuple[float, float]:
+    """Ball centre on the face where it starts, m.
+
+    Raises:
+        InvalidValue: if there is no such ring.
+    """
+    i, angle = int(p["ring"]), float(p["angle"])
+    if i >= len(maze.rings):
+        raise InvalidValue(f"ball_maze: ring is {i}; valid: 0 to {len(maze.rings) - 1}.")
+    ring = maze.rings[i]
+    if p["side"] == "outer":
+        rho = ring.outer + maze.ball
+        return rho * math.sin(angle), rho * math.cos(angle)
+    rho = ring.inner - maze.ball
+    return rho * math.sin(angle), -rho * math.cos(angle)
+
+
+def tilted_gravity(p: Mapping[str, Value]) -> float:
+    """Gravity in the plane of the maze, m/s^2."""
+    return float(p["gravity"]) * math.sin(math.radians(float(p["tip"])))
+
+
+def clearances(maze: Maze) -> tuple[float, ...]:
     """Radial clearance of the ball in every channel between rings, m."""
     radii = [(ring.inner, ring.outer) for ring in maze.rings] + [(maze.wall, maze.wall)]
     return tuple(b[0] - a[1] - 2.0 * maze.ball for a, b in pairwise(radii))

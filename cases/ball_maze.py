@@ -22,7 +22,6 @@ import numpy as np
 
 from crossbody.cases import _maze_geometry as geometry
 from crossbody.cases._case import Case, Coordinate, Law, Parameter, Value
-from crossbody.cases._errors import InvalidValue
 from crossbody.cases._maze_claims import claims
 from crossbody.cases._maze_limits import limits
 
@@ -59,7 +58,7 @@ PARAMETERS = {
     "noise_speed": Parameter(default=0.0, unit="m/s", doc="deviation of the readings of x' and y'", low=0.0),
     "seed": Parameter(default=0, doc="of the noise", low=0, high=2**31),
     "ring": Parameter(default=3, doc="ring on whose face the ball starts", low=0, high=1e4),
-    "side": Parameter(default="outer", doc="start on top of the ring, or inside at the bottom", choices=("outer", "inner")),
+    "side": Parameter(default="outer", doc="on top of the ring, or inside at the bottom", choices=("outer", "inner")),
     "angle": Parameter(default=0.0, unit="rad", doc="start from there towards +x"),
     "theta": Parameter(default=0.0, unit="rad", doc="angle of the maze at the start"),
     "t_end": _positive(75.0, "s", "horizon"),
@@ -94,28 +93,11 @@ DISCRETE = ("channel", "sector below", "sector above", "controller")
 _COORDINATES = (("maze", "rad"), ("x", "m"), ("y", "m"), ("ball", "rad"))
 
 
-def start(maze: geometry.Maze, p: Mapping[str, Value]) -> tuple[float, float]:
-    """Ball centre on the face where it starts, m.
-
-    Raises:
-        InvalidValue: if there is no such ring.
-    """
-    i, angle = int(p["ring"]), float(p["angle"])
-    if i >= len(maze.rings):
-        raise InvalidValue(f"ball_maze: ring is {i}; valid: 0 to {len(maze.rings) - 1}.")
-    ring = maze.rings[i]
-    if p["side"] == "outer":
-        rho = ring.outer + maze.ball
-        return rho * math.sin(angle), rho * math.cos(angle)
-    rho = ring.inner - maze.ball
-    return rho * math.sin(angle), -rho * math.cos(angle)
-
-
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene at rest on a face."""
     p = parameters
     maze = geometry.maze_of(p)
-    x, y = start(maze, p)
+    x, y = geometry.start(maze, p)
     slip = 2 if p["rolling"] else 0
     rows = NORMAL + slip
     return Case(
