@@ -14,12 +14,12 @@ from functools import cached_property
 from itertools import islice, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from crossbody.cases._arrays import Bytes, Floats
 from crossbody.cases._linear_arc import LinearArc
 from crossbody.cases._outcome import Outcome
+from crossbody.cases._pieces import pieces
 from crossbody.cases._trajectory import Event, Ledger, Mode, Trajectory
 
 MAX_ARCS = 20_000
@@ -166,7 +166,7 @@ class Motion:
         An instant of an event that is asked for twice stands before and after it.
         """
         t = np.asarray(t, dtype=np.float64)
-        piece = self._pieces(t)
+        piece = pieces(self._starts, t)
         h, v, lam = np.empty_like(t), np.empty_like(t), np.zeros_like(t)
         for i in np.unique(piece):
             arc, on = self.arcs[i], piece == i
@@ -174,13 +174,6 @@ class Motion:
             if arc.closed:
                 lam[on] = self.ball.mass * (self.ball.gravity - self.ball.a1 * v[on] - self.ball.a0 * h[on])
         return self._trajectory(t, h, v, lam, np.array([self.arcs[i].mode for i in piece], dtype=np.int8))
-
-    def _pieces(self, t: Floats) -> NDArray[np.intp]:
-        """Index of the arc of each time: at an event the arc before, and after it if the time stands there again."""
-        again = np.concatenate(([False], t[1:] == t[:-1]))
-        before = np.searchsorted(self._starts, t, side="left") - 1
-        after = np.searchsorted(self._starts, t, side="right") - 1
-        return np.clip(np.where(again, after, before), 0, None)
 
     def _trajectory(self, t: Floats, h: Floats, v: Floats, lam: Floats, mode: Bytes) -> Trajectory:
         m, first = self.ball.mass, self.arcs[0]

@@ -79,7 +79,7 @@ def pushes(G: Floats, b: Floats) -> Floats:
     If not all push, the set that does is found by non-negative least squares on the Cholesky factor, in finitely many
     steps.
     """
-    x = np.linalg.solve(G, -b)
+    x: Floats = np.asarray(np.linalg.solve(G, -b), dtype=np.float64)
     if x.min() >= 0.0:
         return x
     R = cholesky(G)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._align import aligned
 
 if TYPE_CHECKING:
@@ -14,12 +15,22 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+STILL = 1e-9
+"""A coordinate that moves less than this part of its like rests."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over samples and coordinates of |q - q_truth| / max |q_truth|."""
+    """Max over samples and coordinates of |q - q_truth| / max |q_truth|; None where nothing moves."""
     inside, exact = aligned(truth, run)
-    scale = np.max(np.abs(truth.trajectory.q), axis=0)
+    scale = _scale(truth.trajectory, case)
     if not inside.any() or not scale.all():
         return None
     return float(np.max(np.abs(run.q[inside] - exact.q) / scale))
+
+
+def _scale(exact: Trajectory, case: Case) -> Floats:
+    """Largest |q_truth| of each coordinate (n,); of all that share its unit, for one that rests but for rounding."""
+    own: Floats = np.max(np.abs(exact.q), axis=0)
+    units = np.array([coordinate.unit for coordinate in case.coordinates])
+    shared = np.array([own[units == unit].max() for unit in units])
+    return np.where(own > STILL * shared, own, shared)
