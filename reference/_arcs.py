@@ -18,6 +18,7 @@ from sksundae.cvode import CVODE
 from sksundae.ida import IDA
 
 from crossbody.cases import Outcome
+from crossbody.reference._discrete import Discrete
 from crossbody.reference._equations import Ended, Equations
 from crossbody.reference._kinds import Floats
 from crossbody.reference._level_machine import LevelMachine, View, Watch
@@ -44,11 +45,20 @@ class State:
 
 
 @dataclass(slots=True)
+class Fired:
+    """What a root call located: (row, function) of the machine, and guards of the mechanism."""
+
+    rows: list[tuple[int, Watch]]
+    guards: list[int]
+
+
+@dataclass(slots=True)
 class Scene:
     """What all arcs of a run share."""
 
     equations: Equations
     machine: LevelMachine
+    discrete: Discrete
     options: Options
     nz: int
     scale: float
@@ -86,7 +96,8 @@ class Arc:
             "max_num_steps": CHUNK,
             "max_step": longest if np.isfinite(longest) else 0.0,
         }
-        self.watched = len(Watch) * len(scene.machine.rows)
+        self.of_rows = len(Watch) * len(scene.machine.rows)
+        self.watched = self.of_rows + scene.discrete.guards
         self.solver = self._begin(start, view)
 
     def _begin(self, start: State, view: View) -> Any:
@@ -114,7 +125,8 @@ class Arc:
         self.q[:], self.v[:] = y[:n], y[n : 2 * n]
         _, lam = scene.equations.accelerate(t, self.q, self.v)
         self._known = t, lam
-        scene.machine.guards(t, self.q, self.v, lam, out)
+        scene.machine.guards(t, self.q, self.v, lam, out[: self.of_rows])
+        scene.discrete.watch(t, self.q, self.v, out[self.of_rows :])
 
     def multipliers(self, s: State) -> Floats:
         """Lam at a state that `step` returned: the solver's own, or that of the last look at the guards."""
@@ -135,11 +147,11 @@ class Arc:
         share = SHARE * self.options.tolerance
         return np.concatenate([np.full(2 * self.n, share), np.full(self.scene.nz, share * self.scene.scale)])
 
-    def step(self, target: float, stop: float, natural: bool) -> tuple[State, list[tuple[int, Watch]]]:
+    def step(self, target: float, stop: float, natural: bool) -> tuple[State, Fired]:
         """Go on by one step of the solver's own, or to `target`; never beyond `stop`.
 
         Returns:
-            The state, and (row, function) of what fired there.
+            The state, and what fired there.
 
         Raises:
             Ended: with the outcome if the solver gives up.
@@ -150,8 +162,12 @@ class Arc:
         if not np.isfinite(done.y).all():
             raise Ended(Outcome.NOT_FINITE)
         fired = np.flatnonzero(done.i_events[-1]).tolist() if done.status == ROOT else []
-        rows = self.scene.machine.rows
-        return self._state(float(done.t), done.y), [(rows[j // len(Watch)], Watch(j % len(Watch))) for j in fired]
+        return self._state(float(done.t), done.y), self._fired(fired)
+
+    def _fired(self, places: list[int]) -> Fired:
+        rows, own = self.scene.machine.rows, self.of_rows
+        pairs = [(rows[j // len(Watch)], Watch(j % len(Watch))) for j in places if j < own]
+        return Fired(pairs, [j - own for j in places if j >= own])
 
 
 class CvodeArc(Arc):

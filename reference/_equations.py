@@ -9,7 +9,8 @@ pivoting.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite
 
 import numpy as np
@@ -185,14 +186,50 @@ class Equations:
         Raises:
             Ended: ILL_POSED if these rows are dependent.
         """
-        active = self.active
-        self.active, self._index[: len(rows)] = rows, rows
-        try:
+        with self._selected(rows):
             for _ in range(PROJECTIONS):
                 q -= self._least(q, v, lambda H, h: h)
             v -= self._least(q, v, lambda H, h: H @ v)
+
+    @contextmanager
+    def _selected(self, rows: list[int]) -> Iterator[None]:
+        """Let `rows` give these rows, whatever is active."""
+        active = self.active
+        self.active, self._index[: len(rows)] = rows, rows
+        self._H[:] = 0.0
+        try:
+            yield
         finally:
             self.active, self._index[: len(active)] = active, active
+            self._H[:] = 0.0
+
+    def mobility(self, t: float, q: Floats, v: Floats, rows: list[int]) -> tuple[Floats, Floats]:
+        """H (m, n) of the given rows, active or not, and M^-1 H^T (n, m).
+
+        Raises:
+            Ended: ILL_POSED if these rows are dependent.
+        """
+        with self._selected(rows):
+            M, _ = self.terms(t, q, v)
+            H = self.rows(t, q, v)[0].copy()
+            X = np.linalg.solve(M, H.T)
+            self._check_rank(H @ X)
+        return H, np.asarray(X, dtype=np.float64)
+
+    def row_acceleration(self, t: float, q: Floats, v: Floats, i: int) -> float:
+        """h_i'' under the active rows, m/s^2."""
+        vd, _ = self.accelerate(t, q, v)
+        with self._selected([i]):
+            H, _, Hdv = self.rows(t, q, v)
+            return float(H[0] @ vd + Hdv[0])
+
+    def strongest(self, t: float, q: Floats, v: Floats, rows: list[int]) -> float:
+        """Largest h_i'' of these rows that forces and motion alone may make, without cancellation, m/s^2."""
+        with self._selected(rows):
+            M, f = self.terms(t, q, v)
+            H, _, Hdv = self.rows(t, q, v)
+            sizes = np.abs(H) @ np.abs(np.linalg.solve(M, f)) + np.abs(Hdv)
+        return float(sizes[np.isfinite(sizes)].max(initial=0.0))
 
     def _least(self, q: Floats, v: Floats, error: Callable[[Floats, Floats], Floats]) -> Floats:
         """The smallest x with H x = error."""

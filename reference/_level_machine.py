@@ -56,6 +56,8 @@ class LevelMachine:
     Attributes:
         modes: of every row.
         events: transitions in order.
+        frozen: rows whose collisions take no time; none in this machine.
+        work (nc,): done by the impulses of every row so far, J.
     """
 
     def __init__(self, system: System, equations: Equations) -> None:
@@ -65,6 +67,8 @@ class LevelMachine:
         self.rows = [i for i in range(system.nc) if self.switching[i] and self.follows[i] < 0]
         self.modes: list[Mode] = [Mode(mode) for mode in initial_modes(system).tolist()]
         self.events: list[Event] = []
+        self.frozen: frozenset[int] = frozenset()
+        self.work = np.zeros(system.nc)
         self.fastest = 0.0
         self._instant = -np.inf
         self._seen: set[tuple[int, ...]] = set()
@@ -79,6 +83,14 @@ class LevelMachine:
 
     def _active_mode(self, i: int) -> Mode:
         return Mode.COLLISION if self.equations.fast[i, 0] > 0.0 else Mode.CONTACT
+
+    def _touches(self, i: int, h: float, q: Floats) -> bool:
+        """Whether gap i is closed."""
+        return h <= 0.0
+
+    def _approaches(self, i: int, rate: float) -> bool:
+        """Whether gap i closes."""
+        return rate < -self.slow
 
     def _activate(self, modes: list[Mode]) -> None:
         for i, leader in enumerate(self.follows):
@@ -112,19 +124,25 @@ class LevelMachine:
         finally:
             self._activate(self.modes)
 
+    def _presses(self, i: int, h: float, t: float, q: Floats, v: Floats) -> bool:
+        """Whether row i would push if it were active now."""
+        lam, noise = self.pressure(i, t, q, v)
+        return lam > noise
+
     def _wanted(self, i: int, view: View, t: float, q: Floats, v: Floats) -> Mode:
         """Where row i belongs at this instant."""
         mode, h, rate = self.modes[i], float(view.gap[i]), float(view.rate[i])
-        closing = rate < -self.slow
+        closing = self._approaches(i, rate)
 
         def presses() -> bool:
-            lam, noise = self.pressure(i, t, q, v)
-            return lam > noise
+            return self._presses(i, h, t, q, v)
 
         if mode in ACTIVE:
             return self._released(i, h) if view.lam[i] < -view.noise[i] else mode
-        if h > 0.0:
+        if not self._touches(i, h, q) or (h > 0.0 and mode != Mode.FREE):
             return Mode.FREE
+        if closing and i in self.frozen:
+            return mode  # it collides
         if mode != Mode.FREE:
             return self._active_mode(i) if closing and presses() else mode
         if closing:
@@ -138,8 +156,8 @@ class LevelMachine:
             return Mode.FREE
         return Mode.COLLISION_SEPARATION if self.modes[i] == Mode.COLLISION else Mode.BALLISTIC
 
-    def _switch(self, t: float, i: int, after: Mode) -> None:
-        self.events.append(Event(t=t, contact=i, before=self.modes[i], after=after))
+    def _switch(self, t: float, i: int, after: Mode, impulse: float = 0.0) -> None:
+        self.events.append(Event(t=t, contact=i, before=self.modes[i], after=after, impulse=impulse))
         self.modes[i] = after
 
     def _repeats(self, t: float) -> bool:
@@ -153,11 +171,17 @@ class LevelMachine:
         return known
 
     def settle(self, t: float, q: Floats, v: Floats) -> View:
-        """Switch until nothing changes: all rows together, and one at a time once a mode set has repeated.
+        """Switch until nothing changes; only frozen collisions change v, in place.
 
         Raises:
             Ended: MODE_CYCLE naming the rows, or what the equations raise.
         """
+        view = self._switch_rows(t, q, v)
+        self._arm(view, q)
+        return view
+
+    def _switch_rows(self, t: float, q: Floats, v: Floats) -> View:
+        """All rows together, and one at a time once a mode set has repeated."""
         changed: set[int] = set()
         self._repeats(t)
         while True:
@@ -172,7 +196,6 @@ class LevelMachine:
                     if self._one_by_one:
                         break
             if count == 0:
-                self._arm(view)
                 return view
             if self._repeats(t):
                 if self._one_by_one:
@@ -196,9 +219,15 @@ class LevelMachine:
                 self._switch(t, i, self._active_mode(i) if mode == Mode.FREE else Mode.FREE)
         return len(self.events) > before
 
-    def _arm(self, view: View) -> None:
+    def move(self, t: float, modes: list[Mode]) -> None:
+        """Take over the modes that the mechanism's `switch` wants."""
+        for i, after in enumerate(modes):
+            if after != self.modes[i] and i in self.rows:
+                self._switch(t, i, after)
+
+    def _arm(self, view: View, q: Floats) -> None:
         """Lift every guard that starts at or below zero to just above: it has fired already, or is round-off."""
-        self._inside = {i for i in self.rows if view.gap[i] <= 0.0}
+        self._inside = {i for i in self.rows if self._touches(i, float(view.gap[i]), q)}
         self._shift = [0.0] * (len(Watch) * len(self.rows))
         for j, i in enumerate(self.rows):
             start = view.lam[i] if self.modes[i] in ACTIVE else view.gap[i]
@@ -221,10 +250,11 @@ class LevelMachine:
                     out[at + Watch.OTHER] = elastic - SPENT * max(inertial, 0.0)
             elif mode == Mode.FREE:
                 out[at] = max(h, hd + self.slow) if i in self._inside else h
-                out[at + Watch.TURN] = -hd
+                out[at + Watch.TURN] = (self.slow if i in self.frozen else 0.0) - hd
             else:
                 closing = hd + self.slow
                 out[at], out[at + Watch.TURN] = -h, hd
-                out[at + Watch.OTHER] = closing if closing > 0.0 else max(closing, -self.pressure(i, t, q, v)[0])
+                catches = closing <= 0.0 and i not in self.frozen
+                out[at + Watch.OTHER] = max(closing, -self.pressure(i, t, q, v)[0]) if catches else closing
         out += self._shift
         out[out == 0.0] = TINY

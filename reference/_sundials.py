@@ -14,8 +14,10 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
-from crossbody.reference._arcs import Arc, BdfArc, CvodeArc, IdaArc, Scene, State
+from crossbody.reference._arcs import Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
+from crossbody.reference._discrete import START, TOUCHED, Discrete
 from crossbody.reference._equations import ULP, Ended, Equations
+from crossbody.reference._frozen_machine import FrozenMachine
 from crossbody.reference._kinds import Floats
 from crossbody.reference._level_machine import LevelMachine, View
 from crossbody.reference._options import Options
@@ -24,6 +26,7 @@ from crossbody.reference._system import System
 
 FAR = 1e30
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
+ROUNDS = 100  # of rows and discrete variables that switch each other at one instant
 STILL = 200  # steps in a row, each within rounding of the time
 ON_THE_MANIFOLD = 1e-6
 
@@ -64,15 +67,21 @@ class SundialsRun:
     def start(self) -> None:
         """Back to the beginning."""
         e = self.equations = Equations(self.system, rigid=bool(self.rigid))
-        self.machine = LevelMachine(self.system, e)
+        self.machine = self._machine(e)
+        self.discrete = Discrete(self.system, e)
         nz = self.system.nc + 2 if self.options.ledger else 0
         energy = np.abs(np.nan_to_num(e.energy(self.q0, self.v0))).sum()
-        self.scene = Scene(e, self.machine, self.options, nz, max(float(energy), 1.0))
+        self.scene = Scene(e, self.machine, self.discrete, self.options, nz, max(float(energy), 1.0))
         self.state = State(0.0, self.q0.copy(), self.v0.copy(), np.zeros(nz))
         self.rows: list[tuple[float, Floats, Floats, Floats, Floats, Floats, list[int], Floats]] = []
         self.next_sample = self.next_input = self.next_tick = 0
         self.retries = self.still = 0
         self.ended_rows: list[int] = []
+        self.told = 0  # events of which the mechanism's `switch` knows
+
+    def _machine(self, e: Equations) -> LevelMachine:
+        rule = self.options.collisions
+        return LevelMachine(self.system, e) if rule == "resolved" else FrozenMachine(self.system, e, rule)
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
@@ -91,6 +100,7 @@ class SundialsRun:
     def _drive(self, began: float, progress: Callable[[float], None] | None) -> None:
         t_end = self.options.t_end
         stop = self._take_inputs()
+        self._discretely(START)
         view = self._settle()
         self._sample(view.lam)
         arc = self._arc(view)
@@ -122,14 +132,38 @@ class SundialsRun:
 
         IDA cannot start off the manifold of rigid rows: the drift of the arc before is taken away first.
         """
-        s = self.state
+        s, work = self.state, self.machine.work.copy()
+        s.q, s.v = s.q.copy(), s.v.copy()
         if self.rigid:
-            s.q, s.v = s.q.copy(), s.v.copy()
             self.equations.project(s.q, s.v, self.rigid)
-        view = self.machine.settle(s.t, s.q, s.v)
+        view = self._settle_both()
+        if self.scene.nz:
+            s.z = s.z.copy()
+            s.z[: self.system.nc] += self.machine.work - work
         if self.natural:
             self._record(view.lam)
         return view
+
+    def _settle_both(self) -> View:
+        """Settle the rows, and tell the mechanism's `switch` whenever some have switched, until nothing changes."""
+        s, events = self.state, self.machine.events
+        for _ in range(ROUNDS):
+            view = self.machine.settle(s.t, s.q, s.v)
+            if len(events) == self.told:
+                return view
+            self.told = len(events)
+            if not self._discretely(TOUCHED):
+                return view
+        raise Ended(Outcome.MODE_CYCLE, sorted({e.contact for e in events if e.t == s.t}))
+
+    def _discretely(self, fired: int) -> bool:
+        """Let the mechanism switch its discrete variables; whether it did."""
+        s, events = self.state, self.machine.events
+        changed, modes = self.discrete.switch(s.t, s.q, s.v, self.machine.modes, fired)
+        known = len(events)
+        self.machine.move(s.t, modes)
+        self.told += len(events) - known
+        return changed
 
     def _arc(self, view: View, cautious: bool = False) -> Arc:
         longest = self.options.max_step
@@ -160,7 +194,15 @@ class SundialsRun:
             self._record(lam)
         else:
             self._sample(lam)
-        return self.machine.fire(state.t, state.q, state.v, fired) if fired else False
+        return self._fire(fired)
+
+    def _fire(self, fired: Fired) -> bool:
+        """Apply what was located; whether the arc ends there."""
+        s = self.state
+        switched = self.machine.fire(s.t, s.q, s.v, fired.rows) if fired.rows else False
+        for guard in fired.guards:
+            self._discretely(guard)
+        return switched or bool(fired.guards)
 
     def _check_progress(self, moved: bool) -> None:
         self.still = 0 if moved else self.still + 1
@@ -209,6 +251,7 @@ class SundialsRun:
         modes = mode.astype(np.int8)
         return Trajectory(
             t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, events=tuple(self.machine.events),
+            switches=tuple(self.discrete.switches),
             outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
             counts=MappingProxyType({"rhs": self.equations.evaluations}),
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
