@@ -17,6 +17,8 @@ DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
 FINER_STEP = 4.0
 FINEST_TOLERANCE = 1e-12
+REFINED_S = 20.0
+"""Time that a refinement may take, s: an integrator that grinds to a halt at 1e-12 has none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,6 +169,8 @@ def _refined(case: Case, pick: Pick, settings: Mapping[str, Any]) -> Trajectory 
         finer = {"rtol": min(FINEST_TOLERANCE, float(settings["rtol"]))}
     else:
         return None
+    if "time_limit" in settings:
+        finer["time_limit"] = REFINED_S
     engine = engines.load(pick.engine)
     run = engine.prepare(case, pick.profile, **finer).run()
     return run if run.outcome.ok and math.isfinite(float(run.t[-1])) else None
