@@ -77,7 +77,7 @@ class Reference:
             return UNSUITED[case.mechanism, solver]
         if find_spec(f"{SYSTEMS}.{case.mechanism}") is None or not hasattr(_module(case.mechanism), "build"):
             return f"The reference has no equations of the mechanism {case.mechanism!r}."
-        if _rule(case) not in COLLISIONS:
+        if case.collisions not in COLLISIONS:
             return (
                 f"The reference has no rule {case.collisions!r} for several contacts; it has: {', '.join(COLLISIONS)}."
             )
@@ -118,11 +118,6 @@ def _module(mechanism: str) -> ModuleType:
     return import_module(f"{SYSTEMS}.{mechanism}")
 
 
-def _rule(case: Case) -> str:
-    """One contact that can switch collides with no other: every rule is the same."""
-    return case.collisions if int(np.sum(case.law.unilateral)) > 1 else "resolved"
-
-
 def _known(solver: str) -> dict[str, Parameter]:
     low, high = TOLERANCES
     known = {
@@ -152,7 +147,7 @@ def _options(case: Case, solver: str, used: Mapping[str, Any]) -> Options:
     if given["fsm"] == OF_THE_CASE:
         given["fsm"] = case.fsm
     given["inputs"] = None if case.inputs is None else (case.inputs.times, case.inputs.values)
-    return Options(t_end=case.t_end, solver=solver, collisions=_rule(case), **given)
+    return Options(t_end=case.t_end, solver=solver, collisions=case.collisions, **given)
 
 
 def _provenance(used: Mapping[str, Any], options: Options) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 
 FSMS = ("level", "edge", "memoryless")
-COLLISIONS = ("resolved",)
+COLLISIONS = ("sequential", "simultaneous", "resolved")
 SOLVERS = ("compiled", "ida", "cvode")
 TOLERANCES = (1e-14, 1e-1)
 ATOL_PART = 1e-3  # default absolute tolerance in units of rtol: gaps are small against heights
@@ -30,7 +30,8 @@ class Options:
         rtol: relative tolerance in [1e-14, 0.1].
         atol: absolute tolerance; rtol/1000 if not given.
         fsm: "level", "edge" or "memoryless" (spec 1.2).
-        collisions: rule for several contacts at once.
+        collisions: how rows with fast constants collide: at one instant, "sequential" or "simultaneous", or
+            "resolved" in real time (spec 1.2). Rows with one set of constants are always resolved.
         solver: "compiled", "ida" or "cvode".
         samples: times of the rows; None for every step and both sides of every event.
         inputs: (times, values) held from each time on; None for zero.
@@ -47,7 +48,7 @@ class Options:
     rtol: float = 1e-9
     atol: float | None = None
     fsm: str = "level"
-    collisions: str = "resolved"
+    collisions: str = "sequential"
     solver: str = "compiled"
     samples: ArrayLike | None = None
     inputs: tuple[ArrayLike, ArrayLike] | None = None

@@ -32,13 +32,15 @@ def program() -> Any:
 def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """The program with one system's kernels built in.
 
-    Handing seven functions over from Python costs more than a short run; an entry names them as constants. It is worth
+    Handing nine functions over from Python costs more than a short run; an entry names them as constants. It is worth
     its compilation for runs that are repeated.
     """
     advance = program()
-    dynamics, gaps, rows, energy, power, solve, control = functions
+    dynamics, gaps, rows, energy, power, solve, control, watch, switch = functions
 
     def call(state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
-        return advance(dynamics, gaps, rows, energy, power, solve, control, state, model, work, buffers, budget)
+        return advance(
+            dynamics, gaps, rows, energy, power, solve, control, watch, switch, state, model, work, buffers, budget
+        )
 
     return numba.njit([types.int64(_state(), TABLE, TABLE, TABLE, types.int64)])(call)  # type: ignore[no-any-return]

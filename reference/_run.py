@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Event, Ledger, Mode, Outcome, Trajectory
+from crossbody.cases import Event, InvalidValue, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.reference._kinds import Floats
-from crossbody.reference._options import FSMS, Options
+from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
@@ -27,8 +27,25 @@ _OUTCOMES = {
     layout.ILL_POSED: Outcome.ILL_POSED,
     layout.MODE_CYCLE: Outcome.MODE_CYCLE,
     layout.DIVERGED: Outcome.DIVERGED,
+    layout.LOST: Outcome.LOST,
 }
-_COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations")
+_COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions")
+_EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
+
+
+def _frozen(system: System, options: Options) -> bool:
+    """Whether any row collides at one instant.
+
+    Raises:
+        InvalidValue: for frozen collisions under another machine than level.
+    """
+    frozen = options.collisions != "resolved" and bool(np.any(np.asarray(system.b0) > 0.0))
+    if frozen and options.fsm != "level":
+        raise InvalidValue(
+            f"collisions={options.collisions!r} needs fsm='level', not {options.fsm!r}: "
+            "the other machines know real time alone; use collisions='resolved'."
+        )
+    return frozen
 
 
 class CompiledRun:
@@ -46,7 +63,10 @@ class CompiledRun:
         samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)
         n, nc = system.n, system.nc
         self.nz = nc + 2 if options.ledger else 0
-        self.work = layout.workspace(n, nc, system.inputs, system.mass_block, self.nz, system.memory, system.scratch)
+        self.work = layout.workspace(
+            n, nc, system.inputs, system.mass_block, self.nz, system.memory, system.scratch, system.guards,
+            len(np.atleast_1d(system.discrete)),
+        )  # fmt: skip
         natural = options.samples is None
         rows, events = (ROWS if natural else len(samples) + 1), EVENTS + 16 * nc
         self.buffers: dict[str, NDArray[Any]] = {
@@ -54,6 +74,7 @@ class CompiledRun:
             "mode": np.zeros(nc, np.int8), "history": np.zeros((max(HISTORY, 4 * nc) + 1, nc), np.int8),
             "out": np.zeros((rows, 1 + 2 * n + 2 * nc + 2 + self.nz)), "modes": np.zeros((rows, nc), np.int8),
             "events_t": np.zeros(events), "events": np.zeros((events, 3), np.int64),
+            "impulses": np.zeros(events), "switches_t": np.zeros(EVENTS), "switches": np.zeros((EVENTS, 3), np.int64),
         }  # fmt: skip
         self.model = [np.array(getattr(system, name)) for name in layout.Model.__annotations__]
         self.tables = [table(self.model), table([*self.work.values()]), table([*self.buffers.values()])]
@@ -65,7 +86,9 @@ class CompiledRun:
         state = np.zeros(1, layout.STATE)
         values = {
             "n": system.n, "nc": system.nc, "nu": system.inputs, "k": system.mass_block, "nz": self.nz,
-            "fsm": FSMS.index(options.fsm),
+            "fsm": FSMS.index(options.fsm), "rule": COLLISIONS.index(options.collisions),
+            "frozen": _frozen(system, options), "has_switch": system.switch is not None,
+            "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "has_control": system.control is not None, "rtol": options.rtol,
@@ -79,6 +102,7 @@ class CompiledRun:
         """Back to the beginning."""
         self.state = self.template.copy()
         self.buffers["mode"][:] = initial_modes(self.system)
+        self.model[0][:] = self.system.p
         for name in ("u", "s", "z"):
             self.work[name][:] = 0.0
         self.work["y"][:] = self.start_state
@@ -124,7 +148,7 @@ class CompiledRun:
 
     def _grow(self, code: int) -> None:
         """Double the buffers that are full."""
-        full = {layout.ROWS_FULL: ("out", "modes"), layout.EVENTS_FULL: ("events_t", "events")}.get(code, ())
+        full = {layout.ROWS_FULL: ("out", "modes"), layout.EVENTS_FULL: _EVENT_BUFFERS}.get(code, ())
         for name in full:
             self.buffers[name] = np.concatenate([self.buffers[name], np.zeros_like(self.buffers[name])])
         if full:
@@ -139,7 +163,7 @@ class CompiledRun:
         t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
         return Trajectory(
             t=t[:, 0], q=q, v=v, gap=gap, lam=lam, energy=energy, mode=self.buffers["modes"][: len(rows)],
-            events=self._event_list(), outcome=outcome, message=self._message(outcome),
+            events=self._event_list(), switches=self._switch_list(), outcome=outcome, message=self._message(outcome),
             steps=int(state["steps"]), wall_s=wall_s,
             counts=MappingProxyType({name: int(state[name]) for name in _COUNTERS}),
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
@@ -149,11 +173,18 @@ class CompiledRun:
 
     def _event_list(self) -> tuple[Event, ...]:
         count = int(self.state["events"][0])
+        times, rows, impulses = (self.buffers[name][:count].tolist() for name in _EVENT_BUFFERS[:3])
         return tuple(
-            Event(t=t, contact=i, before=Mode(before), after=Mode(after))
-            for t, (i, before, after) in zip(
-                self.buffers["events_t"][:count].tolist(), self.buffers["events"][:count].tolist(), strict=True
-            )
+            Event(t=t, contact=i, before=Mode(before), after=Mode(after), impulse=impulse)
+            for t, (i, before, after), impulse in zip(times, rows, impulses, strict=True)
+        )
+
+    def _switch_list(self) -> tuple[Switch, ...]:
+        count = int(self.state["switches"][0])
+        times, changes = (self.buffers[name][:count].tolist() for name in _EVENT_BUFFERS[3:])
+        return tuple(
+            Switch(t=t, variable=i, before=before, after=after)
+            for t, (i, before, after) in zip(times, changes, strict=True)
         )
 
     def _message(self, outcome: Outcome) -> str:

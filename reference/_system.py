@@ -107,7 +107,7 @@ class System:
 
     @property
     def kernels(self) -> dict[str, Any]:
-        """The seven functions in the order of `kernels.NAMES`; what is absent is a stand-in."""
+        """The nine functions in the order of `kernels.NAMES`; what is absent is a stand-in."""
         return {name: getattr(self, name) or getattr(_none, name) for name in kernel_types.NAMES}
 
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:

@@ -63,16 +63,15 @@ def _signatures(scalar: Any) -> dict[str, Any]:
 
 
 _f, _fm = _vectors(types.float64)
-_MODES = types.int8[::1]
 REAL = {
     **_signatures(types.float64),
     "solve": types.int64(_T, _f, _f, _f, _f, _f, _fm, _IDX, types.int64, _f, _f, _f),
     "control": types.void(_T, _f, _f, _f, _f, _f),
+    "watch": types.void(_T, _f, _f, _f, _f),
+    "switch": types.int64(_T, _f, _f, _f, types.int8[::1], types.int64),
 }
 COMPLEX = _signatures(types.complex128)
 NAMES = tuple(REAL)
-REAL["watch"] = types.void(_T, _f, _f, _f, _f)
-REAL["switch"] = types.int64(_T, _f, _f, _f, _MODES, types.int64)
 
 
 def function_type(name: str) -> core_types.FunctionType:

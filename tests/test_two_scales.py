@@ -19,7 +19,7 @@ def _with(base, **changes):
 def test_a_row_without_fast_constants_keeps_its_own_while_the_row_it_follows_collides():
     # Three masses; the second row is a damper (a0 = 0) that lives while the first collides.
     system = _with(sliders(3), a0=[1.0, 0.0], a1=[1.0, 1000.0], b0=[1e4, 0.0], b1=[0.0, 0.0], follows=[-1, 0])
-    run = simulate(system, [0.0, 0.0, 0.5], [1.0, 0.0, -0.5], 0.02, rtol=1e-9)
+    run = simulate(system, [0.0, 0.0, 0.5], [1.0, 0.0, -0.5], 0.02, rtol=1e-9, collisions="resolved")
     assert run.events[0].after is Mode.COLLISION
     assert abs(run.v[-1, 2] - run.v[-1, 1]) < 0.5 * np.exp(-10.0)
 
@@ -30,7 +30,7 @@ def test_collision_hands_over_when_the_elastic_part_is_spent():
     system = wall_pendulum(0.9, a0=1.0, a1=2.0, b0=[0.0, 1e6], b1=[0.0, 2e3])
     start = [0.9, -np.cos(angle)], [1e-3, 1e-3 * np.tan(angle)]
     ours, independent = (
-        simulate(system, *start, 0.02, rtol=1e-10, solver=solver, inputs=([0.0], [[100.0]]))
+        simulate(system, *start, 0.02, rtol=1e-10, solver=solver, collisions="resolved", inputs=([0.0], [[100.0]]))
         for solver in ("compiled", "cvode")
     )
     assert [e.after for e in ours.events] == [e.after for e in independent.events]

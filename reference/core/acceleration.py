@@ -14,7 +14,7 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes, Floats
-from crossbody.reference.core.algebra import factor_mass, factor_schur, solve_mass, solve_schur, span
+from crossbody.reference.core.algebra import factor_mass, factor_schur, solve_mass, solve_schur
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 
 # numba compiles a function anew for every literal that it is called with; numpy's integers are values, not literals.
@@ -36,6 +36,29 @@ def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
             w.law[i, j] = m.beta[i, j] if fast else m.alpha[i, j]
 
 
+@inlined
+def clear(m: Model, w: Work, j: int) -> None:
+    """Zero row j of H, so that kernels need not write its zeros."""
+    i = w.idx[j]
+    for c in range(m.span[i, 0], m.span[i, 1]):
+        w.H[j, c] = 0.0
+
+
+@compiled
+def add_row(m: Model, w: Work, j: int, i: int) -> None:
+    """Put row i in place j, j rising from 0, and find where its band of the Schur complement begins."""
+    w.idx[j] = i
+    clear(m, w, j)
+    first, last = m.span[i, 0], m.span[i, 1]
+    w.reach[j] = j
+    b = j - 1
+    while b >= 0 and w.ends[b] > first:
+        if m.span[w.idx[b], 0] < last and m.span[w.idx[b], 1] > first:
+            w.reach[j] = b
+        b -= 1
+    w.ends[j] = max(last, w.ends[j - 1]) if j > 0 else last
+
+
 @compiled
 def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     """List the active rows and put their constants in force; a row that follows another shares its mode."""
@@ -44,10 +67,9 @@ def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
         if m.follows[i] >= 0:
             mode[i] = mode[m.follows[i]]
         if is_active(mode[i]):
-            w.idx[na] = i
+            add_row(m, w, na, i)
             na += 1
     laws_in_force(s, m, w, mode)
-    w.H[:na] = 0.0  # so that kernels need not write the zeros of H
     s.na = na
 
 
@@ -75,11 +97,11 @@ def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Arra
 
 
 @inlined
-def _rate_and_drive(s: Any, w: Work, j: int, v: Array, first: int, last: int) -> None:
+def _rate_and_drive(s: Any, m: Model, w: Work, j: int, v: Array) -> None:
     """Rate h' of active row j, and the right-hand side of its multiplier with the size of its terms."""
     i = w.idx[j]
     rate, push = 0.0, 0.0
-    for c in range(first, last):
+    for c in range(m.span[i, 0], m.span[i, 1]):
         rate += w.H[j, c] * v[c]
         push += w.H[j, c] * w.vd[c]
     h = w.ha[j]
@@ -90,22 +112,37 @@ def _rate_and_drive(s: Any, w: Work, j: int, v: Array, first: int, last: int) ->
 
 
 @inlined
-def assemble(rows: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
+    """Row j of M^-1 H^T and of G, as far as its band goes."""
+    first, last = m.span[w.idx[j], 0], m.span[w.idx[j], 1]
+    for c in range(first, last):
+        w.X[j, c] = w.H[j, c]
+    solve_mass(w.L, w.X[j], s.k, first, last)
+    for b in range(w.reach[j], j + 1):
+        total = 0.0
+        for c in range(max(first, m.span[w.idx[b], 0]), min(last, m.span[w.idx[b], 1])):
+            total += w.X[j, c] * w.H[b, c]
+        w.G[j, b] = total
+
+
+@compiled
+def assemble(rows: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array) -> int:
     """Evaluate the active rows and factor their Schur complement G = H M^-1 H^T."""
     na = s.na
-    rows(t, q, v, p, w.w, w.idx, na, w.H, w.ha, w.Hdv)
+    rows(t, q, v, m.p, w.w, w.idx, na, w.H, w.ha, w.Hdv)
     for j in range(na):
-        first, last = span(w.H[j], s.n, s.k)
-        _rate_and_drive(s, w, j, v, first, last)
-        for c in range(s.n):
-            w.X[j, c] = w.H[j, c]
-        solve_mass(w.L, w.X[j], s.k, first, last)
-        for b in range(j + 1):
-            total = 0.0
-            for c in range(first, last):
-                total += w.X[j, c] * w.H[b, c]
-            w.G[j, b] = total
-    return factor_schur(w.G, na)
+        _rate_and_drive(s, m, w, j, v)
+        _schur_row(s, m, w, j)
+    return factor_schur(w.G, na, w.reach)
+
+
+@inlined
+def push_rows(m: Model, w: Work, na: int, x: Array, factor: float, out: Array) -> None:
+    """Out += factor M^-1 H^T x."""
+    for j in range(na):
+        i = w.idx[j]
+        for c in range(m.span[i, 0], m.span[i, 1]):
+            out[c] += factor * w.X[j, c] * x[j]
 
 
 @inlined
@@ -153,11 +190,8 @@ def accelerate(
         return 1
     if na == 0:
         return 0
-    if assemble(rows, s, m.p, w, t, q, v) != 0:
+    if assemble(rows, s, m, w, t, q, v) != 0:
         return 1
-    solve_schur(w.G, na, w.r, w.la)
-    for j in range(na):
-        lam = w.la[j]
-        for c in range(s.n):
-            w.vd[c] += w.X[j, c] * lam
+    solve_schur(w.G, na, w.reach, w.r, w.la)
+    push_rows(m, w, na, w.la, 1.0, w.vd)
     return 0

@@ -8,9 +8,9 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Index
-from crossbody.reference.core import choice, dense, dop853, events, exact, machine, record, stepping
+from crossbody.reference.core import choice, dense, dop853, events, exact, journal, record, settle, stepping
 from crossbody.reference.core.acceleration import scatter
-from crossbody.reference.core.algebra import copy
+from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.layout import (
     DONE,
     EVENTS_FULL,
@@ -18,6 +18,7 @@ from crossbody.reference.core.layout import (
     EXPLICIT,
     ILL_POSED,
     IMPLICIT,
+    LOST,
     MODE_CYCLE,
     MORE,
     NODES,
@@ -30,6 +31,8 @@ from crossbody.reference.core.layout import (
     open_model,
     open_work,
 )
+from crossbody.reference.kernels import LOST as IS_LOST
+from crossbody.reference.kernels import START
 
 
 class Kernels(NamedTuple):
@@ -42,6 +45,8 @@ class Kernels(NamedTuple):
     power: Any
     solve: Any
     control: Any
+    watch: Any
+    switch: Any
 
 
 @inlined
@@ -65,9 +70,11 @@ def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
 @compiled
 def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Settle the modes at the present instant and choose how to go on."""
-    code = machine.settle(K, s, m, w, b.mode, b.history, b.events_t, b.events)
+    s.unsettled = 1
+    code = settle.settle(K, s, m, w, b)
     if code != 0:
         return int(code)
+    s.unsettled = 0
     s.method = EXPLICIT
     s.stalled, s.hold, s.full_jacobian = 0, 0, 0
     remembered = s.h_active if s.na > 0 else s.h_free
@@ -92,7 +99,7 @@ def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 @inlined
 def _land(K: Any, s: Any, m: Model, w: Work) -> None:
     """End the step where the first guard fired."""
-    dense.state(s, w, s.theta, w.y1)
+    dense.state(s, m, w, s.theta, w.y1)
     if s.ledger and s.method != EXACT:
         dense.ledger(s, w, s.theta, w.z1)
 
@@ -127,18 +134,24 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         scatter(s, w, w.lam0)
         record.here(K, s, m, w, b.mode, b.out, b.modes)
     K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
-    machine.remember(s, b.history, b.mode)
+    journal.remember(s, b)
+    moved = False
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
-            machine.write_event(s, b.events_t, b.events, i, b.mode[i], after)
-            b.mode[i] = after
-    if machine.remember(s, b.history, b.mode):
+            if after != b.mode[i]:
+                journal.move(s, b, i, after)
+                moved = True
+    if moved and journal.remember(s, b):
         if s.one_by_one:
             return MODE_CYCLE
         s.one_by_one, s.history = 1, 0
+    for i in range(s.ng):
+        if w.guard_hit[i] <= s.theta and settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
+            return LOST
     code = _restart(K, s, m, w, b)
-    record.here(K, s, m, w, b.mode, b.out, b.modes)
+    if code == 0:
+        record.here(K, s, m, w, b.mode, b.out, b.modes)
     return code
 
 
@@ -161,7 +174,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if events.scan(K, s, m, w, b.mode) != 0:
         return ILL_POSED
     fired = s.theta <= 1.0
-    at_stop = s.t_old + s.hs >= s.stop - 4.0 * machine.ULP * abs(s.stop)
+    at_stop = s.t_old + s.hs >= s.stop - 4.0 * ULP * abs(s.stop)
     t = s.t_old + s.theta * s.hs if fired else (s.stop if at_stop else s.t_old + s.hs)
     record.within_step(K, s, m, w, b.mode, b.samples, t, b.out, b.modes)
     if fired:
@@ -178,7 +191,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if at_stop and s.stop < s.t_end:
         _take_inputs(K, s, m, w, b)
         code = _resume(K, s, m, w, b)
-        record.here(K, s, m, w, b.mode, b.out, b.modes)
+        if code == 0:
+            record.here(K, s, m, w, b.mode, b.out, b.modes)
     return code
 
 
@@ -193,18 +207,35 @@ def _remember_step(s: Any, method: int) -> None:
 
 
 @inlined
+def _first_rows(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
+    """Write the start down, after everything has settled."""
+    record.here(K, s, m, w, b.mode, b.out, b.modes)
+    while s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:
+        record.write_row(K, s, m, w, b.mode, s.t, w.y, w.lam0, w.z, b.out, b.modes)
+        s.next_sample += 1
+
+
+@inlined
 def _begin_run(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.started = 1
     for i in range(s.nc):
         s.switching |= m.unilateral[i]
-    s.history_t = np.inf
+    s.history_t, s.collision_t = np.inf, np.inf
+    if s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST:
+        return LOST
     _take_inputs(K, s, m, w, b)
     code = _restart(K, s, m, w, b)
     if code == 0:
-        record.here(K, s, m, w, b.mode, b.out, b.modes)
-        while s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:
-            record.write_row(K, s, m, w, b.mode, s.t, w.y, w.lam0, w.z, b.out, b.modes)
-            s.next_sample += 1
+        _first_rows(K, s, m, w, b)
+    return code
+
+
+@inlined
+def _settle_again(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Go on with an instant that found no room for its events."""
+    code = _restart(K, s, m, w, b)
+    if code == 0:
+        _first_rows(K, s, m, w, b)
     return code
 
 
@@ -213,16 +244,16 @@ def _room(s: Any, b: Buffers) -> int:
     """Whether the next step finds room for all that it may write."""
     if s.natural and s.rows + record.ARC_POINTS + 4 > len(b.out):
         return ROWS_FULL
-    return EVENTS_FULL if s.events + 16 * s.nc + 16 > len(b.events_t) else DONE
+    return EVENTS_FULL if journal.full(s, b) else DONE
 
 
 def advance(
-    dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, solve: Any, control: Any,
+    dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, solve: Any, control: Any, watch: Any, switch: Any,
     state: Any, model: Index, work: Index, buffers: Index, budget: int,
 ) -> int:  # fmt: skip
     """Go on for at most `budget` steps.
 
-    The seven kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
+    The nine kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
     tables of the bundles in `layout`.
 
     Returns:
@@ -230,10 +261,14 @@ def advance(
         or a negative code for a numerical failure. All that is needed to go on is in the arguments.
     """
     s = state[0]
-    K = Kernels(dynamics, gaps, rows, energy, power, solve, control)
+    K = Kernels(dynamics, gaps, rows, energy, power, solve, control, watch, switch)
     m, w, b = open_model(model), open_work(work), open_buffers(buffers)
     if not s.started:
         code = _begin_run(K, s, m, w, b)
+        if code != 0:
+            return code
+    elif s.unsettled:
+        code = _settle_again(K, s, m, w, b)
         if code != 0:
             return code
     for _ in range(budget):

@@ -10,6 +10,7 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Floats, Index
 
+ULP = 2.3e-16
 RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
 
 
@@ -54,25 +55,16 @@ def solve_mass(L: Floats, x: Array, k: int, first: int, last: int) -> None:
             x[b + i] = total / L[b + i, i]
 
 
-@inlined
-def span(H: Array, n: int, k: int) -> tuple[int, int]:
-    """First coordinate of the first block and end of the last block in which a row of H is not zero."""
-    first = 0
-    while first < n and H[first] == 0.0:
-        first += 1
-    last = n
-    while last > first and H[last - 1] == 0.0:
-        last -= 1
-    return first - first % k, (last + k - 1) // k * k
-
-
 @compiled
-def factor_schur(G: Floats, na: int) -> int:
-    """Cholesky factor of the Schur complement in its lower triangle; 1 if it lost rank."""
+def factor_schur(G: Floats, na: int, reach: Index) -> int:
+    """Cholesky factor of the Schur complement in its lower triangle; 1 if it lost rank.
+
+    Row i begins at column reach[i]: what stands before is zero and stays zero, so a chain's factor is a band.
+    """
     for i in range(na):
-        for j in range(i + 1):
+        for j in range(reach[i], i + 1):
             total = G[i, j]
-            for m in range(j):
+            for m in range(max(reach[i], reach[j]), j):
                 total -= G[i, m] * G[j, m]
             if i == j:
                 if not total > RANK * G[i, i]:
@@ -84,27 +76,26 @@ def factor_schur(G: Floats, na: int) -> int:
 
 
 @compiled
-def solve_schur(G: Floats, na: int, r: Array, x: Array) -> None:
+def solve_schur(G: Floats, na: int, reach: Index, r: Array, x: Array) -> None:
     """X = G^-1 r from the factor of `factor_schur`."""
     for i in range(na):
         total = r[i]
-        for m in range(i):
+        for m in range(reach[i], i):
             total -= G[i, m] * x[m]
         x[i] = total / G[i, i]
     for i in range(na - 1, -1, -1):
-        total = x[i]
-        for m in range(i + 1, na):
-            total -= G[m, i] * x[m]
-        x[i] = total / G[i, i]
+        x[i] /= G[i, i]
+        for m in range(reach[i], i):
+            x[m] -= G[i, m] * x[i]
 
 
 @compiled
-def inverse_diagonal(G: Floats, na: int, i: int, x: Array) -> float:
+def inverse_diagonal(G: Floats, na: int, reach: Index, i: int, x: Array) -> float:
     """(G^-1)_ii from the factor of `factor_schur`; x is scratch."""
     total = 0.0
     for j in range(i, na):
         part = 1.0 if j == i else 0.0
-        for m in range(i, j):
+        for m in range(max(i, reach[j]), j):
             part -= G[j, m] * x[m]
         x[j] = part / G[j, j]
         total += x[j] * x[j]

@@ -45,7 +45,7 @@ def _error(s: Any, w: Work, h: float) -> float:
 @compiled
 def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     """From y and k[0] to y1 and k[3] = f(y1); the error in units of the tolerance, -1 if a stage is ill posed."""
-    begin_watch(s, w)
+    begin_watch(K, s, m, w)
     for stage in range(1, STAGES):
         _advance(w.y, w.k, stage, h, w.ys)
         if derivative(K, s, m, w, s.t + _C[stage] * h, w.ys, stage) != 0:

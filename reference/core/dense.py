@@ -38,10 +38,10 @@ def _quintic(n: int, end_stage: int, w: Work, theta: float, h: float, out: Array
 
 
 @compiled
-def state(s: Any, w: Work, theta: float, out: Array) -> None:
+def state(s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
     """Out = (q, v) at the part theta of the step."""
     if s.method == EXACT:
-        exact.evaluate(s, w, theta * s.hs, out)
+        exact.evaluate(s, m, w, theta * s.hs, out)
     elif theta == 1.0:
         for i in range(2 * s.n):
             out[i] = w.y1[i]

@@ -77,11 +77,24 @@ def _error(s: Any, w: Work, h: float) -> float:
 
 
 @inlined
-def begin_watch(s: Any, w: Work) -> None:
+def begin_watch(K: Any, s: Any, m: Model, w: Work) -> None:
     """Extremes of multipliers and gaps over the step, as far as its start tells."""
     for i in range(s.nc):
         w.lo[i] = w.hi[i] = w.lam0[i]
         w.gap_lo[i] = w.gap_hi[i] = w.gaps[0, i]
+    if s.ng > 0:
+        K.watch(s.t, w.y[: s.n], w.y[s.n :], m.p, w.guard)
+        for i in range(s.ng):
+            w.guard_lo[i] = w.guard_hi[i] = w.guard[i]
+
+
+@inlined
+def watch_guards(K: Any, s: Any, m: Model, w: Work, t: float) -> None:
+    """Take the discrete variables' guards at a stage into the extremes."""
+    K.watch(t, w.ys[: s.n], w.ys[s.n :], m.p, w.guard)
+    for i in range(s.ng):
+        w.guard_lo[i] = min(w.guard_lo[i], w.guard[i])
+        w.guard_hi[i] = max(w.guard_hi[i], w.guard[i])
 
 
 @inlined
@@ -106,15 +119,18 @@ def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float) -> None:
 @compiled
 def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     """From y and k[0] to y1; returns the error in units of the tolerance, -1 if a stage is ill posed."""
-    begin_watch(s, w)
+    begin_watch(K, s, m, w)
     for stage in range(1, STAGES):
         _combine(w.y, w.k, stage, h, w.ys)
         t = s.t + C[stage] * h
         if derivative(K, s, m, w, t, w.ys, stage) != 0:
             return -1.0
         watch_multipliers(s, w)
-        if s.na < s.nc and (stage == 4 or stage == 8 or stage == 10):
-            watch_gaps(K, s, m, w, t)
+        if stage == 4 or stage == 8 or stage == 10:
+            if s.na < s.nc:
+                watch_gaps(K, s, m, w, t)
+            if s.ng > 0:
+                watch_guards(K, s, m, w, t)
     _combine(w.y, w.k, STAGES, h, w.y1)
     if s.ledger:
         _combine(w.z, w.kz, STAGES, h, w.z1)

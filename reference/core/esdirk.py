@@ -14,9 +14,9 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
-from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, laws_in_force
+from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, laws_in_force, push_rows
 from crossbody.reference.core.algebra import factor_lu, solve_lu, solve_schur
-from crossbody.reference.core.dop853 import begin_watch, powers, watch_gaps, watch_multipliers
+from crossbody.reference.core.dop853 import begin_watch, powers, watch_gaps, watch_guards, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -47,26 +47,25 @@ def jacobian(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> int:
     if s.full_jacobian and _smooth_part(K, s, m, w, mode) != 0:
         return 1
     for j in range(s.na):
-        _row_part(s, w, j)
+        _row_part(s, m, w, j)
     s.have_jacobian = 1
     return _newton_matrix(s, w, h)
 
 
 @inlined
-def _row_part(s: Any, w: Work, j: int) -> None:
+def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
     """Subtract M^-1 H^T (G^-1)_.j (a0_j + 3 a2_j h_j^2, a1_j) H_j."""
     i = w.idx[j]
     w.r[: s.na] = 0.0
     w.r[j] = 1.0
-    solve_schur(w.G, s.na, w.r, w.la)
+    solve_schur(w.G, s.na, w.reach, w.r, w.la)
     spring = w.law[i, 0] + 3.0 * w.law[i, 2] * w.ha[j] ** 2
+    w.d[:] = 0.0
+    push_rows(m, w, s.na, w.la, 1.0, w.d)
     for a in range(s.n):
-        push = 0.0
-        for b in range(s.na):
-            push += w.X[b, a] * w.la[b]
-        for c in range(s.n):
-            w.Jq[a, c] -= push * spring * w.H[j, c]
-            w.Jv[a, c] -= push * w.law[i, 1] * w.H[j, c]
+        for c in range(m.span[i, 0], m.span[i, 1]):
+            w.Jq[a, c] -= w.d[a] * spring * w.H[j, c]
+            w.Jv[a, c] -= w.d[a] * w.law[i, 1] * w.H[j, c]
 
 
 @inlined
@@ -201,7 +200,7 @@ def step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> float:
             return -1.0
     elif s.jacobian_scale != h and _newton_matrix(s, w, h) != 0:
         return -1.0
-    begin_watch(s, w)
+    begin_watch(K, s, m, w)
     for stage in range(1, STAGES):
         code = _stage(K, s, m, w, stage, h)
         if code == 1:
@@ -213,6 +212,8 @@ def step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> float:
         watch_multipliers(s, w)
         if s.na < s.nc:
             watch_gaps(K, s, m, w, s.t + C[stage] * h)
+        if s.ng > 0:
+            watch_guards(K, s, m, w, s.t + C[stage] * h)
     w.y1[:] = w.ys
     for i in range(s.nz):
         w.z1[i] = w.z[i]

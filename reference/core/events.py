@@ -13,6 +13,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
+from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.guards import (
     CATCH,
     HANDOVER,
@@ -22,6 +23,7 @@ from crossbody.reference.core.guards import (
     RATE,
     RATE_DOWN,
     RELEASE,
+    SWITCH,
     TOUCH,
     TOUCH_INSIDE,
     guard,
@@ -40,7 +42,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.core.machine import ULP, active_mode, released_mode, slow
+from crossbody.reference.core.machine import active_mode, released_mode, slow
 
 NEAR = 0.25  # of the range in the step: seen at twelve stages, a value does not come from farther to zero
 
@@ -80,9 +82,9 @@ def _touch(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
 def _touch_inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """First closing of a FREE row that starts on the surface."""
     closing = w.rates[0, i] + slow(s)
-    before = max(w.gaps[0, i], closing)
+    before = max(w.gaps[0, i] - s.touch, closing)
     for node in range(1, NODES):
-        value = max(w.gaps[node, i], w.rates[node, i] + slow(s))
+        value = max(w.gaps[node, i] - s.touch, w.rates[node, i] + slow(s))
         if value < 0.0:
             return root(K, s, m, w, mode, TOUCH_INSIDE, i, _place(node - 1), max(before, 1e-300), _place(node), value)
         before = value
@@ -108,10 +110,10 @@ def _leave(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
 
 @inlined
 def _by_nodes(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int) -> float:
-    """First firing of a guard that is known at the nodes only where it is evaluated (CATCH, PRESS)."""
+    """First firing of a guard that is known at the nodes only where it is evaluated (CATCH, PRESS, TOUCH_INSIDE)."""
     before = 1e-300
     for node in range(1, NODES):
-        if kind == CATCH and not w.rates[node, i] < -slow(s):
+        if kind != PRESS and not w.rates[node, i] < -slow(s):
             before = 1e-300
             continue
         value = guard(K, s, m, w, mode, kind, i, _place(node))
@@ -160,7 +162,7 @@ def _handed_over(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> floa
 def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """Earliest switching of row i under the level and the memoryless machine; its guard in kind[i]."""
     if mode[i] == FREE:
-        inside = w.gaps[0, i] <= 0.0
+        inside = w.gaps[0, i] <= s.touch
         w.kind[i] = TOUCH_INSIDE if inside else TOUCH
         return _touch_inside(K, s, m, w, mode, i) if inside else _touch(K, s, m, w, mode, i)
     if is_active(mode[i]):
@@ -178,6 +180,8 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     w.kind[i] = LEAVE
     place = _leave(K, s, m, w, mode, i)
     kind = CATCH if s.fsm == LEVEL else PRESS
+    if s.frozen and m.beta[i, 0] > 0.0:
+        kind = TOUCH_INSIDE  # it collides at once, whatever presses it
     other = _by_nodes(K, s, m, w, mode, kind, i)
     if other < place:
         w.kind[i] = kind
@@ -206,6 +210,12 @@ def _first_edge(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float
 
 
 @inlined
+def _near(low: float, high: float) -> bool:
+    """Whether a value that was seen between low and high can have come to zero."""
+    return bool(not low > NEAR * (high - low))
+
+
+@inlined
 def _watched(s: Any, w: Work, mode: Bytes, i: int) -> bool:
     """Whether a row can switch in this step: its gap, or its multiplier, came near zero against what it varied.
 
@@ -220,15 +230,14 @@ def _watched(s: Any, w: Work, mode: Bytes, i: int) -> bool:
         low, high, end = w.gap_lo[i], w.gap_hi[i], w.gaps[last, i]
     else:
         low, high, end = w.lo[i], w.hi[i], w.lams[last, i]
-    low, high = min(low, end), max(high, end)
-    return not low > NEAR * (high - low)
+    return _near(min(low, end), max(high, end))
 
 
 @inlined
 def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     """Gaps and rates, and the multipliers if asked, at the inner nodes."""
     for node in range(1, NODES - 1):
-        dense.state(s, w, _place(node), w.ys)
+        dense.state(s, m, w, _place(node), w.ys)
         t = s.t_old + _place(node) * s.hs
         q, v = w.ys[: s.n], w.ys[s.n :]
         K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])
@@ -239,10 +248,51 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     return 0
 
 
+@inlined
+def _first_switch(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """First fall to zero of a discrete variable's guard; one that starts below zero is not armed until it has risen."""
+    for node in range(NODES - 1):
+        a, b = _place(node), _place(node + 1)
+        ga, gb = w.guards[node, i], w.guards[node + 1, i]
+        if ga > 0.0 and not gb > 0.0:
+            return root(K, s, m, w, mode, SWITCH, i, a, ga, b, gb)
+        if node + 2 < NODES and 0.0 < gb < ga and gb < w.guards[node + 2, i]:
+            dip = _vertex(b, b - a, ga, gb, w.guards[node + 2, i])
+            value = guard(K, s, m, w, mode, SWITCH, i, dip)
+            if not value > 0.0:
+                return root(K, s, m, w, mode, SWITCH, i, min(a, dip), ga, dip, value)
+    return NEVER
+
+
+@inlined
+def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
+    """Take the discrete variables' guards into s.theta; 1 if ill posed."""
+    watched = False
+    K.watch(s.t_old + s.hs, w.y1[: s.n], w.y1[s.n :], m.p, w.guards[NODES - 1])
+    for i in range(s.ng):
+        end = w.guards[NODES - 1, i]
+        low, high = min(w.guard_lo[i], end), max(w.guard_hi[i], end)
+        w.guard_hit[i] = NEVER
+        watched = watched or s.method == EXACT or _near(low, high)
+    if not watched:
+        return 0
+    if dense.prepare(K, s, m, w) != 0:
+        return 1
+    for node in range(NODES - 1):
+        dense.state(s, m, w, _place(node), w.ys)
+        K.watch(s.t_old + _place(node) * s.hs, w.ys[: s.n], w.ys[s.n :], m.p, w.guards[node])
+    for i in range(s.ng):
+        w.guard_hit[i] = _first_switch(K, s, m, w, mode, i)
+        s.theta = min(s.theta, w.guard_hit[i])
+    return 0
+
+
 @compiled
 def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 1 if ill posed."""
     s.theta = NEVER
+    if s.ng > 0 and _scan_switches(K, s, m, w, mode) != 0:
+        return 1
     any_gap, any_multiplier = False, False
     for i in range(s.nc):
         w.hit[i] = NEVER
@@ -286,4 +336,6 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return FREE
     if kind == HANDOVER:
         return CONTACT
-    return active_mode(m, i)
+    if s.frozen and m.beta[i, 0] > 0.0:
+        return int(mode[i])  # a frozen collision settles it
+    return active_mode(s, m, i)

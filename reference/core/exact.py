@@ -15,7 +15,7 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes
-from crossbody.reference.core.acceleration import GENERAL, accelerate
+from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
 from crossbody.reference.core.algebra import inverse_diagonal, solve_schur
 from crossbody.reference.core.layout import Model, Work
 
@@ -87,9 +87,9 @@ def _stays(s: Any, w: Work, unilateral: Bytes) -> bool:
     for j in range(s.na):
         if unilateral[w.idx[j]]:
             rest = w.lam0[w.idx[j]]
-            diagonal = inverse_diagonal(w.G, s.na, j, w.scale)
+            diagonal = inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
             for b in range(s.na):
-                rest -= 2.0 * w.r[b] * np.sqrt(diagonal * inverse_diagonal(w.G, s.na, b, w.scale))
+                rest -= 2.0 * w.r[b] * np.sqrt(diagonal * inverse_diagonal(w.G, s.na, w.reach, b, w.scale))
             if not rest > 0.0:
                 return False
     return True
@@ -120,20 +120,18 @@ def begin(K: Any, s: Any, m: Model, w: Work) -> None:
     for j in range(s.na):
         i = w.idx[j]
         w.r[j] = -w.law[i, 1] * w.rates[0, i] - w.law[i, 0] * w.gaps[0, i]
-    _push(s, w, -1.0, w.g)
+    _push(s, m, w, -1.0, w.g)
 
 
 @inlined
-def _push(s: Any, w: Work, sign: float, out: Array) -> None:
+def _push(s: Any, m: Model, w: Work, sign: float, out: Array) -> None:
     """Out += sign M^-1 H^T G^-1 r."""
-    solve_schur(w.G, s.na, w.r, w.la)
-    for j in range(s.na):
-        for a in range(s.n):
-            out[a] += sign * w.X[j, a] * w.la[j]
+    solve_schur(w.G, s.na, w.reach, w.r, w.la)
+    push_rows(m, w, s.na, w.la, sign, out)
 
 
 @compiled
-def evaluate(s: Any, w: Work, t: float, out: Array) -> None:
+def evaluate(s: Any, m: Model, w: Work, t: float, out: Array) -> None:
     """Out = (q, v) after time t on the arc."""
     n = s.n
     q, v = out[:n], out[n:]
@@ -147,7 +145,7 @@ def evaluate(s: Any, w: Work, t: float, out: Array) -> None:
         h, hd = w.gaps[0, i], w.rates[0, i]
         w.ha[j], w.hda[j] = linear_arc(w.law[i, 0], w.law[i, 1], h, hd, t)
         w.r[j] = w.ha[j] - h - hd * t
-    _push(s, w, 1.0, q)
+    _push(s, m, w, 1.0, q)
     for j in range(s.na):
         w.r[j] = w.hda[j] - w.rates[0, w.idx[j]]
-    _push(s, w, 1.0, v)
+    _push(s, m, w, 1.0, v)

@@ -10,12 +10,12 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
-from crossbody.reference.core.algebra import inverse_diagonal
+from crossbody.reference.core.algebra import ULP, inverse_diagonal
 from crossbody.reference.core.layout import Model, Work
-from crossbody.reference.core.machine import ULP, multiplier_if_active, slow
+from crossbody.reference.core.machine import multiplier_if_active, slow
 
 # Guards: each is positive until it fires.
-NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, RATE, RATE_DOWN = np.arange(10)
+NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, RATE, RATE_DOWN, SWITCH = np.arange(11)
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT (spec 1.2)
 
 
@@ -38,20 +38,23 @@ def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
     for j in range(s.na):
         if w.idx[j] == i:
             elastic = w.law[i, 1] * abs(w.hda[j]) + w.law[i, 0] * abs(w.ha[j])
-            return float(elastic - HANDOVER_PART * w.la[j] / inverse_diagonal(w.G, s.na, j, w.scale))
+            return float(elastic - HANDOVER_PART * w.la[j] / inverse_diagonal(w.G, s.na, w.reach, j, w.scale))
     return np.nan
 
 
 @compiled
 def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> float:
     """Value of one guard at the part theta of the step."""
-    dense.state(s, w, theta, w.ys)
+    dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
     q, v = w.ys[: s.n], w.ys[s.n :]
     if kind == RELEASE:
         return _multiplier(K, s, m, w, i, t)
     if kind == HANDOVER:
         return _handover(K, s, m, w, i, t)
+    if kind == SWITCH:
+        K.watch(t, q, v, m.p, w.guard)
+        return float(w.guard[i])
     if kind == PRESS:
         return -multiplier_if_active(K, s, m, w, mode, i, t, q, v)
     K.gaps(t, q, v, m.p, w.gap, w.rate)
@@ -66,7 +69,7 @@ def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, the
         return float(rate)
     closing = rate + slow(s)
     if kind == TOUCH_INSIDE:
-        return float(max(h, closing))
+        return float(max(h - s.touch, closing))
     return float(max(closing, -multiplier_if_active(K, s, m, w, mode, i, t, q, v)))
 
 

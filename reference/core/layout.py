@@ -12,10 +12,11 @@ from crossbody.reference.core.dop853_table import DENSE_STAGES, DENSE_TERMS
 
 # Return codes of `advance`; the Python side turns them into outcomes.
 DONE, MORE, ROWS_FULL, EVENTS_FULL = 0, 1, 2, 3
-STEP_TOO_SMALL, NOT_FINITE, ILL_POSED, MODE_CYCLE, DIVERGED = -1, -2, -3, -4, -5
+STEP_TOO_SMALL, NOT_FINITE, ILL_POSED, MODE_CYCLE, DIVERGED, LOST = -1, -2, -3, -4, -5, -6
 
-# Machines, methods.
+# Machines, rules for several contacts, methods.
 LEVEL, EDGE, MEMORYLESS = 0, 1, 2
+SEQUENTIAL, SIMULTANEOUS, RESOLVED = 0, 1, 2
 EXPLICIT, IMPLICIT, EXACT, SHORT = 0, 1, 2, 3
 
 # Modes, as in crossbody.cases.Mode.
@@ -33,6 +34,11 @@ STATE = np.dtype(
         ("k", "i8"),
         ("nz", "i8"),
         ("fsm", "i8"),
+        ("rule", "i8"),
+        ("frozen", "i8"),  # rows with fast constants collide at one instant
+        ("ng", "i8"),
+        ("nd", "i8"),
+        ("latched", "i8"),
         ("has_solve", "i8"),
         ("constant_mass", "i8"),
         ("affine", "i8"),
@@ -40,6 +46,7 @@ STATE = np.dtype(
         ("natural", "i8"),
         ("ledger", "i8"),
         ("has_control", "i8"),
+        ("has_switch", "i8"),
         ("rtol", "f8"),
         ("atol", "f8"),
         ("t_end", "f8"),
@@ -47,6 +54,7 @@ STATE = np.dtype(
         ("tick", "f8"),
         # the run
         ("started", "i8"),
+        ("unsettled", "i8"),
         ("t", "f8"),
         ("t_old", "f8"),
         ("h", "f8"),
@@ -71,6 +79,9 @@ STATE = np.dtype(
         ("full_jacobian", "i8"),
         ("jacobian_scale", "f8"),
         ("speed", "f8"),
+        ("collision_t", "f8"),
+        ("collisions_now", "i8"),
+        ("touch", "f8"),  # a gap below this is closed as far as rounding tells
         ("theta", "f8"),
         ("history", "i8"),
         ("history_t", "f8"),
@@ -80,6 +91,7 @@ STATE = np.dtype(
         ("next_sample", "i8"),
         ("rows", "i8"),
         ("events", "i8"),
+        ("switches", "i8"),
         # counters
         ("steps", "i8"),
         ("rejected", "i8"),
@@ -87,6 +99,7 @@ STATE = np.dtype(
         ("implicit_steps", "i8"),
         ("exact_steps", "i8"),
         ("factorisations", "i8"),
+        ("collisions", "i8"),
     ]
 )
 
@@ -99,6 +112,7 @@ class Model:
     beta: Floats2  # (nc, 3) the fast constants; a0 = 0 where the row has none
     unilateral: Bytes
     follows: Index  # the row whose activity this row shares; -1 for none
+    span: Index2  # (nc, 2) first column, and one past the last, of each row of H
 
 
 class Buffers:
@@ -113,6 +127,9 @@ class Buffers:
     modes: Bytes2
     events_t: Floats
     events: Index2
+    impulses: Floats
+    switches_t: Floats
+    switches: Index2
 
 
 class Work:
@@ -163,7 +180,17 @@ class Work:
     Jv: Floats2
     d: Floats
     g: Floats
+    discrete: Floats  # (nd,) discrete variables before a switch
+    guard: Floats  # (ng,) guards of the discrete variables
+    guard_lo: Floats
+    guard_hi: Floats
+    guards: Floats2  # (5, ng) at the nodes of the step
+    guard_hit: Floats
     idx: Index  # active rows
+    reach: Index  # first column of each row of the Schur complement's factor
+    ends: Index  # largest column past an active row and all before it
+    struck: Index  # (nc,) how each row takes part in a frozen collision
+    before: Bytes  # modes before a switch
     kind: Index  # (nc,) which guard fired
     pivot: Index
 
@@ -172,7 +199,7 @@ MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Wor
 open_model, open_buffers, open_work = opener(MODEL), opener(BUFFERS), opener(WORK)
 
 
-def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int) -> dict[str, Any]:
+def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: int, nd: int) -> dict[str, Any]:
     """Allocate the workspace: one array a field of `Work`, in its order."""
     shapes: dict[str, tuple[int, ...]] = {
         **dict.fromkeys(("y", "y1", "ys"), (2 * n,)),
@@ -183,9 +210,11 @@ def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int) -> di
         **dict.fromkeys(("f", "vd", "d", "g", "pivot"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
+        **dict.fromkeys(("guard", "guard_lo", "guard_hi", "guard_hit"), (ng,)),
+        "guards": (NODES, ng), "discrete": (nd,),
     }  # fmt: skip
-    integer = ("idx", "kind", "pivot")
+    types = {"Index": np.int64, "Bytes": np.int8}
     return {
-        name: np.zeros(shapes.get(name, (nc,)), dtype=np.int64 if name in integer else np.float64)
-        for name in Work.__annotations__
+        name: np.zeros(shapes.get(name, (nc,)), dtype=types.get(kind, np.float64))
+        for name, kind in Work.__annotations__.items()
     }

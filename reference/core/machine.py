@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes, Floats, Index
-from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, is_active, scatter
+from crossbody.reference._kinds import Bytes, Floats
+from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, clear, is_active, scatter
+from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.dop853 import START, derivative
 from crossbody.reference.core.layout import (
     BALLISTIC,
@@ -29,7 +30,6 @@ from crossbody.reference.core.layout import (
     FREE,
     ILL_POSED,
     LEVEL,
-    MODE_CYCLE,
     NOT_FINITE,
     Model,
     Work,
@@ -38,7 +38,6 @@ from crossbody.reference.core.layout import (
 SLOW = 1e-9  # part of the largest rate seen
 DEEP = 1e-9  # m: a FREE gap below -DEEP was started in penetration
 ROUNDING = 1e-13
-ULP = 2.3e-16
 
 
 @inlined
@@ -48,9 +47,9 @@ def slow(s: Any) -> float:
 
 
 @inlined
-def active_mode(m: Model, i: int) -> int:
-    """COLLISION where the row has fast constants, CONTACT where it has one set."""
-    return COLLISION if m.beta[i, 0] > 0.0 else CONTACT
+def active_mode(s: Any, m: Model, i: int) -> int:
+    """COLLISION where the row has fast constants and follows them in real time, else CONTACT."""
+    return COLLISION if m.beta[i, 0] > 0.0 and not s.frozen else CONTACT
 
 
 @inlined
@@ -62,20 +61,25 @@ def released_mode(mode: int, h: float) -> int:
 
 
 @inlined
-def _noise(s: Any, w: Work) -> None:
-    """What rounding of the state and of the sums can make of each multiplier."""
+def _from_state(s: Any, w: Work, i: int) -> float:
+    """What rounding of the state makes of row i's law."""
     n = s.n
     position, speed = 0.0, 0.0
     for a in range(n):
         position = max(position, abs(w.y[a]))
         speed = max(speed, abs(w.y[n + a]))
+    return float(8.0 * ULP * (w.law[i, 0] * position + w.law[i, 1] * speed))
+
+
+@inlined
+def noise(s: Any, m: Model, w: Work) -> None:
+    """What rounding of the state and of the sums can make of each multiplier."""
     for j in range(s.na):
         i = w.idx[j]
         G = 0.0
-        for c in range(n):
+        for c in range(m.span[i, 0], m.span[i, 1]):
             G += w.H[j, c] * w.X[j, c]
-        from_state = 8.0 * ULP * (w.law[i, 0] * position + w.law[i, 1] * speed)
-        w.noise[i] = (ROUNDING * w.scale[j] + from_state) / G
+        w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i)) / G
 
 
 @inlined
@@ -105,11 +109,11 @@ def multiplier_if_active(
 ) -> float:
     """Lam of row i if it were active now, from the same equations that the row would use; noise[i] beside it."""
     before = mode[i]
-    mode[i] = active_mode(m, i)
+    mode[i] = active_mode(s, m, i)
     activate(s, m, w, mode)
     lam = -np.inf
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) == 0:
-        _noise(s, w)
+        noise(s, m, w)
         for j in range(s.na):
             if w.idx[j] == i:
                 lam = w.la[j]
@@ -119,7 +123,30 @@ def multiplier_if_active(
 
 
 @inlined
+def _own_press(K: Any, s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether lam of row i would be positive: the rest of its law is negative with the others as they are.
+
+    Lam of a row that joins is that rest over a positive number, so its sign needs no solution.
+    """
+    n, j = s.n, s.na
+    w.idx[j] = i
+    clear(m, w, j)
+    K.rows(s.t, w.y[:n], w.y[n:], m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
+    push, rate = 0.0, 0.0
+    for c in range(m.span[i, 0], m.span[i, 1]):
+        push += w.H[j, c] * w.k[START, n + c]
+        rate += w.H[j, c] * w.y[n + c]
+    h, a0, a1, a2 = w.ha[j], w.law[i, 0], w.law[i, 1], w.law[i, 2]
+    spring = (a0 + a2 * h * h) * h
+    size = abs(push) + abs(w.Hdv[j]) + a1 * abs(rate) + abs(spring)
+    return bool(-(push + w.Hdv[j] + a1 * rate + spring) > ROUNDING * size + _from_state(s, w, i))
+
+
+@inlined
 def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether row i would push if it were active now; the acceleration of the present modes stands in k[0]."""
+    if not s.has_solve and active_mode(s, m, i) == CONTACT:
+        return _own_press(K, s, m, w, i)
     lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.n], w.y[s.n :])
     return bool(lam > w.noise[i])
 
@@ -134,13 +161,13 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return FREE
     if mode[i] != FREE:
         closing = rate < -slow(s)
-        return active_mode(m, i) if closing and _would_press(K, s, m, w, mode, i) else int(mode[i])
+        return active_mode(s, m, i) if closing and _would_press(K, s, m, w, mode, i) else int(mode[i])
     if rate < -slow(s):
-        return active_mode(m, i)
+        return active_mode(s, m, i)
     if h < -DEEP:
-        return active_mode(m, i) if _would_press(K, s, m, w, mode, i) else BALLISTIC
+        return active_mode(s, m, i) if _would_press(K, s, m, w, mode, i) else BALLISTIC
     if rate <= slow(s) and _would_press(K, s, m, w, mode, i):
-        return active_mode(m, i)
+        return active_mode(s, m, i)
     return FREE
 
 
@@ -157,7 +184,8 @@ def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> 
 
 
 @inlined
-def _next(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
+def next_mode(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
+    """Where the machine in force puts row i at this instant."""
     if s.fsm == LEVEL:
         return _next_level(K, s, m, w, mode, i)
     if s.fsm == EDGE:  # a row activated at this instant with lam < 0 has its edge; nothing else becomes true here
@@ -165,82 +193,3 @@ def _next(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         w.kind[i] = 0
         return BALLISTIC if fresh and w.lam[i] < -w.noise[i] else int(mode[i])
     return _next_memoryless(K, s, m, w, mode, i)
-
-
-@inlined
-def write_event(s: Any, events_t: Floats, events: Index, i: int, before: int, after: int) -> None:
-    """Note one transition."""
-    e = s.events
-    if e < len(events_t):
-        events_t[e] = s.t
-        events[e, 0], events[e, 1], events[e, 2] = i, before, after
-        s.events = e + 1
-
-
-@compiled
-def remember(s: Any, history: Bytes, mode: Bytes) -> bool:
-    """Note the mode set; whether it stood here at this instant before."""
-    if abs(s.t - s.history_t) > 8.0 * ULP * abs(s.t):
-        s.history, s.history_t, s.one_by_one = 0, s.t, 0
-    for r in range(s.history):
-        if np.array_equal(history[r], mode):
-            return True
-    if s.history < len(history) - 1:
-        history[s.history] = mode
-        s.history += 1
-        return False
-    return True
-
-
-@inlined
-def _pass(
-    K: Any, s: Any, m: Model, w: Work, mode: Bytes, events_t: Floats, events: Index, changed: Bytes
-) -> int:  # fmt: skip
-    """Switch every row that wants to (only the first one once all together repeated); how many did."""
-    count = 0
-    for i in range(s.nc):
-        if m.unilateral[i] and m.follows[i] < 0:
-            after = _next(K, s, m, w, mode, i)
-            if after != mode[i]:
-                write_event(s, events_t, events, i, mode[i], after)
-                mode[i] = after
-                changed[i] = 1
-                count += 1
-                if s.one_by_one or s.fsm != LEVEL:
-                    break
-    return count
-
-
-@compiled
-def settle(
-    K: Any, s: Any, m: Model, w: Work, mode: Bytes, history: Bytes, events_t: Floats, events: Index
-) -> int:  # fmt: skip
-    """Iterate until the mode set is consistent; leaves k[0], lam0 and the gaps of node 0 for the next step.
-
-    Returns:
-        0, or a negative code. After MODE_CYCLE, w.kind marks the rows that switch for ever.
-    """
-    changed = history[len(history) - 1]
-    changed[:] = 0
-    remember(s, history, mode)
-    code = 0
-    while True:
-        code = evaluate(K, s, m, w, mode)
-        if code != 0:
-            return code
-        if s.fsm != EDGE and s.na > 0:
-            if s.has_solve:
-                accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL)
-            _noise(s, w)
-        if _pass(K, s, m, w, mode, events_t, events, changed) == 0:
-            break
-        if remember(s, history, mode):
-            if s.one_by_one:
-                return MODE_CYCLE
-            s.one_by_one, s.history = 1, 0
-            changed[:] = 0
-    for i in range(s.nc):
-        w.lam0[i] = w.lam[i]
-        w.gaps[0, i] = w.gap[i]
-        w.rates[0, i] = w.rate[i]
-    return 0

@@ -46,7 +46,7 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     """Append the state at a time inside the step."""
     theta = min(max((t - s.t_old) / s.hs, 0.0), 1.0)
     dense.prepare(K, s, m, w)
-    dense.state(s, w, theta, w.ys)
+    dense.state(s, m, w, theta, w.ys)
     accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN)
     scatter(s, w, w.lam)
     z = w.z

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference._cache import inlined
-from crossbody.reference.core import bogacki, choice, dop853, esdirk, exact, machine
+from crossbody.reference.core import bogacki, choice, dop853, esdirk, exact
 from crossbody.reference.core.acceleration import scatter
+from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.dop853_table import STAGES
 from crossbody.reference.core.layout import (
     DIVERGED,
@@ -38,7 +39,7 @@ def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
     if s.hold_short > 0:
         s.hold_short -= 1
         return False
-    if h > SHORT_PART * min(s.h, s.h_max) or h < 4.0 * machine.ULP * abs(s.t):
+    if h > SHORT_PART * min(s.h, s.h_max) or h < 4.0 * ULP * abs(s.t):
         return False
     if not bogacki.step(K, s, m, w, h) <= 1.0:
         s.hold_short = HOLD_SHORT
@@ -88,7 +89,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         clipped = h >= left or left - h < 0.01 * h
         if clipped:
             h = left
-        if h < 4.0 * machine.ULP * abs(s.t):
+        if h < 4.0 * ULP * abs(s.t):
             break
         error = dop853.step(K, s, m, w, h) if s.method == EXPLICIT else esdirk.step(K, s, m, w, b.mode, h)
         if 0.0 <= error <= 1.0:
@@ -115,7 +116,7 @@ def take_arc(K: Any, s: Any, m: Model, w: Work, length: float) -> int:
     s.have_dense = 1
     s.hs = min(length, s.stop - s.t, s.h_max)
     exact.begin(K, s, m, w)
-    exact.evaluate(s, w, s.hs, w.y1)
+    exact.evaluate(s, m, w, s.hs, w.y1)
     s.exact_steps += 1
     if s.ledger:
         w.z1[:] = w.z

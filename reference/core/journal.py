@@ -1,0 +1,76 @@
+"""What happened at an instant: transitions of rows, changes of discrete variables, mode sets that stood before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.layout import Buffers, Model, Work
+
+
+@inlined
+def write_event(s: Any, b: Buffers, i: int, before: int, after: int, impulse: float) -> None:
+    """Note one transition."""
+    e = s.events
+    if e < len(b.events_t):
+        b.events_t[e] = s.t
+        b.events[e, 0], b.events[e, 1], b.events[e, 2] = i, before, after
+        b.impulses[e] = impulse
+        s.events = e + 1
+
+
+@inlined
+def move(s: Any, b: Buffers, i: int, after: int) -> None:
+    """Put row i in another mode, and note it."""
+    write_event(s, b, i, b.mode[i], after, 0.0)
+    b.mode[i] = after
+
+
+@compiled
+def remember(s: Any, b: Buffers) -> bool:
+    """Note the mode set; whether it stood here at this instant before."""
+    if abs(s.t - s.history_t) > 8.0 * ULP * abs(s.t):
+        s.history, s.history_t, s.one_by_one = 0, s.t, 0
+    for r in range(s.history):
+        if np.array_equal(b.history[r], b.mode):
+            return True
+    if s.history < len(b.history) - 1:
+        b.history[s.history] = b.mode
+        s.history += 1
+        return False
+    return True
+
+
+@inlined
+def keep_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
+    """Copy the modes and the discrete variables, to see afterwards what a switch changed."""
+    first = len(m.p) - s.latched - s.nd
+    for j in range(s.nd):
+        w.discrete[j] = m.p[first + j]
+    for i in range(s.nc):
+        w.before[i] = b.mode[i]
+
+
+@inlined
+def write_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
+    """Note what a switch changed."""
+    first = len(m.p) - s.latched - s.nd
+    for j in range(s.nd):
+        e, before, after = s.switches, w.discrete[j], m.p[first + j]
+        if before != after and e < len(b.switches_t):
+            b.switches_t[e] = s.t
+            b.switches[e, 0], b.switches[e, 1], b.switches[e, 2] = j, int(before), int(after)
+            s.switches = e + 1
+    for i in range(s.nc):
+        if w.before[i] != b.mode[i]:
+            write_event(s, b, i, w.before[i], b.mode[i], 0.0)
+
+
+@inlined
+def full(s: Any, b: Buffers) -> bool:
+    """Whether the next instant may not find room for its events."""
+    room = 16 * s.nc + 16
+    return bool(s.events + room > len(b.events_t) or s.switches + 16 * s.nd > len(b.switches_t))

@@ -1,0 +1,120 @@
+"""Event iteration: what is switched at one instant, until nothing changes any more."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference.core.acceleration import GENERAL, accelerate
+from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.collisions import collide
+from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
+from crossbody.reference.core.layout import EDGE, LEVEL, LOST, MODE_CYCLE, Buffers, Model, Work
+from crossbody.reference.core.machine import evaluate, next_mode, noise
+from crossbody.reference.kernels import LOST as IS_LOST
+from crossbody.reference.kernels import TOUCHED, UNCHANGED
+
+TOUCHING = 64.0 * ULP  # of the largest coordinate: a gap below it is closed as far as rounding tells
+SWITCH_ROUNDS = 32  # switches that follow one another at one instant
+
+
+@inlined
+def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Switch every row that wants to (only the first one once all together repeated); how many did."""
+    count = 0
+    changed = b.history[len(b.history) - 1]
+    for i in range(s.nc):
+        if m.unilateral[i] and m.follows[i] < 0:
+            after = next_mode(K, s, m, w, b.mode, i)
+            if after != b.mode[i]:
+                move(s, b, i, after)
+                changed[i] = 1
+                count += 1
+                if s.one_by_one or s.fsm != LEVEL:
+                    break
+    return count
+
+
+@inlined
+def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
+    """What a machine asks for besides `evaluate`: the general algebra's rows and the noise of the multipliers."""
+    if s.fsm != EDGE and s.na > 0:
+        if s.has_solve:
+            accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL)
+        noise(s, m, w)
+
+
+@inlined
+def _touching(s: Any, w: Work) -> None:
+    """How large a gap rounding alone can make of a touch."""
+    largest = 0.0
+    for a in range(s.n):
+        largest = max(largest, abs(w.y[a]))
+    s.touch = TOUCHING * largest
+
+
+@compiled
+def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Collide and switch until the mode set is consistent; 0 or a code."""
+    changed = b.history[len(b.history) - 1]
+    changed[:] = 0
+    remember(s, b)
+    while True:
+        code = evaluate(K, s, m, w, b.mode)
+        if code != 0:
+            return int(code)
+        if s.frozen:
+            struck = s.collisions
+            code = collide(K, s, m, w, b)
+            if code != 0:
+                return int(code)
+            if s.collisions > struck:
+                s.history, s.one_by_one = 0, 0  # another velocity: mode sets may stand again
+                continue
+        _consistent(K, s, m, w)
+        if _pass(K, s, m, w, b) == 0:
+            return 0
+        if remember(s, b):
+            if s.one_by_one:
+                return MODE_CYCLE
+            s.one_by_one, s.history = 1, 0
+            changed[:] = 0
+
+
+@inlined
+def switch(K: Any, s: Any, m: Model, w: Work, b: Buffers, fired: int) -> int:
+    """Let the mechanism change its discrete variables; UNCHANGED, CHANGED or LOST of the kernels."""
+    keep_discrete(s, m, w, b)
+    result = K.switch(s.t, w.y[: s.n], w.y[s.n :], m.p, b.mode, fired)
+    write_discrete(s, m, w, b)
+    return int(result)
+
+
+@compiled
+def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Iterate until modes and discrete variables agree; leaves k[0], lam0 and the gaps of node 0 for the next step.
+
+    Returns:
+        0, EVENTS_FULL if the caller must make room and come again, or a negative code. After MODE_CYCLE the last line
+        of the history marks the rows that switch for ever.
+    """
+    if s.frozen:
+        _touching(s, w)
+    code = _iterate(K, s, m, w, b)
+    rounds = 0
+    while code == 0 and s.has_switch:
+        result = switch(K, s, m, w, b, TOUCHED)
+        if result == IS_LOST:
+            return LOST
+        if result == UNCHANGED:
+            break
+        rounds += 1
+        if rounds > SWITCH_ROUNDS:
+            return MODE_CYCLE
+        s.history, s.one_by_one = 0, 0
+        code = _iterate(K, s, m, w, b)
+    for i in range(s.nc):
+        w.lam0[i] = w.lam[i]
+        w.gaps[0, i] = w.gap[i]
+        w.rates[0, i] = w.rate[i]
+    return int(code)
