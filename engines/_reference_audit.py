@@ -13,8 +13,10 @@ from crossbody.reference import System
 def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
     """Constants, start, and functions of the state at zero input: M (n, n), bias (n,) = -f, H (nc, n), lam (nc,) N.
 
-    lam has every row active; NaN where the rows are dependent.
+    Constants and lam are those of rows just entered, with the fast constants where a row has two sets. lam has every
+    row active; NaN where the rows are dependent.
     """
+    law = np.where(system.beta[:, :1] > 0.0, system.beta, system.alpha)
 
     def M(q: Floats) -> Floats:
         return system.mass_matrix(q)
@@ -29,7 +31,7 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
     def lam(q: Floats, v: Floats) -> Floats:
         mass, f = system.terms(q, v)
         rows, h, Hdv = system.constraint(q, v)
-        a0, a1, a2 = system.alpha.T
+        a0, a1, a2 = law.T
         inverse = np.linalg.solve(mass, np.column_stack([rows.T, f]))
         push = rows @ inverse[:, -1] + Hdv + a1 * (rows @ v) + a0 * h + a2 * h**3
         try:
@@ -37,5 +39,5 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
         except np.linalg.LinAlgError:
             return np.full(system.nc, np.nan)
 
-    constants = dict(zip(("a0", "a1", "a2"), system.alpha.T, strict=True))
+    constants = dict(zip(("a0", "a1", "a2"), law.T, strict=True))
     return {"constants": constants, "q0": q0, "v0": v0, "M": M, "bias": bias, "H": H, "lam": lam}

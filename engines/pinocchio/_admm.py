@@ -9,9 +9,6 @@ theta = 1/2, exact in free flight; 1 if a row is always on, or its position woul
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
@@ -20,6 +17,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Log, Modes
 from crossbody.engines._machines import first_modes
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
+from crossbody.engines.pinocchio._scene import Points
 
 FREE, CONTACT, BILATERAL = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BILATERAL)
 WORST = 1e-6
@@ -30,15 +28,13 @@ class TimeStepper:
     """One run.
 
     Attributes:
-        rows: the mechanism; `points` its rows as Pinocchio's constraints, whose third row is the normal.
+        rows: the mechanism; `points` its rows as Pinocchio's constraints, whose third row is the normal (`Scene`).
         e: restitution of every row.
         steps, unsolved, iterations: counters.
         outcome, message: how it ended.
     """
 
-    def __init__(
-        self, rows: PinRows, points: Sequence[Any], e: list[float], tol: float, log: Log, max_steps: int
-    ) -> None:
+    def __init__(self, rows: PinRows, points: Points, e: list[float], tol: float, log: Log, max_steps: int) -> None:
         self.rows, self.points, self.e, self.log, self.max_steps = rows, points, e, log, max_steps
         self.settings = pin.ADMMSolverSettings()
         self.settings.max_iterations = 1000
@@ -101,9 +97,10 @@ class TimeStepper:
         """Solve 0 <= p perp G p + g >= 0 (or G p + g = 0) with a Delassus operator made anew: ADMM changes it."""
         model, data = self.rows.model, self.rows.data
         models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+        points = self.points(q) if callable(self.points) else self.points
         for i in closed:
-            models.append(self.points[i])
-            datas.append(self.points[i].createData())
+            models.append(points[i])
+            datas.append(points[i].createData())
         pin.crba(model, data, q, pin.Convention.WORLD)
         for m, d in zip(models, datas, strict=True):
             m.calc(model, data, d)

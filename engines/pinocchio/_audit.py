@@ -15,11 +15,11 @@ from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 def audit(case: Case, rows: PinRows, constants: Mapping[str, Any]) -> Mapping[str, Any]:
     """Numbers read back from the model, and M(q), bias(q, v), H(q) and lam(q, v) of all rows together.
 
-    lam has no bound: it is what the law asks for, negative where the row would pull.
+    lam has no bound: it is what the law of a row just entered asks for, negative where the row would pull.
     """
     model, data = rows.model, rows.data
 
-    on = (int(Mode.CONTACT),) * rows.nc
+    on = tuple(int(Mode.COLLISION if fast else Mode.CONTACT) for fast in rows.fast)
     return {
         "masses": np.array([inertia.mass for inertia in model.inertias[1:]]),
         "gravity": float(np.linalg.norm(model.gravity.linear)),

@@ -17,10 +17,11 @@ from crossbody.cases._arrays import Floats
 from crossbody.engines import _settings
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
+from crossbody.engines._machines import Machine
 from crossbody.engines.pinocchio._admm import TimeStepper
 from crossbody.engines.pinocchio._audit import audit
 from crossbody.engines.pinocchio._flow import Flow
-from crossbody.engines.pinocchio._impulse import ImpulseMachine, restitution
+from crossbody.engines.pinocchio._impulse import RULES, Impact, ImpulseMachine, constants, restitution
 from crossbody.engines.pinocchio._rows import ALGEBRA
 from crossbody.engines.pinocchio._scene import Scene
 from crossbody.engines.pinocchio._smooth import Smooth, SmoothFlow
@@ -78,6 +79,7 @@ class PinocchioRun:
     settings: Mapping[str, Any]
     constants: Mapping[str, Any]
     integrate: Callable[[Log], tuple[Solver, Mapping[str, int]]]
+    follows: Case | None = None
     engine: str = "pinocchio"
 
     def run(self) -> Trajectory:
@@ -100,7 +102,9 @@ class Pinocchio:
     name = "pinocchio"
     profiles: Mapping[str, str] = {
         "law": "the case's law solved for v' and lam by forwardDynamics, CVODE, the level machine",
-        "impulse": "impacts in no time with the restitution of the law's linear part, rigid contact once captured",
+        "impulse": "impacts in no time with the restitution of the law's linear part, one after another; rigid contact "
+        "once captured",
+        "impulse_simultaneous": "the same with all touching contacts struck at once, as a complementarity problem",
         "admm": "time stepping with ADMM, the LCP baseline: first order, restitution of the law's linear part",
     }
     versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": sksundae.__version__}
@@ -113,7 +117,7 @@ class Pinocchio:
             return f"Pinocchio has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
         if profile == "admm" and not hasattr(_mechanism(case), "build"):
             return "The profile admm steps contacts in time: the loops of this mechanism never open."
-        if profile == "impulse" and not case.law.unilateral.all():
+        if profile in RULES and not case.law.unilateral.all():
             return "An impact needs a contact that opens: a row that is always on has none."
         if profile == "law" and case.fsm != "level":
             return f"The profile law switches by the machine 'level' and not by {case.fsm!r}."
@@ -126,7 +130,7 @@ class Pinocchio:
             case: the scene.
             profile: one of `profiles`; "matched" is law.
             settings: law: rtol, method, max_steps, and algebra, or model where no row ever opens;
-                impulse: rtol, restitution, max_steps;
+                impulse and impulse_simultaneous: rtol, restitution, max_steps;
                 admm: dt in s, tol in m/s and N s, restitution, max_steps.
 
         Raises:
@@ -144,13 +148,14 @@ class Pinocchio:
             smooth: Smooth = mechanism.smooth(case, str(used["model"]))
             return SmoothRun(case=case, scene=smooth, profile=profile, settings=used)
         scene: Scene = mechanism.build(case, str(used.get("algebra", "forwardDynamics")))
-        constants: dict[str, Any] = {"a0": case.law.a0, "a1": case.law.a1, "a2": case.law.a2}
+        constants: dict[str, Any] = dict(zip(("a0", "a1", "a2"), scene.rows.entered, strict=True))
         if profile != "law":
             constants = {"restitution": used["restitution"]}
-        integrate = _PROFILES[profile](case, scene, used)
+        integrate = _PROFILES[profile](case, scene, used, _bounces(case, settings))
         return PinocchioRun(
-            case=case, scene=scene, profile=profile, settings=used, constants=constants, integrate=integrate
-        )
+            case=case, scene=scene, profile=profile, settings=used, constants=constants, integrate=integrate,
+            follows=followed(case, profile) if (followed := getattr(mechanism, "followed", None)) else None,
+        )  # fmt: skip
 
 
 def _path() -> list[str]:
@@ -171,8 +176,8 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
         return {"rtol": RTOL, "method": METHOD, "model": model, "max_steps": STEPS}
     if profile == "law":
         return {"rtol": RTOL, "method": METHOD, "algebra": SOLVER, "max_steps": STEPS}
-    e = Parameter(default=restitution(case.law, 0), doc="restitution", low=0.0, high=1.0)
-    if profile == "impulse":
+    e = Parameter(default=max(_bounces(case, {}), default=0.0), doc="restitution of every row", low=0.0, high=1.0)
+    if profile in RULES:
         return {"rtol": RTOL, "restitution": e, "max_steps": STEPS}
     return {
         "dt": Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True),
@@ -192,19 +197,30 @@ def _start(case: Case, scene: Scene) -> tuple[Floats, Floats]:
     return scene.start or (case.q0, case.v0)
 
 
-def _law(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
+Integrate = Callable[[Log], tuple[Solver, Mapping[str, int]]]
+
+
+def _law(case: Case, scene: Scene, used: Mapping[str, Any], _e: list[float]) -> Integrate:
     return _flowing(lambda: LevelMachine(scene.rows), case, scene, used)
 
 
-def _impulse(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
-    e = [float(used["restitution"])] * scene.rows.nc
-    rows = scene.rows.rigid()
-    return _flowing(lambda: ImpulseMachine(rows, case.law.a0, e), case, scene, used)
+def _impulse(rule: Impact) -> Callable[[Case, Scene, Mapping[str, Any], list[float]], Integrate]:
+    def prepared(case: Case, scene: Scene, used: Mapping[str, Any], e: list[float]) -> Integrate:
+        rows = scene.rows.rigid()
+        a0 = [constants(case.law, i)[0] for i in range(rows.nc)]
+        return _flowing(lambda: ImpulseMachine(rows, a0, e, rule), case, scene, used)
+
+    return prepared
 
 
-def _flowing(
-    machine: Callable[[], Any], case: Case, scene: Scene, used: Mapping[str, Any]
-) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
+def _bounces(case: Case, asked: Mapping[str, Any]) -> list[float]:
+    """Restitution of every row: the one that was asked for, or its law's."""
+    if "restitution" in asked:
+        return [float(asked["restitution"])] * len(case.law.a0)
+    return [restitution(case.law, i) for i in range(len(case.law.a0))]
+
+
+def _flowing(machine: Callable[[], Machine], case: Case, scene: Scene, used: Mapping[str, Any]) -> Integrate:
     rtol, method, limit = float(used["rtol"]), str(used.get("method", "Adams")), int(used["max_steps"])
 
     def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
@@ -215,9 +231,7 @@ def _flowing(
     return integrate
 
 
-def _admm(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], tuple[Solver, Mapping[str, int]]]:
-    e = [float(used["restitution"])] * scene.rows.nc
-
+def _admm(case: Case, scene: Scene, used: Mapping[str, Any], e: list[float]) -> Integrate:
     def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
         stepper = TimeStepper(scene.rows, scene.points, e, float(used["tol"]), log, int(used["max_steps"]))
         stepper.run(*_start(case, scene), case.t_end, float(used["dt"]))
@@ -226,4 +240,4 @@ def _admm(case: Case, scene: Scene, used: Mapping[str, Any]) -> Callable[[Log], 
     return integrate
 
 
-_PROFILES = {"law": _law, "impulse": _impulse, "admm": _admm}
+_PROFILES = {"law": _law, **{profile: _impulse(rule) for profile, rule in RULES.items()}, "admm": _admm}

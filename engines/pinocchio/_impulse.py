@@ -1,11 +1,12 @@
-"""Impacts in no time: `impulseDynamics` with the restitution that the law's own collision has (spec 1.3, 4.3)."""
+"""Impacts in no time: `impulseDynamics` with the restitution that the law's own collision has (spec 1.2, 1.3, 4.3)."""
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Law, Mode
@@ -13,16 +14,28 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._closed_forms import damping_ratio
 from crossbody.cases._closed_forms import restitution as restitution_at
 from crossbody.engines._log import Modes
-from crossbody.engines._machines import WATCHED, Fired, Passed, Settled, active
-from crossbody.engines.pinocchio._rows import PinRows
+from crossbody.engines._machines import WATCHED, Fired, Passed, Settled, active, switched
+from crossbody.engines.pinocchio._rows import ULP, PinRows
 
 FREE, CONTACT, COLLISION = int(Mode.FREE), int(Mode.CONTACT), int(Mode.COLLISION)
-GAP, PUSH = 0, 1
+GAP, TURN = 0, 1
+PUSH = 1
+"""The functions watched of a row that is free, and of one that is held."""
+SLOW = 1e-12
+"""Part of the largest rate of a gap below which it stands still."""
+PER_ROW = 1000
+"""Impacts of one row at one instant that make a cycle."""
+
+
+def constants(law: Law, row: int) -> tuple[float, float]:
+    """a0 and a1 of a collision: the fast ones where the row has two sets."""
+    quick = float(law.b0[row]) > 0.0
+    return (float(law.b0[row]), float(law.b1[row])) if quick else (float(law.a0[row]), float(law.a1[row]))
 
 
 def restitution(law: Law, row: int) -> float:
     """e(zeta) of the linear part of the law; 0 without stiffness, whose collision never ends."""
-    a0, a1 = float(law.a0[row]), float(law.a1[row])
+    a0, a1 = constants(law, row)
     return restitution_at(damping_ratio(a0, a1)) if a0 > 0.0 else 0.0
 
 
@@ -33,69 +46,176 @@ def capture_speed(press: float, a0: float, e: float) -> float:
     return max(press, 0.0) / (math.sqrt(a0) * math.pow(e, 1.5))
 
 
+class Instant:
+    """The rows at one instant, moved on by impacts.
+
+    Attributes:
+        q, v: state; v changes.
+        modes: of every row; they change.
+        passed: transitions so far.
+        touching: the rows whose gap is closed.
+        dropped: rows that were let go here: they are not caught again unless they approach.
+    """
+
+    def __init__(self, rows: PinRows, q: Floats, v: Floats, modes: Modes, slow: float) -> None:
+        self.rows, self.q, self.v, self.modes, self.slow = rows, q, v, list(modes), slow
+        self.passed: list[Passed] = []
+        self.touching: list[int] = []
+        self.dropped: set[int] = set()
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """The rows that carry a multiplier."""
+        return active(tuple(self.modes))
+
+    def rates(self) -> Floats:
+        """Rate of every gap (nc,), m/s; 0 where it stands still."""
+        hd = self.rows.gaps(self.q, self.v)[1]
+        still: Floats = np.where(np.abs(hd) <= self.slow, 0.0, hd)
+        return still
+
+    def press(self) -> tuple[Floats, Floats]:
+        """-h'' of every row that is not held, and its rounding (nc,), m/s^2."""
+        vd, _ = self.rows.accelerate(self.q, self.v, tuple(self.modes))
+        return self.rows.pressure(self.q, self.v, vd)
+
+    def move(self, i: int, after: int, impulse: float = 0.0) -> None:
+        """Switch one row."""
+        self.passed.append((i, self.modes[i], after, impulse))
+        self.modes[i] = after
+
+    def release(self, i: int) -> None:
+        """Let a held row go."""
+        self.move(i, FREE)
+        self.dropped.add(i)
+
+    def release_pulling(self, fired: Fired) -> None:
+        """Let every held row go that pulls, or whose multiplier was found to vanish."""
+        if not self.held:
+            return
+        _, lam = self.rows.accelerate(self.q, self.v, tuple(self.modes))
+        noise = self.press()[1] / np.diag(self.rows.delassus(self.q))
+        for i, mode in enumerate(self.modes):
+            if mode == CONTACT and (lam[i] < -noise[i] or (i, PUSH) in fired):
+                self.release(i)
+
+    def hold_resting(self) -> bool:
+        """Hold the touching rows that rest and are pressed (lam > 0), one after another; whether there was one."""
+        hd, (press, noise) = self.rates(), self.press()
+        for i in self.touching:
+            if self.modes[i] == FREE and i not in self.dropped and hd[i] == 0.0 and press[i] > noise[i]:
+                self.move(i, CONTACT)
+                return True
+        return False
+
+
+Impact = Callable[[Instant, list[float], list[float]], bool]
+"""(instant, a0 and e of every row) -> whether something was struck."""
+
+
+def sequential(at: Instant, a0: list[float], e: list[float]) -> bool:
+    """Strike the free touching row that approaches most (ties within 1e-12 by index); held rows stay if they push."""
+    hd = at.rates()
+    coming = [i for i in at.touching if at.modes[i] == FREE and hd[i] < 0.0]
+    if not coming:
+        return False
+    fastest = min(hd[i] for i in coming)
+    i = next(j for j in coming if hd[j] <= fastest * (1.0 - 1e-12))
+    captured = e[i] <= 0.0 or -hd[i] < capture_speed(float(at.press()[0][i]), a0[i], e[i])
+    at.move(i, COLLISION)
+    while True:
+        together = at.held  # the struck row is among them
+        bounce = [0.0 if captured or j != i else e[i] for j in together]
+        v, p = at.rows.strike(at.q, at.v, together, bounce)
+        pulling = [j for j, impulse in zip(together, p, strict=True) if impulse < 0.0 and at.modes[j] == CONTACT]
+        if not pulling:
+            break
+        for j in pulling:
+            at.release(j)
+    at.v = v
+    at.move(i, CONTACT if captured else FREE, float(p[together.index(i)]))
+    return True
+
+
+def simultaneous(at: Instant, a0: list[float], e: list[float]) -> bool:
+    """Strike all touching rows at once: 0 <= p perp H v+ + e H v >= 0."""
+    hd, press = at.rates(), at.press()[0]
+    coming = [i for i in at.touching if at.modes[i] == FREE and hd[i] < 0.0]
+    if not coming:
+        return False
+    caught = {i for i in coming if e[i] <= 0.0 or -hd[i] < capture_speed(float(press[i]), a0[i], e[i])}
+    bounce = [0.0 if i in caught or at.modes[i] != FREE else e[i] for i in range(at.rows.nc)]
+    near = sorted({*at.touching, *at.held})
+    struck, v, p = _complementary(at, near, bounce)
+    for i in at.held:
+        if at.modes[i] == CONTACT and i not in struck:
+            at.release(i)
+    for i, impulse in zip(struck, p, strict=True):
+        if at.modes[i] == FREE:
+            at.move(i, COLLISION)
+            at.move(i, CONTACT if i in caught else FREE, float(impulse))
+    at.v = v
+    return True
+
+
+def _complementary(at: Instant, near: list[int], e: list[float]) -> tuple[list[int], Floats, Floats]:
+    """Rows with an impulse, velocities behind it, and the impulses: rows that pull leave, rows that close come back."""
+    before, struck = at.rows.gaps(at.q, at.v)[1], list(near)
+    for _ in range(PER_ROW * len(near)):
+        v, p = at.rows.strike(at.q, at.v, struck, [e[i] for i in struck])
+        if len(p) and float(p.min()) < 0.0:
+            struck.pop(int(np.argmin(p)))
+            continue
+        after = at.rows.gaps(at.q, v)[1]
+        closing = {i: after[i] + e[i] * before[i] for i in near if i not in struck}
+        worst = min(closing, key=lambda i: closing[i], default=-1)
+        if worst < 0 or closing[worst] >= -at.slow:
+            break
+        struck = sorted([*struck, worst])
+    return struck, v, p
+
+
+RULES: dict[str, Impact] = {"impulse": sequential, "impulse_simultaneous": simultaneous}
+"""Profile -> rule for several contacts."""
+
+
 class ImpulseMachine:
     """Rows are FREE or, once captured, held rigidly (CONTACT) until they would have to pull.
 
-    A struck row passes through COLLISION within the instant. One row is struck at a time, the most approaching
-    first, until none approaches.
+    A struck row passes through COLLISION within the instant. The rule strikes until no touching row approaches.
+    One run uses one machine: it remembers the largest rate that it saw, and which free gaps are closed.
     """
 
-    def __init__(self, rows: PinRows, a0: Floats, e: list[float]) -> None:
+    def __init__(self, rows: PinRows, a0: list[float], e: list[float], rule: Impact = sequential) -> None:
         self.rows: PinRows = rows
-        self.a0, self.e = a0, e
+        self.own, self.a0, self.e, self.rule = switched(rows), a0, e, rule
+        self.slow = 0.0
+        self._closed: set[int] = set()
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
         """FREE: h and h'; CONTACT: lam."""
         h, hd = self.rows.gaps(q, v)
         lam = self.rows.accelerate(q, v, modes)[1] if CONTACT in modes else None
-        for i, mode in enumerate(modes):
-            pair = (h[i], hd[i]) if mode == FREE else (1.0, lam[i] if lam is not None else 1.0)
-            out[WATCHED * i : WATCHED * i + 3] = (*pair, 1.0)
+        out[:] = 1.0
+        for i in self.own:
+            at = WATCHED * i
+            if modes[i] == FREE:
+                out[at + GAP] = max(h[i], hd[i] + self.slow) if i in self._closed else h[i]
+                out[at + TURN] = hd[i]
+            elif lam is not None:
+                out[at + PUSH] = lam[i]
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = frozenset()) -> Settled:
         """Release what pulls, then strike or hold what touches."""
-        passed: list[Passed] = []
-        now = list(modes)
-        lam = self.rows.accelerate(q, v, modes)[1]
-        for i, mode in enumerate(modes):
-            if mode == CONTACT and (lam[i] < 0.0 or (i, PUSH) in fired):
-                now[i] = FREE
-                passed.append((i, CONTACT, FREE, 0.0))
-        released = {i for i, *_ in passed}
-        touching = [i for i, h in enumerate(self.rows.gaps(q, v)[0]) if h <= 0.0 or (i, GAP) in fired]
-        for _ in range(1000 * len(modes)):
-            i, approach = self._next(q, v, now, touching)
-            if i < 0:
+        h, hd = self.rows.gaps(q, v)
+        self.slow = max(self.slow, SLOW * float(np.abs(hd).max(initial=0.0)))
+        at, rounding = Instant(self.rows, q, v, modes, self.slow), 8.0 * ULP * float(np.abs(q).max(initial=0.0))
+        at.release_pulling(fired)
+        at.touching = [i for i in self.own if h[i] <= rounding or (i, GAP) in fired]
+        cycle = True
+        for _ in range(PER_ROW * len(modes)):
+            if not self.rule(at, self.a0, self.e) and not at.hold_resting():
+                cycle = False
                 break
-            v, after = self._hit(q, v, now, i, approach) if approach > 0.0 else (v, CONTACT)
-            if i in released and after == CONTACT and approach <= 0.0:
-                break
-            passed += (
-                [(i, FREE, COLLISION, 0.0), (i, COLLISION, after, 0.0)] if approach > 0.0 else [(i, FREE, CONTACT, 0.0)]
-            )
-            now[i] = after
-        else:
-            return Settled(tuple(now), v, tuple(passed), cycle=True)
-        return Settled(tuple(now), v, tuple(passed))
-
-    def _next(self, q: Floats, v: Floats, now: list[int], touching: list[int]) -> tuple[int, float]:
-        """The free touching row that approaches most, m/s, or lies pressed at rest (0); row -1 if none."""
-        hd = self.rows.gaps(q, v)[1]
-        best, speed = -1, 0.0
-        for i in touching:
-            if now[i] != FREE:
-                continue
-            if -hd[i] > speed or (hd[i] == 0.0 and best < 0 and self._press(q, v, now, i) > 0.0):
-                best, speed = i, max(float(-hd[i]), 0.0)
-        return best, speed
-
-    def _press(self, q: Floats, v: Floats, now: list[int], i: int) -> float:
-        vd, _ = self.rows.accelerate(q, v, tuple(now))
-        return -float(self.rows.gap_acceleration(q, v, vd)[i])
-
-    def _hit(self, q: Floats, v: Floats, now: list[int], i: int, approach: float) -> tuple[Floats, int]:
-        """Velocities behind the impact, and the mode that the row leaves it in."""
-        e = self.e[i]
-        if e <= 0.0 or approach < capture_speed(self._press(q, v, now, i), float(self.a0[i]), e):
-            return self.rows.strike(q, v, (*active(tuple(now)), i), 0.0), CONTACT
-        return self.rows.strike(q, v, (i,), e), FREE
+        self._closed = set(at.touching)
+        return Settled(tuple(at.modes), at.v, tuple(at.passed), cycle=cycle)

@@ -20,6 +20,8 @@ Forces = Callable[[Floats, Floats, Floats], None]
 ULP = 2.3e-16
 ROUNDING = 1e-13
 """Part of the largest term of a sum that rounding may make of the sum."""
+SMALL = 1e-14
+"""Part of the largest velocity below which a gap that is held stands still."""
 
 
 def by_forward_dynamics(model: Any, data: Any, tau: Floats) -> Solve:
@@ -158,6 +160,23 @@ class PinRows:
             found = self._sets[modes] = (rows, *law[:, on])
         return found
 
-    def strike(self, q: Floats, v: Floats, struck: Sequence[int], e: float) -> Floats:
-        """Velocities behind an impact of the rows `struck` with restitution e (spec 4.3)."""
-        return np.array(pin.impulseDynamics(self.model, self.data, q, v, self.jacobian(q)[list(struck)], e, 0.0))
+    def strike(self, q: Floats, v: Floats, struck: Sequence[int], e: Sequence[float]) -> tuple[Floats, Floats]:
+        """Velocities behind an impact of the rows `struck`, and their impulses (ns,), N s: H v+ = -e H v.
+
+        impulseDynamics knows one restitution: where rows differ, the same equations are solved densely.
+
+        Args:
+            q: positions.
+            v: velocities before it.
+            struck: rows that may carry an impulse.
+            e: restitution of each of them; one that is held, H v = 0, may have any.
+        """
+        J = self.jacobian(q)[list(struck)]
+        bounce = {b for b, rate in zip(e, J @ v, strict=True) if b > 0.0 and rate != 0.0}
+        rigid = all(b > 0.0 or abs(rate) <= SMALL * np.abs(v).max() for b, rate in zip(e, J @ v, strict=True))
+        if not bounce or (len(bounce) == 1 and rigid):
+            after = pin.impulseDynamics(self.model, self.data, q, v, J, max(bounce, default=0.0), 0.0)
+            return np.array(after), np.array(self.data.impulse_c)
+        X = np.linalg.solve(mass_matrix(self.model, self.data, q), J.T)
+        p: Floats = np.linalg.solve(J @ X, -(1.0 + np.array(e)) * (J @ v))
+        return v + X @ p, p

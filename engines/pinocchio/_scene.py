@@ -12,6 +12,8 @@ from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Chart, Observe
 from crossbody.engines.pinocchio._rows import PinRows
 
+Points = Sequence[Any] | Callable[[Floats], Sequence[Any]]
+
 
 def _nothing(_t: float, _q: Floats, _v: Floats) -> None:
     """No input changes."""
@@ -44,7 +46,8 @@ class Scene:
 
     Attributes:
         rows: gaps, accelerations and multipliers.
-        points: every row as a constraint of Pinocchio with three components, the normal last (profile admm).
+        points: every row as a constraint of Pinocchio with three components, the normal last (profile admm); or a
+            function of q that makes them, where they move along the bodies.
         observe: gaps and energies of many states, in the case's coordinates.
         sizes: how far the coordinates move (or how deep contacts give), and how fast: numbers, or one a coordinate
             (n,). Times rtol they are the absolute tolerances.
@@ -55,7 +58,7 @@ class Scene:
     """
 
     rows: PinRows
-    points: Sequence[Any] = ()
+    points: Points = ()
     observe: Observe
     sizes: tuple[float | Floats, float | Floats]
     start: tuple[Floats, Floats] | None = None
