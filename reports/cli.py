@@ -82,6 +82,26 @@ def bench(
 
 
 @cli.command()
+@click.option(
+    "--n",
+    "counts",
+    type=click.IntRange(2, 200),
+    multiple=True,
+    default=(3, 5),
+    show_default=True,
+    help="Number of balls; repeatable.",
+)
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--points", type=click.IntRange(2, 10_000), default=61, show_default=True, help="Gaps from s = 0 to 3.")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: Path) -> int:
+    """Map energy created and pattern of Newton's cradle over the gap between its balls."""
+    from crossbody.reports.commands import gap_map as work
+
+    return work(counts, wanted, points, out, _command())
+
+
+@cli.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> int:
     """Make the page of an earlier run again."""

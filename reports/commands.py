@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from crossbody import engines
 from crossbody.cases import Case, InvalidValue
 from crossbody.reports import jobs, output, page, study
 from crossbody.reports.audit import SEED
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
 WIDTH = 120  # of the table in a file or a pipe
 SHOWN = {"position": "position", "event_times": "times [s]", "energy_drift": "energy"}
 COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
@@ -73,6 +75,23 @@ def bench(
         study.write_table(made / "orders", orders, told)
         page.write(made)
     show_bench(rows, orders, out)
+    return 0
+
+
+def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
+    """Run the sliders over all gaps; writes the table and the page."""
+    from crossbody.reports import gapmap
+
+    picks = jobs.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
+    output.check(out)
+    with progress(len(counts) * len(gapmap.lines(picks))) as tell:
+        rows = gapmap.gap_map(counts, picks, points, tell)
+    told = provenance(command, points=points)
+    with output.folder(out) as made:
+        study.write(made, [], study.judge([], {}), told)
+        study.write_table(made / "gapmap", rows, told)
+        page.write(made)
+    show_gap_map(gapmap.summary(rows), out)
     return 0
 
 
@@ -146,6 +165,14 @@ def _short(value: float | None) -> str:
 
 def _count(count: int, word: Word) -> str:
     return f"[{COLOURS[word]}]{count}[/]" if count else "[dim]0[/]"
+
+
+def show_gap_map(lines: pd.DataFrame, out: Path) -> None:
+    """One line an engine in the terminal, then what those say that failed or were skipped."""
+    print(lines.drop(columns="why").to_string(index=False, float_format=lambda x: f"{x:.4g}"))
+    for line in lines[lines["why"] != ""].to_dict(orient="records"):
+        print(f"{line['n']} balls, {line['engine']}:{line['profile']}, {line['machine']}: {line['why']}")
+    print(f"Report: {(out / page.PAGE).absolute()}")
 
 
 def show_bench(rows: pd.DataFrame, orders: pd.DataFrame, out: Path) -> None:

@@ -55,6 +55,7 @@ def render(out: Path) -> str:
         audit=_records(audit),
         cases=_cases([load(path) for path in sorted((out / "traces").glob("*.parquet"))]),
         bench=_bench(out),
+        gapmap=_gap_map(out),
         provenance=read_json(out / "provenance.json"),
         script=SCRIPT,
     )
@@ -70,6 +71,17 @@ def _bench(out: Path) -> dict[str, Any]:
     rows = pd.DataFrame(table["rows"])
     orders = read_json(out / "orders.json")["rows"]
     return {"rows": _records(rows), "orders": orders, "plot": plot("work-precision", work_precision(rows))}
+
+
+def _gap_map(out: Path) -> dict[str, Any]:
+    """Context of the gap map; empty where there is none."""
+    if not (out / "gapmap.json").is_file():
+        return {}
+    from crossbody.reports.gapmap import summary
+    from crossbody.reports.gapmap_figure import gap_map
+
+    rows = pd.DataFrame(read_json(out / "gapmap.json")["rows"])
+    return {"rows": _records(summary(rows)), "plot": plot("gap-map", gap_map(rows))}
 
 
 def _records(rows: pd.DataFrame) -> list[dict[str, Any]]:

@@ -6,8 +6,8 @@ same state has another one, and lam books the difference:
     jump = 1/2 a0 (h_B^T G_B^-1 h_B - h_A^T G_A^-1 h_A)                 from the set A to the set B
 
 Switching on a row j at h_j = 0 gives 1/2 a0 h_A^T [(G_(A+j)^-1)_AA - G_A^-1] h_A >= 0; a row that lets go where its
-lam vanishes gives 0. Unequal a0 have no potential: there is no such number. It is exact where G is constant; where G depends on q, lam does
-work besides, O(a0^-1/2) of it, since a contact moves the configuration by speed/sqrt(a0).
+lam vanishes gives 0. Unequal a0 have no potential: there is no such number. The sum is all that the law makes where G
+is constant; where G depends on q lam does work besides, O(a0^-1/2) of it: a contact moves q by speed/sqrt(a0).
 """
 
 from __future__ import annotations
