@@ -17,7 +17,19 @@ from crossbody.cases import Event, Mode, Switch
 from crossbody.cases._arrays import Floats
 from crossbody.engines._maze_edges import DEAD_BAND, SOLID, to_edge, wrapped
 from crossbody.engines._maze_memory import (
-    BALANCE, BALLISTIC, CENTRE, CONTACT, FREE, OFF, SNATCH, Memory, angle, over_edge, place_of, rolling, through_gap,
+    BALANCE,
+    BALLISTIC,
+    CENTRE,
+    CONTACT,
+    FREE,
+    OFF,
+    SNATCH,
+    Memory,
+    angle,
+    over_edge,
+    place_of,
+    rolling,
+    through_gap,
 )  # fmt: skip
 from crossbody.engines._maze_rows import ABOVE, BELOW, NORMALS, Formula
 from crossbody.engines._maze_scene import BallMaze
@@ -70,10 +82,18 @@ class MazeMachine:
     def __init__(self, maze: BallMaze, accelerate: Accelerate) -> None:
         self.maze, self.rings, self.accelerate = maze, maze.rings, accelerate
 
-    def watch(self, q: State, v: State, memory: Memory) -> list[float]:
-        """The (16,) functions whose zeros are where the machine must look, positive until then where it matters."""
+    def watch(self, q: State, v: State, memory: Memory, lam: Floats | None = None) -> list[float]:
+        """The (16,) functions whose zeros are where the machine must look, positive until then where it matters.
+
+        Args:
+            q: theta, x, y, phi.
+            v: their rates.
+            memory: discrete state.
+            lam: multipliers there (nc,), if they are known.
+        """
         out = [1.0] * NG
-        lam = self.accelerate(q, v, memory)[1] if CONTACT in memory.modes else None
+        if lam is None and CONTACT in memory.modes:
+            lam = self.accelerate(q, v, memory)[1]
         for i, formula in self.maze.rows.at(memory.place).items():
             if i in NORMALS:
                 out[2 * i], out[2 * i + 1] = self._pair(i, formula, q, v, memory, lam)
@@ -98,7 +118,8 @@ class MazeMachine:
 
         Args:
             t: instant, s.
-            q, v: state.
+            q: theta, x, y, phi.
+            v: their rates.
             memory: before.
             fired: indices of the watched functions that reached zero here.
         """
@@ -199,9 +220,10 @@ class MazeMachine:
         h, hd = at
         if h > 0.0 or (2 * i in fired and hd >= 0.0):
             return FREE
-        if now or not hd < 0.0:
+        if now:
             return BALLISTIC
-        return CONTACT if 2 * i + 1 in fired or self._would_push(q, v, memory, i) > 0.0 else BALLISTIC
+        returns = 2 * i + 1 in fired or (hd < 0.0 and self._would_push(q, v, memory, i) > 0.0)
+        return CONTACT if returns else BALLISTIC
 
     def _would_push(self, q: State, v: State, memory: Memory, i: int) -> float:
         """Multiplier that a row would have with the others and the torque as they are, N."""
@@ -226,10 +248,11 @@ def _released(lam: float, hd: float, now: bool, fired: bool) -> bool:
 
 
 def _transitions(t: float, before: Memory, after: Memory) -> list[Event]:
+    """Of the rows that decide for themselves: slip follows its face without an event of its own."""
     return [
         Event(t=t, contact=i, before=Mode(b), after=Mode(a))
         for i, (b, a) in enumerate(zip(before.modes, after.modes, strict=True))
-        if b != a
+        if b != a and i in NORMALS
     ]
 
 
