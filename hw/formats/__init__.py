@@ -11,14 +11,27 @@ A format is a module here with these public names; its third-party library is im
 from __future__ import annotations
 
 import stat
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from crossbody.cases import FormatUnavailable, LogFormatError, _registry
-from crossbody.hw.formats._contract import Column, Group, Reader
+from crossbody.cases import ColumnMapError, FormatUnavailable, LogFormatError, _registry
+from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group, Reader
 
-__all__ = ["Column", "Group", "Reader", "load", "names", "open_log", "recognise", "summary"]
+__all__ = [
+    "BLOCK_ROWS",
+    "Block",
+    "Column",
+    "Group",
+    "Reader",
+    "load",
+    "names",
+    "open_log",
+    "options",
+    "recognise",
+    "summary",
+]
 
 HEAD = 4096
 
@@ -98,6 +111,22 @@ def _unreadable(path: Path, error: Exception) -> Exception:
         return error
     reason = getattr(error, "strerror", None) or str(error)
     return LogFormatError(path, f"cannot be read: {reason}.")
+
+
+def options(name: str, given: Mapping[str, Any]) -> Any:
+    """The options of a format, as its own type.
+
+    Raises:
+        ColumnMapError: for one that it does not have, or of a wrong type.
+    """
+    import msgspec
+
+    try:
+        return msgspec.convert(given, load(name).Options, strict=True)
+    except msgspec.ValidationError as error:
+        told, _, where = str(error).partition(" - at `$")
+        known = ", ".join(load(name).Options.__struct_fields__) or "none"
+        raise ColumnMapError("column map", "$.options" + where.rstrip("`"), f"{told}; {name} has: {known}.") from None
 
 
 def open_log(path: Path, name: str | None = None, options: Any = None) -> Reader:
