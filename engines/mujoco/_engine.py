@@ -29,6 +29,7 @@ class MujocoRun:
     profile: str
     settings: Mapping[str, Any]
     said: tuple[str, ...]
+    follows: Case | None = None
     engine: str = "mujoco"
 
     def run(self) -> Trajectory:
@@ -94,7 +95,11 @@ class Mujoco:
                 raise  # ours, and it is a ValueError too
             except ValueError as error:
                 raise CaseUnsupported(f"MuJoCo refuses the model of {case.label}: {error}.") from None
-        return MujocoRun(case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said))
+        followed = getattr(mechanism, "followed", None)
+        return MujocoRun(
+            case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said),
+            follows=followed(case, profile) if followed else None,
+        )  # fmt: skip
 
 
 def _known(case: Case, step: float) -> dict[str, Parameter]:
