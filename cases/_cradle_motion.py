@@ -125,7 +125,7 @@ class Motion:
         kinetic = 0.5 * (m * v * v).sum(axis=1)
         shape = (len(t), self.row.n - 1)
         return Trajectory(
-            t=t, q=x, v=v, gap=self.row.gap + np.diff(x, axis=1), lam=np.zeros(shape),
+            t=t, q=x, v=v, gap=np.maximum(self.row.gap + np.diff(x, axis=1), 0.0), lam=np.zeros(shape),
             energy=np.stack([kinetic, np.zeros_like(t)], axis=1), mode=np.zeros(shape, dtype=np.int8),
             events=self.events, steps=len(course.starts),
             outcome=Outcome.STEP_LIMIT if course.full else Outcome.FINISHED,

@@ -7,7 +7,7 @@ some units, where they are over before the next begins (spec 2.2).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -129,7 +129,12 @@ def _run(line: Line, case: Case) -> tuple[Case, Trajectory, str]:
         if not run.outcome.ok or over(run):
             break
         case = replace(case, t_end=2.0 * case.t_end)
-    return case, run, str(prepared.settings.get("law", case.fsm if case.collisions == "resolved" else case.collisions))
+    return case, run, _followed(prepared.settings, case)
+
+
+def _followed(settings: Mapping[str, Any], case: Case) -> str:
+    """The machine of an engine's own, impacts where a restitution stands for the law, else the case's machine."""
+    return "impacts" if "restitution" in settings else str(settings.get("law", case.fsm))
 
 
 def over(run: Trajectory) -> bool:
