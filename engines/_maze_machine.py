@@ -105,13 +105,23 @@ class MazeMachine:
         memory = Memory(modes=(FREE,) * self.maze.nc, place=place_of(self.rings, q))
         if not self.maze.driver.on:
             return memory
-        return self._controlled(replace(memory, control=BALANCE if memory.place.channel else CENTRE), q, touched=False)
+        return self.controlled(replace(memory, control=BALANCE if memory.place.channel else CENTRE), q, touched=False)
 
     def first(self, q: State, v: State) -> Settled:
         """The memory at the start, settled."""
         memory = self.untouched(q)
-        lost = self._places(q, memory)[-1] <= 0.0
-        return replace(self.settle(0.0, q, v, memory), switches=(), lost=lost)
+        return replace(self.settle(0.0, q, v, memory), switches=(), lost=self.strayed(q, memory))
+
+    def strayed(self, q: State, memory: Memory) -> bool:
+        """Whether the ball is where the controller cannot bring it back from."""
+        return self._places(q, memory)[-1] <= 0.0
+
+    def seen(self, memory: Memory, q: State) -> Memory:
+        """Place and controller of a ball that is looked at now and then, instead of at its events."""
+        place = place_of(self.rings, q)
+        moved = place.channel != memory.place.channel and memory.control != OFF
+        memory = replace(memory, place=place, control=SNATCH if moved else memory.control)
+        return self.controlled(memory, q, touched=False)
 
     def settle(self, t: float, q: State, v: State, memory: Memory, fired: Collection[int] = ()) -> Settled:
         """Switch until nothing changes.
@@ -136,9 +146,9 @@ class MazeMachine:
             switched.update(e.contact for e in new)
             memory = after
             if not new:
-                return Settled(memory, tuple(events), _switches(t, start, memory))
+                return Settled(memory, tuple(events), switches(t, start, memory))
             if memory.modes in seen:
-                return Settled(memory, tuple(events), _switches(t, start, memory), cycle=True)
+                return Settled(memory, tuple(events), switches(t, start, memory), cycle=True)
             seen.add(memory.modes)
 
     def _pair(
@@ -182,10 +192,10 @@ class MazeMachine:
             memory = replace(memory, control=SNATCH if self.maze.driver.on else OFF)
         if memory is before:
             return memory
-        return rolling(self._controlled(memory, q, touched=False), self.maze.rows.rolling)
+        return rolling(self.controlled(memory, q, touched=False), self.maze.rows.rolling)
 
-    def _controlled(self, memory: Memory, q: State, touched: bool) -> Memory:
-        """The controller's mode: a gap below is snatched, a face ends it."""
+    def controlled(self, memory: Memory, q: State, touched: bool) -> Memory:
+        """The controller's mode: a gap below is snatched, the touch of a face ends that."""
         place = memory.place
         if memory.control == BALANCE and place.below != SOLID:
             off = angle(q) - self.rings[place.channel - 1].centre(place.below)
@@ -212,7 +222,7 @@ class MazeMachine:
                 modes[i] = self._from_ballistic(q, v, memory, i, (h, hd), fired, i in switched)
         after = replace(memory, modes=tuple(modes))
         touched = CONTACT in (modes[BELOW], modes[ABOVE])
-        return rolling(self._controlled(after, q, touched), self.maze.rows.rolling)
+        return rolling(self.controlled(after, q, touched), self.maze.rows.rolling)
 
     def _from_ballistic(
         self, q: State, v: State, memory: Memory, i: int, at: tuple[float, float], fired: Collection[int], now: bool
@@ -256,7 +266,7 @@ def _transitions(t: float, before: Memory, after: Memory) -> list[Event]:
     ]
 
 
-def _switches(t: float, before: Memory, after: Memory) -> tuple[Switch, ...]:
+def switches(t: float, before: Memory, after: Memory) -> tuple[Switch, ...]:
     """Channel, sectors below and above, mode of the controller."""
     pairs = zip(_discrete(before), _discrete(after), strict=True)
     return tuple(Switch(t=t, variable=i, before=b, after=a) for i, (b, a) in enumerate(pairs) if a != b)
