@@ -145,7 +145,7 @@ class ClockCheck:
         ratio = self._median / self.given
         if not 1.0 / UNIT_WRONG < ratio < UNIT_WRONG:
             text = f"the step is {self._median:.6g} s and sample_time {self.given:.6g} s; is the unit of time right?"
-            return [Finding(check="sample_time", fault=True, channel="time", row=1, t=self.start, count=1, text=text)]
+            return [Finding(check="sample_time", fault=True, channel="time", row=0, t=self.start, count=1, text=text)]
         if self._drift.count:
             text = f"the clock is a whole sample off its nominal time; it runs {1e6 * self.drift:+.1f} ppm slow."
             return [self._drift.told("drift", "time", text, fault=False)]

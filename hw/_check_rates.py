@@ -11,7 +11,7 @@ SPAN = 16  # samples of one comparison: long enough to outweigh the noise of one
 GAIN = (0.5, 2.0)
 ALIKE = 0.7  # correlation
 QUANTA = 20.0  # steps of the encoder that a span must change by, or there is no motion to judge by
-TRAVEL = 10.0  # mean changes that the whole travel must hold: noise at rest holds about six
+SMOOTH = 0.2  # correlation of neighbouring spans: about 1 for a resolved motion, -0.5 for noise at rest
 FEWEST = 8  # spans
 
 
@@ -30,7 +30,7 @@ class RateCheck:
         self._n = 0
         self._dq2 = self._iv2 = self._both = 0.0
         self._quantum = np.inf
-        self._low, self._high = np.inf, -np.inf
+        self._next = 0.0
         self._worst: list[tuple[float, float, int, float]] = []
 
     def see(self, rows: Rows, times: Floats, q: Floats, v: Floats) -> None:
@@ -43,7 +43,6 @@ class RateCheck:
         steps = np.abs(np.diff(q))
         moved = steps[steps > 0.0]
         self._quantum = min(self._quantum, float(moved.min()) if len(moved) else np.inf)
-        self._low, self._high = min(self._low, float(q.min())), max(self._high, float(q.max()))
         path = np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(times))))
         at = np.arange(spans + 1) * SPAN
         dq, iv = np.diff(q[at]), np.diff(path[at])
@@ -51,6 +50,7 @@ class RateCheck:
         self._dq2 += float(dq @ dq)
         self._iv2 += float(iv @ iv)
         self._both += float(dq @ iv)
+        self._next += float(dq[1:] @ dq[:-1])
         self._remember(dq, iv, rows[at[:-1]], times[at[:-1]])
 
     def _remember(self, dq: Floats, iv: Floats, rows: Rows, times: Floats) -> None:
@@ -64,7 +64,7 @@ class RateCheck:
     def _moves(self) -> bool:
         """Whether the coordinate does more than show its noise and the steps of its encoder."""
         size = np.sqrt(self._dq2 / max(self._n, 1))
-        return bool(self._n >= FEWEST and size > QUANTA * self._quantum and self._high - self._low > TRAVEL * size)
+        return bool(self._n >= FEWEST and size > QUANTA * self._quantum and self._next > SMOOTH * self._dq2)
 
     def findings(self) -> list[Finding]:
         """Whether the two belong together; nothing if there is too little motion to tell."""

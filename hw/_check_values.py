@@ -60,12 +60,13 @@ class ValueCheck:
 
     def _about_runs(self) -> list[Finding]:
         runs, found = self.runs, []
-        if runs.longest.count >= STUCK:
+        rests = runs.longest_value == 0.0 and runs.longest.count < runs.seen  # at rest a sensor reads 0
+        if runs.longest.count >= STUCK and not rests:
             text = f"the value does not change for {runs.longest.count} samples."
             found.append(runs.longest.told("stuck", self._channel, text, fault=False))
         for end, first in (("largest", runs.top), ("smallest", runs.bottom)):
             value = runs.high if end == "largest" else runs.low
-            if first.count >= SATURATED and runs.low < runs.high and value != 0.0:  # at rest a sensor reads 0
+            if first.count >= SATURATED and runs.low < runs.high and value != 0.0 and not runs.switch:
                 text = f"the value stays at its {end}, {value:.6g} {self._unit}, for {first.count} samples."
                 found.append(first.told("saturated", self._channel, text, fault=False))
         return found
@@ -80,8 +81,14 @@ class Runs:
     def __init__(self) -> None:
         self.low, self.high = np.inf, -np.inf
         self.longest, self.top, self.bottom = First(), First(), First()
+        self.longest_value, self.seen = np.nan, 0
         self._open = First()
         self._value = np.nan
+
+    @property
+    def switch(self) -> bool:
+        """Whether the values seem to be those of a switch."""
+        return (self.low, self.high) == (0.0, 1.0)
 
     def see(self, rows: Rows, times: Floats, values: Floats) -> None:
         """Take in the next block."""
@@ -89,6 +96,7 @@ class Runs:
         rows, times, values = rows[good], times[good], values[good]
         if not len(values):
             return
+        self.seen += len(values)
         starts = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # NaN differs from everything
         lengths = np.diff(starts, append=len(values))
         head = int(starts[0]) if len(starts) else len(values)
@@ -112,7 +120,7 @@ class Runs:
 
     def _note(self, run: First, value: float) -> None:
         if run.count > self.longest.count:
-            self.longest = First(run.row, run.t, run.count)
+            self.longest, self.longest_value = First(run.row, run.t, run.count), value
         if value > self.high or (value == self.high and run.count > self.top.count):
             self.high, self.top = value, First(run.row, run.t, run.count)
         if value < self.low or (value == self.low and run.count > self.bottom.count):

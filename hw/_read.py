@@ -200,10 +200,17 @@ def check(
     Raises:
         ColumnMapError, LogFormatError, FormatUnavailable: if it cannot be read at all.
     """
-    with scan(path, columns, part) as found:
+    with _opened(Path(path), columns, part) as found:
         for _ in found.rows():
             pass
-        return found.checks.findings()
+        told = list(found.checks.findings())
+        for _, group in groupby(sorted(found.plan.joined, key=_clock), key=_clock):
+            sources = list(group)
+            apart = Checks(sources, None)
+            for block in found.stream.joined(sources):
+                apart.see(block)
+            told += apart.findings()
+    return tuple(sorted(told, key=lambda finding: (not finding.fault, finding.row)))
 
 
 def parts(path: str | Path, columns: Columns | str | Path) -> tuple[int, ...]:

@@ -85,7 +85,7 @@ def recognise(path: Path) -> str:
         raise LogFormatError(path, "is a folder; name a file, or the folder of a ROS 2 bag (with its metadata.yaml).")
     promised = [name for name in names() if path.suffix.lower() in load(name).SUFFIXES]
     if promised:
-        raise LogFormatError(path, f"does not begin as a {'/'.join(promised)} file does: damaged, or not what it says.")
+        raise LogFormatError(path, f"does not begin as {' or '.join(promised)} files do: damaged, or not what it says.")
     known = ", ".join(f"{name} ({' '.join(load(name).SUFFIXES)})" for name in names())
     raise LogFormatError(path, f"is in no known log format (it begins with {head[:8].hex(' ')}). Known: {known}.")
 
