@@ -59,9 +59,10 @@ class RedBody:
     def point(self, q: Floats, row: int) -> Floats:
         """Where row's own point is in the world (2,), m: a foot, a lower corner, the upper right corner."""
         body = SLAB if row < 2 else BOX
-        return q[body][:2] + _turned(q[body][2], self._arm(row))
+        return q[body][:2] + _turned(q[body][2], self.arm(row))
 
-    def _arm(self, row: int) -> tuple[float, float]:
+    def arm(self, row: int) -> tuple[float, float]:
+        """Row's own point in the axes of its body, m."""
         side = -1.0 if row in (0, 2) else 1.0
         return self.foot(side) if row < 2 else self.corner(side, -1.0 if row < 4 else 1.0)
 

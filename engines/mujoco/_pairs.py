@@ -50,6 +50,8 @@ class Pairs:
         self.model, self.data, self.small, self.gaps, self.drift = model, data, small, gaps, drift
         self.nc, self.a0 = len(geoms), np.array(law.a0)
         self.margin: Floats = model.pair_margin
+        # The compiler sorts pairs by the bodies that they join.
+        self.order = np.array([model.pair(f"pair {i}").id for i in range(model.npair)])
         ids = [[model.geom(name).id for name in pair] for pair in geoms]
         self._row = {(a, b): i for i, pair in enumerate(ids) for a, b in (pair, pair[::-1])}
 
@@ -83,7 +85,7 @@ class Pairs:
         """What opens and closes rows to suit their modes; a closed one exists up to a gap of `reach`, m."""
 
         def arm(modes: Modes) -> None:
-            self.margin[:] = [-FAR if mode == FREE else reach for mode in modes]
+            self.margin[self.order] = [-FAR if mode == FREE else reach for mode in modes]
 
         return arm
 
@@ -103,7 +105,7 @@ class Pairs:
         """Correct the reference accelerations: positions are counted from the margin, and H' v is missing."""
         if d.nefc:
             rows, at = self._there()
-            d.efc_aref[at] -= self.a0[rows] * self.margin[rows]
+            d.efc_aref[at] -= self.a0[rows] * self.margin[self.order[rows]]
             if self.drift is not None:
                 d.efc_aref[at] -= self.drift()[rows]
 
