@@ -71,7 +71,8 @@ def truth_of(case: Case) -> Truth:
         CrossbodyError: if the reference cannot run the case.
     """
     if case.closed_form is None:
-        return _integrated(case)
+        # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
+        return _integrated(case, _tight(case), "cvode" if case.fsm == "level" else "compiled")
     motion = case.closed_form
     first = motion(np.zeros(1))
     return Truth(
@@ -96,12 +97,37 @@ def cache_of_one(function: Callable[[Floats], Trajectory]) -> Callable[[Floats],
     return cached
 
 
-def _integrated(case: Case) -> Truth:
-    """Tier C: the compiled integrator at 1e-13, held against CVODE; tier D for another machine than level."""
+def law_of(followed: Case) -> Truth | None:
+    """The truth of the equations that an engine really integrates, where they are not the case's own (spec 4.1).
+
+    Against it an engine has a discretisation error alone. It is known by the reference itself (tier D).
+
+    Args:
+        followed: the case with the engine's machine and collision rule (`follows` of its run).
+
+    Returns:
+        None where the reference does not reach the horizon: the engine is then judged against itself.
+    """
+    first = _tight(followed)
+    if not first.outcome.ok:
+        return None
+    found = _integrated(followed, first, "compiled")
+    rule = f"the equations that the engine follows (machine {followed.fsm}, collisions {followed.collisions}): "
+    return replace(found, source=rule + found.source)
+
+
+def _tight(case: Case) -> Trajectory:
+    """The compiled integrator at 1e-13."""
+    from crossbody.engines import load
+
+    return load("reference").prepare(case, "compiled", rtol=TIGHT).run()
+
+
+def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
+    """The compiled integrator at 1e-13, held against another solver: tier C if that is independent, else D."""
     from crossbody.engines import load
 
     reference = load("reference")
-    first = reference.prepare(case, "compiled", rtol=TIGHT).run()
 
     @cache_of_one
     def at(times: Floats) -> Trajectory:
@@ -109,8 +135,7 @@ def _integrated(case: Case) -> Truth:
         return with_both_sides(run, first)
 
     dense = at(sample_times(first, case.t_end))
-    # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
-    tier, other = (Tier.C, "cvode") if case.fsm == "level" else (Tier.D, "compiled")
+    tier = Tier.D if other == "compiled" else Tier.C
     second = reference.prepare(case, other, rtol=SECOND).run()
     truth = Truth(tier=tier, source="", trajectory=dense, at=at, agreement={})
     truth = replace(truth, trusted=_trusted(truth, second))
