@@ -56,6 +56,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         t_end=p["t_end"],
         law=soft.contact_law(p, *((6, 3) if whole else ())),
         collisions="resolved",
+        tight=1e-11 if whole else 1e-12,
         claims=claims(variant, parameters, PARAMETERS, VARIANTS[variant]),
         limits=limits(variant),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},

@@ -13,10 +13,8 @@ from crossbody.cases import Case, Tier, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports._between import between
 
-TIGHT = 1e-13
-"""Tolerance of the reference where it stands for the truth."""
-SECOND = 1e-12
-"""Tolerance of the independent integrator that it is held against."""
+SECOND = 10.0
+"""Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
 
@@ -117,31 +115,31 @@ def law_of(followed: Case) -> Truth | None:
 
 
 def _tight(case: Case) -> Trajectory:
-    """The compiled integrator at 1e-13."""
+    """The compiled integrator at the case's tightest tolerance."""
     from crossbody.engines import load
 
-    return load("reference").prepare(case, "compiled", rtol=TIGHT).run()
+    return load("reference").prepare(case, "compiled", rtol=case.tight).run()
 
 
 def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
-    """The compiled integrator at 1e-13, held against another solver: tier C if that is independent, else D."""
+    """The compiled integrator at its tightest, held against another solver: tier C if that is independent, else D."""
     from crossbody.engines import load
 
     reference = load("reference")
 
     @cache_of_one
     def at(times: Floats) -> Trajectory:
-        run = reference.prepare(case, "compiled", rtol=TIGHT, samples=np.array(times)).run()
+        run = reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)).run()
         return with_both_sides(run, first)
 
     dense = at(sample_times(first, case.t_end))
     tier = Tier.D if other == "compiled" else Tier.C
-    second = reference.prepare(case, other, rtol=SECOND).run()
+    second = reference.prepare(case, other, rtol=SECOND * case.tight).run()
     truth = Truth(tier=tier, source="", trajectory=dense, at=at, agreement={})
     truth = replace(truth, trusted=_trusted(truth, second))
     found = _agreement(truth, second, case)
     said = ", ".join(f"{name} {value:.1e}" for name, value in found.items())
-    source = f"compiled reference at rtol {TIGHT:g}, {other} at {SECOND:g} agrees: {said}"
+    source = f"compiled reference at rtol {case.tight:g}, {other} at {SECOND * case.tight:g} agrees: {said}"
     if truth.trusted < case.t_end:
         source += f"; compared until they part at t = {truth.trusted:.4g} s"
     return replace(truth, source=source, agreement=found)

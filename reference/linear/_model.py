@@ -77,9 +77,10 @@ class LinearModel:
         resolvent = 1j * w[:, None, None] * np.eye(len(self.states)) - self.A
         driven = np.broadcast_to(self.B.astype(np.complex128), (len(w), *self.B.shape))
         try:
-            found: Complex = self.C @ np.linalg.solve(resolvent, driven) + self.D
+            solved = np.linalg.solve(resolvent, driven)
         except np.linalg.LinAlgError:
             raise InvalidValue("LinearModel.response: a frequency is a pole, where there is no response.") from None
+        found: Complex = (self.C @ solved + self.D).astype(np.complex128)
         return found
 
     def pick(self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None) -> LinearModel:
