@@ -14,6 +14,7 @@ Rows = NDArray[np.int64]
 
 GAP = 1.5  # sample times: a longer step lacks samples
 UNIT_WRONG = 1.5  # ratio of median step to nominal step that no clock explains
+EARLY = 1000  # steps that tell the sample time
 JITTER = 0.1  # sample times
 
 
@@ -55,7 +56,7 @@ class ClockCheck:
         self.start = self.end = np.nan
         self.longest = 0.0
         self.missing = 0
-        self._median = np.nan
+        self._early: list[float] = []
         self._index, self._row = 0, -1
         self._sums = np.zeros(5)  # k, k^2, e, e k, e^2
         self._finite, self._back, self._same = First(), First(), First()
@@ -68,7 +69,7 @@ class ClockCheck:
         self._finite.see(~np.isfinite(times), rows, times)
         if not self.rows:
             self.start = self.end = float(times[0])
-            self._first_block(times)
+        self._look_at_first(times)
         with np.errstate(invalid="ignore", over="ignore"):
             steps = np.diff(times, prepend=self.end)
             if not self.rows:
@@ -81,13 +82,20 @@ class ClockCheck:
             self.end = float(times[-1])
         self.rows += len(times) + (0 if self.rows else 1)
 
-    def _first_block(self, times: Floats) -> None:
+    def _look_at_first(self, times: Floats) -> None:
+        """The median of the first steps; it is the sample time where none was given."""
+        if len(self._early) >= EARLY:
+            return
         with np.errstate(invalid="ignore", over="ignore"):
-            steps = np.diff(times)
-        steps = steps[np.isfinite(steps) & (steps > 0.0)]
-        self._median = float(np.median(steps)) if len(steps) else np.nan
-        if self.given is None:
-            self.step = self._median
+            steps = np.diff(times[:EARLY], prepend=self.end)
+        self._early += steps[np.isfinite(steps) & (steps > 0.0)].tolist()
+        if self.given is None and not self.step > 0.0 and self._early:
+            self.step = self.median
+
+    @property
+    def median(self) -> float:
+        """Median of the first steps, s; NaN if there are none."""
+        return float(np.median(self._early)) if self._early else np.nan
 
     def _against_nominal(self, rows: Rows, times: Floats, steps: Floats) -> None:
         good = np.isfinite(steps) & (steps > 0.0) & (steps < 1e9 * self.step)
@@ -104,7 +112,7 @@ class ClockCheck:
         self._index = int(k[-1])
         e = times - self.start - k * self.step
         self._drift.see(np.abs(e) > self.step, rows, times)
-        self._sums += (k.sum(), k @ k, e.sum(), e @ k, e @ e)
+        self._sums += (k.sum(), (k * k).sum(), e.sum(), (e * k).sum(), (e * e).sum())  # no BLAS: its threads cost more
 
     @property
     def drift(self) -> float:
@@ -137,15 +145,20 @@ class ClockCheck:
         told = [
             first.told(check, "time", text + ".", fault=fault) for first, check, text, fault in found if first.count
         ]
-        return told + self._about_nominal()
+        wrong = self._unit_is_wrong()
+        return [f for f in told if f.fault] + wrong if wrong else told + self._about_drift()
 
-    def _about_nominal(self) -> list[Finding]:
-        if self.given is None or self.rows < 2:
+    def _unit_is_wrong(self) -> list[Finding]:
+        if self.given is None or not self._early:
             return []
-        ratio = self._median / self.given
-        if not 1.0 / UNIT_WRONG < ratio < UNIT_WRONG:
-            text = f"the step is {self._median:.6g} s and sample_time {self.given:.6g} s; is the unit of time right?"
-            return [Finding(check="sample_time", fault=True, channel="time", row=0, t=self.start, count=1, text=text)]
+        if 1.0 / UNIT_WRONG < self.median / self.given < UNIT_WRONG:
+            return []
+        text = f"the step is {self.median:.6g} s and sample_time {self.given:.6g} s; is the unit of time right?"
+        return [Finding(check="sample_time", fault=True, channel="time", row=0, t=self.start, count=1, text=text)]
+
+    def _about_drift(self) -> list[Finding]:
+        if self.given is None:
+            return []
         if self._drift.count:
             text = f"the clock is a whole sample off its nominal time; it runs {1e6 * self.drift:+.1f} ppm slow."
             return [self._drift.told("drift", "time", text, fault=False)]

@@ -47,10 +47,10 @@ class RateCheck:
         at = np.arange(spans + 1) * SPAN
         dq, iv = np.diff(q[at]), np.diff(path[at])
         self._n += spans
-        self._dq2 += float(dq @ dq)
-        self._iv2 += float(iv @ iv)
-        self._both += float(dq @ iv)
-        self._next += float(dq[1:] @ dq[:-1])
+        self._dq2 += float((dq * dq).sum())
+        self._iv2 += float((iv * iv).sum())
+        self._both += float((dq * iv).sum())
+        self._next += float((dq[1:] * dq[:-1]).sum())
         self._remember(dq, iv, rows[at[:-1]], times[at[:-1]])
 
     def _remember(self, dq: Floats, iv: Floats, rows: Rows, times: Floats) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from crossbody.cases import LogFormatError
 from crossbody.hw._check_clock import ClockCheck
 from crossbody.hw._check_rates import RateCheck
 from crossbody.hw._check_values import ValueCheck
@@ -44,17 +43,22 @@ class Checks:
         """Raise the first fault that was found, if there is one.
 
         Raises:
-            LogFormatError: with row, time and channel of its first offence; also for a log too short to be one.
+            LogFormatError: with row, time and channel of its first offence.
         """
-        if self.clock.rows < FEWEST:
-            raise LogFormatError(path, f"has {self.clock.rows} samples; a log needs at least {FEWEST}.")
         for finding in self.findings():
             if finding.fault:
                 raise finding.error(path)
 
+    def _about_length(self) -> list[Finding]:
+        if self.clock.rows >= FEWEST:
+            return []
+        text = f"the number of samples is {self.clock.rows}; a log needs at least {FEWEST}."
+        t = self.clock.start
+        return [Finding(check="samples", fault=True, channel="time", row=0, t=t, count=1, text=text)]
+
     def findings(self) -> tuple[Finding, ...]:
         """Everything found, faults first, in the order of their rows."""
-        found = self.clock.findings() + [f for check in self._values for f in check.findings()]
+        found = self._about_length() + self.clock.findings() + [f for check in self._values for f in check.findings()]
         if not any(f.fault for f in found):  # with a broken clock or holes, rates tell nothing new
             found += [f for check, _, _ in self._rates for f in check.findings()]
         return tuple(sorted(found, key=lambda f: (not f.fault, f.row)))

@@ -90,7 +90,10 @@ def test_a_new_format_is_one_new_file(tmp_path: Path, monkeypatch: pytest.Monkey
     sys.modules.pop("crossbody.hw.formats.counts")
 
 
-PACKAGES = {"mat73": "h5py", "hdf5": "h5py", "mcap": "mcap", "ros1": "rosbags", "ros2": "rosbags", "mdf": "asammdf", "tdms": "nptdms"}  # fmt: skip
+PACKAGES = {
+    "mat73": "h5py", "hdf5": "h5py", "mcap": "mcap", "ros1": "rosbags", "ros2": "rosbags", "mdf": "asammdf",
+    "tdms": "nptdms",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", PACKAGES)
@@ -110,8 +113,9 @@ def test_reading_imports_only_the_library_of_its_format(tmp_path: Path) -> None:
     log_files.write("csv", tmp_path, log_files.table(20))
     (tmp_path / "map.toml").write_text(hw.dump_columns(map_of("csv")))
     code = (
-        f"import sys\nfrom crossbody import hw\nhw.read({str(tmp_path / 'log.csv')!r}, {str(tmp_path / 'map.toml')!r})\n"
-        "found = [m for m in ('h5py', 'mcap', 'rosbags', 'asammdf', 'nptdms', 'pickle_loads') if m in sys.modules]\n"
+        "import sys\nfrom crossbody import hw\n"
+        f"hw.read({str(tmp_path / 'log.csv')!r}, {str(tmp_path / 'map.toml')!r})\n"
+        "found = [m for m in ('h5py', 'mcap', 'rosbags', 'asammdf', 'nptdms') if m in sys.modules]\n"
         "assert not found, found\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -206,7 +210,8 @@ def test_ros_stamps_count_exactly(tmp_path: Path) -> None:
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    time_, header, state = (store.types[f"{n}"] for n in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", "sensor_msgs/msg/JointState"))  # fmt: skip
+    kinds = ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", "sensor_msgs/msg/JointState")
+    time_, header, state = (store.types[kind] for kind in kinds)
     start, none = 1_700_000_000, np.zeros(0)
     with Writer(tmp_path / "bag", version=9) as bag:
         link = bag.add_connection("/joints", state.__msgtype__, typestore=store)
