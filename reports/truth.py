@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Case, Tier, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.cases._trajectory import Ledger
 from crossbody.reports._between import between
 
 SECOND = 10.0
@@ -169,7 +171,18 @@ def with_both_sides(run: Trajectory, natural: Trajectory) -> Trajectory:
     for name in ("q", "v", "gap", "lam", "energy", "mode"):
         rows[name] = getattr(run, name).copy()
         rows[name][again[known]] = getattr(natural, name)[after[known]]
-    return replace(run, **rows)  # type: ignore[arg-type]
+    booked = run.ledger
+    if booked is not None and natural.ledger is not None:
+        booked = _booked(booked, natural.ledger, again[known], after[known])
+    return replace(run, ledger=booked, **rows)  # type: ignore[arg-type]
+
+
+def _booked(run: Ledger, natural: Ledger, at: NDArray[np.intp], after: NDArray[np.intp]) -> Ledger:
+    """The account behind an event: a collision in no time does its work at one instant."""
+    accounts = {name: getattr(run, name).copy() for name in ("contact", "input", "dissipated")}
+    for name, account in accounts.items():
+        account[at] = getattr(natural, name)[after]
+    return Ledger(**accounts)
 
 
 def _agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
