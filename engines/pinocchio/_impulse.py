@@ -213,7 +213,7 @@ class ImpulseMachine:
                 out[at + PUSH] = lam[i]
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = frozenset()) -> Settled:
-        """Release what pulls, then strike or hold what touches."""
+        """Release what pulls; hold what rests and is pressed; strike what approaches, until nothing does."""
         h, hd = self.rows.gaps(q, v)
         at, rounding = Instant(self.rows, q, v, modes), 8.0 * ULP * float(np.abs(q).max(initial=0.0))
         at.slow = self.slow = max(self.slow, SLOW * float(np.abs(hd).max(initial=0.0)))
@@ -222,7 +222,7 @@ class ImpulseMachine:
         at.touching = [i for i in self.own if h[i] <= rounding or (i, GAP) in fired]
         cycle = True
         for _ in range(PER_ROW * len(modes)):
-            if not self.rule(at, self.a0, self.e) and not at.hold_resting():
+            if not at.hold_resting() and not self.rule(at, self.a0, self.e):
                 cycle = False
                 break
         self._closed = set(at.touching)
