@@ -29,7 +29,7 @@ GEOMETRY = maze_of(load("ball_maze", variant="solve").parameters)
 
 def there(channel, lower, upper, mode=0, target=0.3, touching=0.0, system=SYSTEM):
     p = system.p.copy()
-    p[layout.CHANNEL :] = channel, lower, upper, mode, target, touching
+    p[layout.CHANNEL : layout.ANGLE] = channel, lower, upper, mode, target, touching
     return p
 
 
