@@ -127,6 +127,8 @@ class Pinocchio:
             return "The profile admm steps contacts in time: the loops of this mechanism never open."
         if profile in RULES and not case.law.unilateral.all():
             return "An impact needs a contact that opens: a row that is always on has none."
+        if profile == "impulse_simultaneous" and int(case.law.unilateral.sum()) < 2:
+            return "One contact collides with no other: the profile impulse is the same."
         if profile == "law" and case.fsm != "level":
             return f"The profile law switches by the machine 'level' and not by {case.fsm!r}."
         return None
