@@ -18,13 +18,29 @@ from crossbody.reports.cli import main
 DAMAGES = {damage.name: damage for damage in log_damage.damages()}
 
 
-def made(damage: log_damage.Damage, folder: Path) -> tuple[Path, Path]:
-    """The damaged log, and the map to read it by."""
-    if damage.needs:
-        pytest.importorskip(damage.needs)
-    (folder / "map.toml").write_text(log_damage.column_map(damage.case))
-    (folder / "rig").mkdir()
-    return damage.make(folder / "rig"), folder / "map.toml"
+class Workshop:
+    """Damaged logs, each made once in a folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._made: dict[str, tuple[Path, Path]] = {}
+
+    def made(self, name: str) -> tuple[Path, Path]:
+        """The damaged log, and the map to read it by."""
+        damage = DAMAGES[name]
+        if damage.needs:
+            pytest.importorskip(damage.needs)
+        if name not in self._made:
+            folder = self.folder / name
+            (folder / "rig").mkdir(parents=True)
+            (folder / "map.toml").write_text(log_damage.column_map(damage.case))
+            self._made[name] = damage.make(folder / "rig"), folder / "map.toml"
+        return self._made[name]
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
+    return Workshop(tmp_path_factory.mktemp("damaged"))
 
 
 def listing(folder: Path) -> list[str]:
@@ -45,11 +61,11 @@ def test_the_undamaged_log_is_read(case: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_log_is_refused_with_its_place_in_one_sentence_and_exit_code_2(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, workshop: Workshop, capsys: pytest.CaptureFixture[str]
 ) -> None:
     damage = DAMAGES[name]
-    path, columns = made(damage, tmp_path)
-    before = listing(tmp_path)
+    path, columns = workshop.made(name)
+    before = listing(columns.parent)
     with pytest.raises(LogFormatError) as told:
         hw.read(path, columns)
     assert damage.says in str(told.value)
@@ -63,7 +79,7 @@ def test_a_damaged_log_is_refused_with_its_place_in_one_sentence_and_exit_code_2
     assert shown.err.count("\n") == 1
     assert path.name in shown.err
     assert "\x1b" not in shown.out + shown.err
-    assert listing(tmp_path) == before
+    assert listing(columns.parent) == before
 
 
 CHILD = """
@@ -95,7 +111,9 @@ print(json.dumps([refused, seen, (resource.getrusage(resource.RUSAGE_SELF).ru_ma
 """
 
 
-def test_reading_them_executes_nothing_writes_nothing_and_keeps_memory_bounded(tmp_path: Path) -> None:
+def test_reading_them_executes_nothing_writes_nothing_and_keeps_memory_bounded(
+    tmp_path: Path, workshop: Workshop
+) -> None:
     for package in sorted(set(log_files.NEEDS.values())):
         pytest.importorskip(package)
     work = []
@@ -104,15 +122,15 @@ def test_reading_them_executes_nothing_writes_nothing_and_keeps_memory_bounded(t
         columns = tmp_path / f"clean-{case}" / "map.toml"
         columns.write_text(log_damage.column_map(case))
         work.append((str(log_files.write(case, columns.parent / "clean", log_damage.motion())), str(columns)))
-    for name, damage in DAMAGES.items():
-        (tmp_path / name).mkdir()
-        work.append(tuple(map(str, made(damage, tmp_path / name))))
-    before = listing(tmp_path)
+    for name in DAMAGES:
+        path, columns = workshop.made(name)
+        work.append((str(path), str(columns)))
+    before = listing(workshop.folder)
     done = subprocess.run([sys.executable, "-c", CHILD, json.dumps(work)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     refused, seen, megabytes = json.loads(done.stdout)
     assert refused == len(DAMAGES)
     assert seen == []
     assert megabytes < 200, "the sparse ones are 10 GB each"
-    assert listing(tmp_path) == before
-    assert not list(tmp_path.rglob("executed"))
+    assert listing(workshop.folder) == before
+    assert not [name for name in before if name.endswith("executed")]

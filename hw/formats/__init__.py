@@ -142,9 +142,9 @@ def open_log(path: Path, name: str | None = None, options: Any = None) -> Reader
         FormatUnavailable: if the format's package is not installed.
         UnknownName: for a format that does not exist.
     """
-    if name is not None:
-        _head(path)
     module = load(name or recognise(path))
+    if name is not None and not module.recognises(path, _head(path)):
+        raise LogFormatError(path, f"does not begin as {name} files do: damaged, or in another format.")
     try:
         reader: Reader = module.open_log(path, module.Options() if options is None else options)
     except ModuleNotFoundError as error:
