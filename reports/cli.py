@@ -102,6 +102,16 @@ def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: P
 
 
 @cli.command()
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+def stability(wanted: tuple[str, ...], out: Path) -> int:
+    """Map from which scenes the closed-loop ball maze still comes to its centre."""
+    from crossbody.reports.commands import stability_map as work
+
+    return work(wanted, out, _command())
+
+
+@cli.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> int:
     """Make the page of an earlier run again."""

@@ -56,6 +56,7 @@ def render(out: Path) -> str:
         cases=_cases([load(path) for path in sorted((out / "traces").glob("*.parquet"))]),
         bench=_bench(out),
         gapmap=_gap_map(out),
+        stability=_stability(out),
         provenance=read_json(out / "provenance.json"),
         script=SCRIPT,
     )
@@ -82,6 +83,16 @@ def _gap_map(out: Path) -> dict[str, Any]:
 
     rows = pd.DataFrame(read_json(out / "gapmap.json")["rows"])
     return {"rows": _records(summary(rows)), "plot": plot("gap-map", gap_map(rows))}
+
+
+def _stability(out: Path) -> dict[str, Any]:
+    """Context of the stability map; empty where there is none."""
+    if not (out / "stability.json").is_file():
+        return {}
+    from crossbody.reports.stability_figure import stability
+
+    rows = pd.DataFrame(read_json(out / "stability.json")["rows"])
+    return {"rows": _records(rows), "plot": plot("stability-map", stability(rows))}
 
 
 def _records(rows: pd.DataFrame) -> list[dict[str, Any]]:

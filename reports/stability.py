@@ -17,13 +17,18 @@ import pandas as pd
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Trajectory, Value
+from crossbody.reports.jobs import Pick
 from crossbody.reports.metrics._maze import ring_changes
 
-COLUMNS = ("change", "scene", "expected", "arrived", "outcome", "arrival", "changes", "wall_ms", "why")
+COLUMNS = (
+    "engine", "profile", "change", "scene", "expected", "arrived", "outcome", "ended", "arrival", "changes", "wall_ms",
+    "why",
+)  # fmt: skip
 HORIZON = 130.0
 """Time in which the slowest maze of the map comes to the centre, s."""
 RTOL = 1e-8
-TUMBLES = "either"
+TUMBLES, SKIPPED = "either", "skipped"
+DEFAULT = Pick(engine="reference", profile="compiled")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,31 +91,35 @@ POINTS = (
 
 
 def stability_map(
-    points: Iterable[Point] = POINTS, engine: str = "reference", profile: str = "compiled",
-    tell: Callable[[str], None] = lambda _: None,
-) -> pd.DataFrame:  # fmt: skip
-    """Run every point.
+    picks: Iterable[Pick] = (DEFAULT,), points: Sequence[Point] = POINTS, tell: Callable[[str], None] = lambda _: None
+) -> pd.DataFrame:
+    """Run every point on every engine.
 
     Args:
+        picks: the engines; the reference runs with a tolerance of 1e-8, the others with their own.
         points: the scenes.
-        engine: who runs them; the reference with a tolerance of 1e-8.
-        profile: of that engine.
         tell: is told what is being done, once a point.
 
     Returns:
-        One row a point, columns `COLUMNS`; arrival is the instant at which the ball last entered the centre, s.
-
-    Raises:
-        CaseUnsupported: if that engine cannot run the maze.
+        One row a run, columns `COLUMNS`: ended is where the run ended, arrival when the ball came to the centre to
+        stay, s. What an engine cannot run is a row with its sentence.
     """
     rows = []
-    for point in points:
-        tell(f"{point.change}: {point.scene}")
-        case = cases.load("ball_maze", "solve", **{"t_end": HORIZON, **point.parameters})
-        settings = {"rtol": RTOL} if engine == "reference" else {}
-        run = engines.load(engine).prepare(case, profile, **settings).run()
-        rows.append({"change": point.change, "scene": point.scene, "expected": point.expected, **_measured(case, run)})
+    for pick in picks:
+        for point in points:
+            tell(f"{pick.engine}:{pick.profile} {point.change}: {point.scene}")
+            about = {"engine": pick.engine, "profile": pick.profile, "change": point.change, "scene": point.scene}
+            rows.append({**about, "expected": point.expected, **_run(pick, point)})
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _run(pick: Pick, point: Point) -> dict[str, Any]:
+    case = cases.load("ball_maze", "solve", **{"t_end": HORIZON, **point.parameters})
+    reason = pick.skipped or engines.load(pick.engine).why_not(case, pick.profile)
+    if reason:
+        return {"outcome": SKIPPED, "arrived": False, "why": reason}
+    settings = {"rtol": RTOL} if pick.engine == "reference" else {}
+    return _measured(case, engines.load(pick.engine).prepare(case, pick.profile, **settings).run())
 
 
 def _measured(case: Case, run: Trajectory) -> dict[str, Any]:
@@ -120,6 +129,7 @@ def _measured(case: Case, run: Trajectory) -> dict[str, Any]:
     return {
         "arrived": there and run.outcome.ok,
         "outcome": run.outcome.value,
+        "ended": float(run.t[-1]) if len(run.t) else 0.0,
         "arrival": last.t if last is not None and there else math.nan,
         "changes": len(ring_changes(run, case)),
         "wall_ms": 1e3 * run.wall_s,
@@ -129,5 +139,5 @@ def _measured(case: Case, run: Trajectory) -> dict[str, Any]:
 
 def surprises(rows: pd.DataFrame) -> pd.DataFrame:
     """The points whose end is not the expected one."""
-    known = rows["expected"] != TUMBLES
+    known = (rows["expected"] != TUMBLES) & (rows["outcome"] != SKIPPED)
     return rows[known & (rows["arrived"] != (rows["expected"] == "solved"))]

@@ -156,7 +156,7 @@ SAMPLE = {
 def test_a_sample_of_the_stability_map_is_as_published():
     points = [point for point in stability.POINTS if point.scene in SAMPLE]
     assert len(points) == len(SAMPLE)
-    rows = stability.stability_map(points)
+    rows = stability.stability_map(points=points)
     assert stability.surprises(rows).empty, stability.surprises(rows).to_string()
     assert set(rows["outcome"]) == {"finished", "lost"}
     arrival = rows.set_index("scene")["arrival"]
@@ -176,7 +176,7 @@ def test_surprises_are_the_points_that_end_otherwise():
         stability.Point(change="t_end", parameters={"t_end": 12.0}, expected="fails"),
         stability.Point(change="t_end", parameters={"t_end": 12.0}, expected=stability.TUMBLES),
     ]
-    rows = stability.stability_map(points)
+    rows = stability.stability_map(points=points)
     assert stability.surprises(rows).index.tolist() == [0]
     assert rows["changes"].tolist() == [1, 1, 1]
 
