@@ -102,7 +102,7 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     picks = jobs.picks(wanted) if wanted else (stability.DEFAULT,)
     output.check(out)
     with progress(len(picks) * len(stability.POINTS)) as tell:
-        rows = stability.stability_map(picks, tell=tell)
+        rows = stability.stability_map(picks, stability.POINTS, tell)
     told = provenance(command, rtol=stability.RTOL)
     with output.folder(out) as made:
         study.write(made, [], study.judge([], {}), told)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from functools import cache
 
@@ -13,7 +14,7 @@ from crossbody.cases import _closed_forms as cf
 from crossbody.cases import _maze_closed_forms as maze_forms
 from crossbody.reference import simulate
 from crossbody.reference.systems import maze
-from crossbody.reports import metrics, stability
+from crossbody.reports import commands, jobs, metrics, stability
 
 CHANNEL, LOWER, UPPER, MODE = range(4)
 BALANCE, SNATCH, CENTRE = 1, 2, 3
@@ -179,6 +180,28 @@ def test_surprises_are_the_points_that_end_otherwise():
     rows = stability.stability_map(points=points)
     assert stability.surprises(rows).index.tolist() == [0]
     assert rows["changes"].tolist() == [1, 1, 1]
+
+
+def test_map_is_a_command_with_a_section_of_the_page(tmp_path, monkeypatch, capsys):
+    points = (stability.Point(change="omega", parameters={"omega": 0.8}), stability.Point(change="default"))
+    absent = stability.Point(change="t_end", parameters={"t_end": 2.0})
+    monkeypatch.setattr(stability, "POINTS", (*points, absent))
+    assert commands.stability_map((), tmp_path / "out", "crossbody stability") == 1
+    said = capsys.readouterr().out
+    assert "outside: reference:compiled t_end = 2: solved expected." in said
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert 'id="stability"' in page
+    assert "omega = 0.8" in page
+    kept = json.loads((tmp_path / "out" / "stability.json").read_text())["rows"]
+    assert [row["arrived"] for row in kept] == [True, True, False]
+
+
+def test_an_engine_that_cannot_run_the_maze_says_so():
+    pick = jobs.Pick(engine="absent", profile="any", skipped="absent is not installed.")
+    rows = stability.stability_map([pick], [stability.Point(change="default")])
+    assert rows["outcome"].tolist() == ["skipped"]
+    assert rows["why"].tolist() == ["absent is not installed."]
+    assert stability.surprises(rows).empty
 
 
 def test_metrics_of_ring_changes_compare_run_and_truth():
