@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
-from crossbody.cases._case import Limit
+from crossbody.cases._case import Claim, Limit
 
 TOGETHER = (
     "It integrates the law of all contacts together: balls that touch act as one block, and where collisions overlap "
@@ -51,7 +51,6 @@ _SLIDERS: Bounds = {
     "position": (1e-9, _EXACT),
     "event_times": (1e-10, _EXACT),
     "touch_count": (0.0, "a count"),
-    "balls_out": (0.0, "a count"),
 }
 _PENDULUMS: Bounds = {
     "pattern_distance": (1e-3, "balls that wait for the last collision swing back a little, by the gap"),
@@ -60,7 +59,6 @@ _PENDULUMS: Bounds = {
     "position": (1e-5, _LOCATED),
     "event_times": (1e-6, _LOCATED),
     "touch_count": (0.0, "a count"),
-    "balls_out": (0.0, "a count"),
 }
 _RESOLVED: Bounds = {
     "energy_drift": (1e-6, _LOCATED),
@@ -78,15 +76,17 @@ _SIZES = {"pattern_distance": 1.0, "pattern_simultaneous": 1.0, "energy_drift": 
 """How far another rule takes an engine from this one's truth: about twice what was measured (crossbody run)."""
 
 
-def limits(variant: str, rule: str, gap: float) -> tuple[Limit, ...]:
+def limits(variant: str, rule: str, gap: float, claims: Iterable[Claim]) -> tuple[Limit, ...]:
     """The limits of one variant under one rule.
 
     Args:
         variant: "sliders" or "pendulums".
         rule: for several contacts.
         gap: between neighbours at rest, m; 0 where they touch.
+        claims: what the case claims: each is a count.
     """
-    return tuple(_all(variant, rule, gap))
+    counts = {claim.metric: (0.0, "a count") for claim in claims}
+    return tuple(_all(variant, rule, {**_bounds(variant, rule, gap), **counts}))
 
 
 def _bounds(variant: str, rule: str, gap: float) -> Bounds:
@@ -96,13 +96,13 @@ def _bounds(variant: str, rule: str, gap: float) -> Bounds:
     if rule == "sequential":
         return bounds
     # Whether a row that passes an impulse on without having closed counts as a touch is a matter of convention.
-    kept = {metric: bound for metric, bound in bounds.items() if metric not in ("balls_out", "touch_count")}
+    kept = {metric: bound for metric, bound in bounds.items() if metric != "touch_count"}
     kept["pattern_simultaneous"] = kept.pop("pattern_distance")
     return kept
 
 
-def _all(variant: str, rule: str, gap: float) -> Iterator[Limit]:
-    for metric, (value, why) in _bounds(variant, rule, gap).items():
+def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
+    for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
         for (engine, profile), known in _OTHERS[rule].items():
             size = _SIZES.get(metric, math.inf)
