@@ -57,6 +57,7 @@ def render(out: Path) -> str:
         bench=_bench(out),
         gapmap=_gap_map(out),
         stability=_stability(out),
+        bode=_bode(out),
         provenance=read_json(out / "provenance.json"),
         script=SCRIPT,
     )
@@ -93,6 +94,17 @@ def _stability(out: Path) -> dict[str, Any]:
 
     rows = pd.DataFrame(read_json(out / "stability.json")["rows"])
     return {"rows": _records(rows), "plot": plot("stability-map", stability(rows))}
+
+
+def _bode(out: Path) -> dict[str, Any]:
+    """Context of the frequency responses; empty where there are none."""
+    if not (out / "bode.json").is_file():
+        return {}
+    from crossbody.reports.bode import growths
+    from crossbody.reports.bode_figure import bode
+
+    rows, poles = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("bode", "poles"))
+    return {"growth": _records(growths(poles)), "plot": plot("bode-soft-contact", bode(rows))}
 
 
 def _records(rows: pd.DataFrame) -> list[dict[str, Any]]:
