@@ -107,8 +107,9 @@ def growths(poles_: pd.DataFrame) -> pd.DataFrame:
     """Largest real part of the poles without the two nearest to 0, 1/s, of every mode set and gain."""
     rows = []
     for (mode, kstar), group in poles_.groupby(["mode", "kstar"], sort=False):
-        size = np.hypot(group["real"], group["imag"])
-        rows.append({"mode": mode, "kstar": kstar, "growth": group["real"][size.sort_values().index[2:]].max()})
+        real, imag = group["real"].to_numpy(), group["imag"].to_numpy()
+        rest = np.argsort(np.hypot(real, imag))[2:]
+        rows.append({"mode": mode, "kstar": kstar, "growth": real[rest].max()})
     return pd.DataFrame(rows, columns=["mode", "kstar", "growth"])
 
 
