@@ -15,7 +15,10 @@ MEMORYLESS = (
     "MuJoCo integrates all contacts together and memoryless: balls that touch act as one block, and where collisions "
     "overlap its law makes energy, less than with ballistic memory."
 )
-OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and a step of 2 ms, not the case's law."
+OBVIOUS = (
+    "The obvious model: spheres with friction, an elastic contact that MuJoCo's own step of 2 ms just resolves (solref "
+    "-10000 0) and Euler's method, not the case's law."
+)
 AT_ONCE = "All impacts are solved together, as a complementarity problem: touching balls act as one block."
 IN_TURN = "Impacts come one after another, in no time: what the ideal cradle does, not what this rule asks for."
 STEPPING = "Time stepping with all contacts in one complementarity problem: first order, touching balls are one block."
@@ -75,6 +78,12 @@ _TOUCHING: Bounds = {
 _SIZES = {"pattern_distance": 1.0, "pattern_simultaneous": 1.0, "energy_drift": 5.0, "balls_out": 5.0}
 """How far another rule takes an engine from this one's truth: about twice what was measured (crossbody run)."""
 
+_DISCRETISATION: Mapping[tuple[str, str], tuple[float, str]] = {
+    ("mujoco", "matched"): (1e-4, "Runge-Kutta 4 with located events, twenty steps a contact, then straight lines"),
+    ("pinocchio", "law"): (2e-5, "relative tolerance of 1e-10, in many short arcs where balls touch"),
+}
+"""Sliders: largest error of position against the equations that an engine really follows (twice what was measured)."""
+
 
 def limits(variant: str, rule: str, gap: float, claims: Iterable[Claim]) -> tuple[Limit, ...]:
     """The limits of one variant under one rule.
@@ -111,6 +120,8 @@ def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
             )
     yield Limit(metric="momentum", value=1e-10, why=_KEPT)
     if variant == "sliders":
+        for (engine, profile), (value, why) in _DISCRETISATION.items():
+            yield Limit(metric="position (discretisation)", value=value, engine=engine, profile=profile, why=why)
         yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")
     for (engine, profile), known in {**_OTHERS[rule], ("pinocchio", "impulse"): IMPACT}.items():
         yield Limit(metric="audit", value=0.0, engine=engine, profile=profile, known=known)
