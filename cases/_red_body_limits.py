@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
-from crossbody.cases._case import Limit
+from crossbody.cases._case import Claim, Limit
 
 REAL_TIME = (
     "It integrates collisions in real time: while one lasts, bodies move and gravity acts, so that velocities behind "
@@ -27,24 +27,22 @@ OBVIOUS = (
 
 Bounds = Mapping[str, tuple[float, str]]
 _TOLERANCE = "a thousand times the default tolerance of 1e-9"
-_COMMON: Bounds = {
+_ERRORS: Bounds = {
     "position": (1e-6, _TOLERANCE),
     "event_times": (1e-8, "a thousand times the tolerance, over the fast time scale of the collisions"),
     "energy_drift": (1e-6, _TOLERANCE),
     "energy_integrator": (1e-6, "the ledger must close to integration accuracy"),
     "lam_impulse": (1e-5, "both integrals take the same samples by the same rule"),
+}
+_CLAIMS: Bounds = {
     "mode_order": (0.0, "every mode change, in order"),
     "foot_lam": (1e-6, "the slab stands still"),
     "wall_lam": (0.0, "a row that is never touched has no multiplier"),
+    "peak_lam3": (1e-3, "the peak is at the touch, which is located"),
+    "peak_lam4": (0.5, "read between the samples of a pulse of some forty steps"),
+    "collision_impulse": (1e-8, _TOLERANCE),
 }
-_BOUNDS: dict[str, Bounds] = {
-    "resolved": {
-        **_COMMON,
-        "peak_lam3": (1e-3, "the peak is at the touch, which is located"),
-        "peak_lam4": (0.5, "read between the samples of a pulse of some forty steps"),
-    },
-    "frozen": {**_COMMON, "collision_impulse": (1e-8, _TOLERANCE)},
-}
+"""Judged where the case claims a number."""
 
 _MATCHED_BOUNDS: Bounds = {
     "position": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
@@ -93,21 +91,23 @@ _OTHER_PHYSICS = (
 """Engines whose constants are a restitution, or their own."""
 
 
-def limits(variant: str) -> tuple[Limit, ...]:
-    """The limits of one variant."""
-    return tuple(_all(variant))
+def limits(variant: str, claims: Iterable[Claim]) -> tuple[Limit, ...]:
+    """The limits of one variant: errors always, and what it claims."""
+    claimed = {claim.metric for claim in claims}
+    bounds = _ERRORS | {metric: bound for metric, bound in _CLAIMS.items() if metric in claimed}
+    return tuple(_all(variant, bounds))
 
 
-def _all(variant: str) -> Iterator[Limit]:
-    for metric, (value, why) in _BOUNDS[variant].items():
+def _all(variant: str, bounds: Bounds) -> Iterator[Limit]:
+    for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
         for (engine, profile), known in _KNOWN[variant].items():
             size = _SIZES.get((engine, profile), {}).get(metric, math.inf)
             yield Limit(
                 metric=metric, value=value, engine=engine, profile=profile, why=why, known=known, known_size=size
             )
-    if variant == "resolved":
-        for metric, (value, why) in _MATCHED_BOUNDS.items():
+        if variant == "resolved" and metric in _MATCHED_BOUNDS:
+            value, why = _MATCHED_BOUNDS[metric]
             yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=why)
     for engine, profile, known in _OTHER_PHYSICS:
         yield Limit(metric="audit", value=0.0, engine=engine, profile=profile, known=known)

@@ -12,6 +12,7 @@ from crossbody import cases
 from crossbody.cases import InvalidValue, Mode, SceneError, Trajectory, load
 from crossbody.cases._red_body_order import LEFT, RIGHT, Fall
 from crossbody.reference import System
+from crossbody.reports.comparison import compare
 from crossbody.reports.metrics import load as metric
 from crossbody.reports.truth import from_run
 
@@ -153,3 +154,11 @@ def test_contradictory_numbers_are_told_in_one_sentence(
     with pytest.raises(error, match=words) as told:
         load("red_body", **changes)
     assert "\n" not in str(told.value)
+
+
+def test_what_is_not_claimed_is_not_judged() -> None:
+    """A flat box has another order: its run is right, and no verdict on the order is given."""
+    case = load("red_body", half_height=0.13)
+    rows = compare(case, [REFERENCE.prepare(case, "compiled")])
+    assert not rows["verdict"].eq("outside").any()
+    assert not rows["metric"].isin(["mode_order", "peak_lam3", "peak_lam4"]).any()
