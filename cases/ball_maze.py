@@ -118,7 +118,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
             unilateral=np.arange(rows) < NORMAL,
         ),
         claims=claims(variant, p, maze),
-        limits=limits(variant, p),
+        limits=limits(variant),
         discrete=DISCRETE,
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )
