@@ -17,7 +17,19 @@ from crossbody.cases import Event, Mode, Switch
 from crossbody.cases._arrays import Floats
 from crossbody.engines._maze_edges import DEAD_BAND, SOLID, to_edge, wrapped
 from crossbody.engines._maze_memory import (
-    BALANCE, BALLISTIC, CENTRE, CONTACT, FREE, OFF, SNATCH, Memory, angle, over_edge, place_of, rolling, through_gap,
+    BALANCE,
+    BALLISTIC,
+    CENTRE,
+    CONTACT,
+    FREE,
+    OFF,
+    SNATCH,
+    Memory,
+    angle,
+    over_edge,
+    place_of,
+    rolling,
+    through_gap,
 )  # fmt: skip
 from crossbody.engines._maze_rows import ABOVE, BELOW, NORMALS, Formula
 from crossbody.engines._maze_scene import BallMaze

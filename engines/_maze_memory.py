@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 from crossbody.cases import Mode
-from crossbody.engines._log import Modes
 from crossbody.cases._maze_geometry import Ring
+from crossbody.engines._log import Modes
 from crossbody.engines._maze_edges import SOLID, nearest_gap, sector, wrapped
 from crossbody.engines._maze_rows import ABOVE, BELOW, SLIP_OF, Place
 
@@ -97,4 +97,3 @@ def rolling(memory: Memory, on: bool) -> Memory:
     for face, slip in SLIP_OF.items() if on else ():
         modes[slip] = CONTACT if modes[face] == CONTACT else FREE
     return replace(memory, modes=tuple(modes))
-

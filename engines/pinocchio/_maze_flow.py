@@ -27,7 +27,9 @@ class MazeFlow:
         outcome, message: how it ended.
     """
 
-    def __init__(self, machine: MazeMachine, log: MazeLog, rtol: float, atol: Floats, method: str, max_steps: int) -> None:
+    def __init__(
+        self, machine: MazeMachine, log: MazeLog, rtol: float, atol: Floats, method: str, max_steps: int
+    ) -> None:
         self.machine, self.log, self.max_steps = machine, log, max_steps
         self.steps = self.rhs = self.still = 0
         self.outcome, self.message = Outcome.FINISHED, ""

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core import dense
@@ -241,6 +243,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
         t = s.t_old + _place(node) * s.hs
         q, v = w.ys[: s.n], w.ys[s.n :]
         K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])
+        s.guards += 1
         if multipliers:
             if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
                 return 1
@@ -287,6 +290,44 @@ def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     return 0
 
 
+@inlined
+def _all_free(s: Any, m: Model, mode: Bytes) -> bool:
+    """Whether nothing but free flight in closed form is under way."""
+    if s.method != EXACT or s.na > 0 or s.fsm == EDGE:
+        return False
+    for i in range(s.nc):
+        if m.unilateral[i] and m.follows[i] < 0 and mode[i] != FREE:
+            return False
+    return True
+
+
+@inlined
+def _fall(h: float, rate: float, a: float) -> float:
+    """Last time at which h + rate t + a t^2/2 falls to zero; 0 if it is below all along, infinite if it never falls."""
+    square = rate * rate - 2.0 * a * h
+    if square < 0.0:
+        return np.inf if h > 0.0 else 0.0
+    if rate < 0.0:
+        return float(max(2.0 * h / (np.sqrt(square) - rate), 0.0))
+    return float((rate + np.sqrt(square)) / -a) if a < 0.0 else np.inf
+
+
+@inlined
+def _free_flight(s: Any, w: Work, i: int) -> float:
+    """First touch of a FREE row in free flight, where its gap is a parabola: in closed form."""
+    h, rate = w.gaps[0, i], w.rates[0, i]
+    a = (w.rates[NODES - 1, i] - rate) / s.hs
+    if h > s.touch:
+        w.kind[i] = TOUCH
+        t = _fall(h, rate, a)
+    else:
+        w.kind[i] = TOUCH_INSIDE
+        # clearly behind the threshold, so that rounding does not leave it where it was
+        closing = -(1.5 * slow(s) + rate) / a if a < 0.0 else np.inf
+        t = max(_fall(h - s.touch, rate, a), closing)
+    return float(t / s.hs) if t <= s.hs else NEVER
+
+
 @compiled
 def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 1 if ill posed."""
@@ -302,6 +343,14 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             any_gap = True
             any_multiplier = any_multiplier or is_active(mode[i])
     if not any_gap:
+        return 0
+    if _all_free(s, m, mode):
+        for i in range(s.nc):
+            if w.hit[i] == 1.0:
+                w.hit[i] = _free_flight(s, w, i)
+                s.theta = min(s.theta, w.hit[i])
+        if s.theta <= 1.0:
+            _tie(s, w)
         return 0
     if dense.prepare(K, s, m, w) != 0 or _fill_nodes(K, s, m, w, any_multiplier) != 0:
         return 1

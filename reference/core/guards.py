@@ -45,6 +45,7 @@ def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
 @compiled
 def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> float:
     """Value of one guard at the part theta of the step."""
+    s.guards += 1
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
     q, v = w.ys[: s.n], w.ys[s.n :]

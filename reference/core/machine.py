@@ -88,7 +88,9 @@ def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     n = s.n
     activate(s, m, w, mode)
     s.have_jacobian = 0
-    K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+    if s.nc > 0:
+        s.guards += 1
+        K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
     if derivative(K, s, m, w, s.t, w.y, START) != 0:
         return ILL_POSED
     scatter(s, w, w.lam)

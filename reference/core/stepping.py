@@ -59,7 +59,9 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
     if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     scatter(s, w, w.lams[last])
-    K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
+    if s.nc > 0:
+        s.guards += 1
+        K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
     for i in range(s.nc):
         w.lams[0, i] = w.lam0[i]
         if not (np.isfinite(w.gaps[last, i]) and np.isfinite(w.rates[last, i]) and np.isfinite(w.lams[last, i])):

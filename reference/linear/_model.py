@@ -125,7 +125,9 @@ class LinearModel:
         given = frozen("LinearModel.restricted", "conditions", conditions, (None, len(self.states)))
         if not np.any(given):
             return self
-        _, R, order = qr(given / np.abs(given).max(axis=1, keepdims=True, initial=1e-300), mode="economic", pivoting=True)
+        _, R, order = qr(
+            given / np.abs(given).max(axis=1, keepdims=True, initial=1e-300), mode="economic", pivoting=True
+        )
         size = np.abs(np.diag(R))
         rank = int(np.sum(size > 1e-10 * size[0]))
         bound, kept = order[:rank], np.sort(order[rank:])

@@ -28,7 +28,9 @@ NAMES = (
     "block_mass", "bt", "k", "ks", "gain_p", "gain_d", "gain_i",
 )  # fmt: skip
 SIZE = len(NAMES)
-_KP, _CP, _WIDTH, _JAW, _SQUEEZE, _START, _STOP, _RELEASE, _TIME, PAD_MASS, BLOCK_MASS, BT, K, KS, _P, _D, _I = range(SIZE)
+_KP, _CP, _WIDTH, _JAW, _SQUEEZE, _START, _STOP, _RELEASE, _TIME, PAD_MASS, BLOCK_MASS, BT, K, KS, _P, _D, _I = range(
+    SIZE
+)
 
 
 @kernels.helper
