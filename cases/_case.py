@@ -219,6 +219,8 @@ class Case:
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
+        tight: tolerance at which the reference stands for the truth; larger where a stiff spring on a small mass makes
+            rounding count before that (kp eps |q|/m against the tolerance of a velocity).
     """
 
     name: str
@@ -239,6 +241,7 @@ class Case:
     claims: tuple[Claim, ...] = ()
     limits: tuple[Limit, ...] = ()
     discrete: tuple[str, ...] = ()
+    tight: float = 1e-13
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:

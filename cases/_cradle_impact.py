@@ -19,14 +19,16 @@ from scipy.optimize import nnls
 from crossbody.cases._arrays import Floats
 
 Touching = NDArray[np.bool_]
-Impact = Callable[[Floats, Floats, Touching, float], Iterator[tuple[int, float]]]
+Impulses = dict[int, float]
+"""Row -> impulse, N s, of all rows that act at once."""
+Impact = Callable[[Floats, Floats, Touching, float], Iterator[Impulses]]
 
 SLOW = 1e-12
 """A gap that closes slower than this part of the fastest ball stands still; equal rates are ties within it."""
 
 
-def sequential(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[tuple[int, float]]:
-    """(row, impulse) of each collision in turn; v (n,) is moved on in place.
+def sequential(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[Impulses]:
+    """The impulse of each collision in turn; v (n,) is moved on in place before each is told.
 
     Args:
         masses (n,): kg.
@@ -41,29 +43,25 @@ def sequential(masses: Floats, v: Floats, touching: Touching, e: float) -> Itera
         if worst >= -slow:
             return
         row = int(np.argmax(rates <= worst + slow))
-        yield row, _collide(masses, v, row, e)
+        a, b = masses[row : row + 2]
+        yield _push(masses, v, {row: float((1.0 + e) * a * b / (a + b) * (v[row] - v[row + 1]))})
 
 
-def _collide(masses: Floats, v: Floats, row: int, e: float) -> float:
-    """One collision of two balls; its impulse, N s."""
-    a, b = masses[row : row + 2]
-    impulse = (1.0 + e) * a * b / (a + b) * (v[row] - v[row + 1])
-    v[row] -= impulse / a
-    v[row + 1] += impulse / b
-    return float(impulse)
+def _push(masses: Floats, v: Floats, impulses: Impulses) -> Impulses:
+    """Let impulses act on the speeds."""
+    for row, impulse in impulses.items():
+        v[row] -= impulse / masses[row]
+        v[row + 1] += impulse / masses[row + 1]
+    return impulses
 
 
-def simultaneous(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[tuple[int, float]]:
-    """(row, impulse) of all that press at once, again if some approach then; arguments as of `sequential`."""
+def simultaneous(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[Impulses]:
+    """All impulses at once, and again if some approach then; arguments as of `sequential`."""
     slow = SLOW * float(np.max(np.abs(v), initial=0.0))
     rows = np.flatnonzero(touching)
     while len(rows) and float(np.diff(v)[rows].min()) < -slow:
         impulses = pushes(delassus(masses)[np.ix_(rows, rows)], (1.0 + e) * np.diff(v)[rows])
-        for row, impulse in zip(rows.tolist(), impulses.tolist(), strict=True):
-            v[row] -= impulse / masses[row]
-            v[row + 1] += impulse / masses[row + 1]
-            if impulse > 0.0:
-                yield row, impulse
+        yield _push(masses, v, dict(zip(rows.tolist(), impulses.tolist(), strict=True)))
 
 
 def delassus(masses: Floats) -> Floats:

@@ -2,9 +2,115 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Mapping
+
 from crossbody.cases._case import Limit
 
+TOGETHER = (
+    "It integrates the law of all contacts together: balls that touch act as one block, and where collisions overlap "
+    "the law itself makes energy."
+)
+MEMORYLESS = (
+    "MuJoCo integrates all contacts together and memoryless: balls that touch act as one block, and where collisions "
+    "overlap its law makes energy, less than with ballistic memory."
+)
+OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and a step of 2 ms, not the case's law."
+AT_ONCE = "All impacts are solved together, as a complementarity problem: touching balls act as one block."
+IN_TURN = "Impacts come one after another, in no time: what the ideal cradle does, not what this rule asks for."
+STEPPING = "Time stepping with all contacts in one complementarity problem: first order, touching balls are one block."
+IMPACT = "Impacts in no time replace the law of contacts: nothing overlaps, nothing is compressed."
 
-def limits(variant: str, rule: str) -> tuple[Limit, ...]:
-    """The limits of one variant under one rule."""
-    return ()
+_OTHERS: dict[str, Mapping[tuple[str, str], str]] = {
+    "sequential": {
+        ("mujoco", "matched"): MEMORYLESS, ("mujoco", "default"): OBVIOUS, ("pinocchio", "law"): TOGETHER,
+        ("pinocchio", "impulse_simultaneous"): AT_ONCE, ("pinocchio", "admm"): STEPPING,
+    },
+    "simultaneous": {
+        ("mujoco", "matched"): MEMORYLESS, ("mujoco", "default"): OBVIOUS, ("pinocchio", "law"): TOGETHER,
+        ("pinocchio", "impulse"): IN_TURN, ("pinocchio", "admm"): STEPPING,
+    },
+    "resolved": {
+        ("mujoco", "matched"): MEMORYLESS, ("mujoco", "default"): OBVIOUS, ("pinocchio", "impulse"): IMPACT,
+        ("pinocchio", "impulse_simultaneous"): IMPACT, ("pinocchio", "admm"): STEPPING,
+    },
+}  # fmt: skip
+"""Rule of the case -> engines that follow another one."""
+
+_EXACT = "straight lines between impacts: rounding"
+_LOCATED = "tolerances of 1e-9 and 1e-10, from touch to touch"
+_RESTING = "rows that touch at rest let go and touch again by rounding: touches are not matched with certainty"
+_KEPT = "what acts on one ball acts on its neighbour"
+
+Bounds = Mapping[str, tuple[float, str]]
+
+_SLIDERS: Bounds = {
+    "pattern_distance": (1e-10, _EXACT),
+    "energy_drift": (1e-10, _EXACT),
+    "energy_integrator": (1e-10, _EXACT),
+    "position": (1e-9, _EXACT),
+    "event_times": (1e-10, _EXACT),
+    "touch_count": (0.0, "a count"),
+    "balls_out": (0.0, "a count"),
+}
+_PENDULUMS: Bounds = {
+    "pattern_distance": (1e-3, "balls that wait for the last collision swing back a little, by the gap"),
+    "energy_drift": (1e-6, _LOCATED),
+    "energy_integrator": (1e-6, _LOCATED),
+    "position": (1e-5, _LOCATED),
+    "event_times": (1e-6, _LOCATED),
+    "touch_count": (0.0, "a count"),
+    "balls_out": (0.0, "a count"),
+}
+_RESOLVED: Bounds = {
+    "energy_drift": (1e-6, _LOCATED),
+    "energy_integrator": (1e-6, _LOCATED),
+    "position": (1e-6, _LOCATED),
+    "event_times": (1e-6, _LOCATED),
+    "touch_count": (0.0, "a count"),
+}
+_TOUCHING: Bounds = {
+    "energy_drift": (1e-3, _RESTING),
+    "energy_integrator": (1e-6, _LOCATED),
+    "position": (1e-5, _RESTING),
+}
+_SIZES = {"pattern_distance": 1.0, "pattern_simultaneous": 1.0, "energy_drift": 1.5, "balls_out": 5.0}
+"""How far another rule takes an engine from this one's truth: about twice what was measured (crossbody run)."""
+
+
+def limits(variant: str, rule: str, gap: float) -> tuple[Limit, ...]:
+    """The limits of one variant under one rule.
+
+    Args:
+        variant: "sliders" or "pendulums".
+        rule: for several contacts.
+        gap: between neighbours at rest, m; 0 where they touch.
+    """
+    return tuple(_all(variant, rule, gap))
+
+
+def _bounds(variant: str, rule: str, gap: float) -> Bounds:
+    if rule == "resolved":
+        return _RESOLVED if gap > 0.0 else _TOUCHING
+    bounds = _SLIDERS if variant == "sliders" else _PENDULUMS
+    if rule == "sequential":
+        return bounds
+    # Whether a row that passes an impulse on without having closed counts as a touch is a matter of convention.
+    kept = {metric: bound for metric, bound in bounds.items() if metric not in ("balls_out", "touch_count")}
+    return {**kept, "pattern_simultaneous": kept.pop("pattern_distance")}
+
+
+def _all(variant: str, rule: str, gap: float) -> Iterator[Limit]:
+    for metric, (value, why) in _bounds(variant, rule, gap).items():
+        yield Limit(metric=metric, value=value, why=why)
+        for (engine, profile), known in _OTHERS[rule].items():
+            size = _SIZES.get(metric, math.inf)
+            yield Limit(
+                metric=metric, value=value, engine=engine, profile=profile, why=why, known=known, known_size=size
+            )
+    yield Limit(metric="momentum", value=1e-10, why=_KEPT)
+    if variant == "sliders":
+        yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")
+    for (engine, profile), known in {**_OTHERS[rule], ("pinocchio", "impulse"): IMPACT}.items():
+        yield Limit(metric="audit", value=0.0, engine=engine, profile=profile, known=known)
+    yield Limit(metric="audit", value=0.0, engine="pinocchio", profile="impulse_simultaneous", known=IMPACT)

@@ -36,6 +36,14 @@ class _Course:
         self.starts.append(t)
 
 
+def _collision(t: float, row: int, impulse: float) -> tuple[Event, Event]:
+    """FREE -> COLLISION -> FREE at one instant."""
+    return (
+        Event(t=t, contact=row, before=Mode.FREE, after=Mode.COLLISION),
+        Event(t=t, contact=row, before=Mode.COLLISION, after=Mode.FREE, impulse=impulse),
+    )
+
+
 class Motion:
     """The motion of a row of sliders under a frozen rule, to be evaluated at any times.
 
@@ -64,14 +72,18 @@ class Motion:
             t += wait
 
     def _collide(self, t: float, v: Floats, touching: Touching, work: Floats, course: _Course) -> bool:
-        """Let the touching balls collide; whether any did. v and work are moved on in place."""
+        """Let the touching balls collide; whether any did. v and work are moved on in place.
+
+        A collision is told of a row that closed; one that stood still and passes an impulse on has none of its own.
+        """
         before, rates = len(course.events), np.diff(v)
-        for row, impulse in self.impact(self.row.masses, v, touching, self.row.e):
+        for impulses in self.impact(self.row.masses, v, touching, self.row.e):
             after = np.diff(v)
-            work[row] += 0.5 * impulse * (rates[row] + after[row])
+            for row, impulse in impulses.items():
+                work[row] += 0.5 * impulse * (rates[row] + after[row])
+                if impulse > 0.0 and rates[row] < -SLOW * self.row.speed:
+                    course.events += _collision(t, row, impulse)
             rates = after
-            course.events.append(Event(t=t, contact=row, before=Mode.FREE, after=Mode.COLLISION))
-            course.events.append(Event(t=t, contact=row, before=Mode.COLLISION, after=Mode.FREE, impulse=impulse))
             if len(course.events) >= 2 * MAX_IMPACTS:
                 break
         return len(course.events) > before
@@ -113,7 +125,7 @@ class Motion:
         kinetic = 0.5 * (m * v * v).sum(axis=1)
         shape = (len(t), self.row.n - 1)
         return Trajectory(
-            t=t, q=x, v=v, gap=self.row.gap + np.diff(x, axis=1), lam=np.zeros(shape),
+            t=t, q=x, v=v, gap=np.maximum(self.row.gap + np.diff(x, axis=1), 0.0), lam=np.zeros(shape),
             energy=np.stack([kinetic, np.zeros_like(t)], axis=1), mode=np.zeros(shape, dtype=np.int8),
             events=self.events, steps=len(course.starts),
             outcome=Outcome.STEP_LIMIT if course.full else Outcome.FINISHED,

@@ -28,8 +28,8 @@ ROBOT = {
 }
 HEAVY: dict[str, Value] = {"m1": 2.5, "m2": 3.0, "m3": 4.0, "gravity": 9.8, "d1": 0.5, "d2": 0.125, "d3": 0.125}
 NAMES = ("torque 1 [N m]", "torque 2 [N m]", "torque 3 [N m]", "force x [N]", "force y [N]", "force z [N]")
-_JOINTS = tuple(f"q{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
-_ROWS = tuple(f"loop {i}{axis}" for i in (2, 3) for axis in "xyz")
+JOINTS = tuple(f"q{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+LOOPS = tuple(f"loop {i}{axis}" for i in (2, 3) for axis in "xyz")
 
 
 def position(x: float, y: float, z: float) -> dict[str, Parameter]:
@@ -69,8 +69,8 @@ def scene(
         title=title,
         mechanism="delta",
         parameters=parameters,
-        coordinates=tuple(Coordinate(name=joint, unit="rad") for joint in _JOINTS),
-        contacts=_ROWS,
+        coordinates=tuple(Coordinate(name=joint, unit="rad") for joint in JOINTS),
+        contacts=LOOPS,
         q0=q0,
         v0=v0,
         t_end=float(parameters["t_end"]),

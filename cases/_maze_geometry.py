@@ -195,7 +195,7 @@ def _check_passages(maze: Maze) -> None:
 
 
 def start(maze: Maze, p: Mapping[str, Value]) -> tuple[float, float]:
-    """Ball centre on the face where it starts, m.
+    """Ball centre on the face where it starts, m: it touches, at rest.
 
     Raises:
         InvalidValue: if there is no such ring.
@@ -203,12 +203,14 @@ def start(maze: Maze, p: Mapping[str, Value]) -> tuple[float, float]:
     i, angle = int(p["ring"]), float(p["angle"])
     if i >= len(maze.rings):
         raise InvalidValue(f"ball_maze: ring is {i}; valid: 0 to {len(maze.rings) - 1}.")
-    ring = maze.rings[i]
-    if p["side"] == "outer":
-        rho = ring.outer + maze.ball
-        return rho * math.sin(angle), rho * math.cos(angle)
-    rho = ring.inner - maze.ball
-    return rho * math.sin(angle), -rho * math.cos(angle)
+    ring, outer = maze.rings[i], p["side"] == "outer"
+    side, R = (-1.0, ring.outer) if outer else (1.0, ring.inner)
+    rho = R - side * maze.ball
+    while True:
+        x, y = rho * math.sin(angle), -side * rho * math.cos(angle)
+        if side * (R - math.sqrt(x * x + y * y)) - maze.ball <= 0.0:
+            return x, y
+        rho = math.nextafter(rho, math.inf if side > 0.0 else 0.0)  # rounding must not let it fall on the face
 
 
 def tilted_gravity(p: Mapping[str, Value]) -> float:

@@ -95,8 +95,7 @@ class Fall:
     @cached_property
     def tilt(self) -> float:
         """Angle at the first touch, rad."""
-        spin = self.p["spin"]
-        return self.p["tilt"] + (spin * self.touch if spin else 0.0)
+        return self.p["tilt"] + self.p["spin"] * self.touch
 
     @cached_property
     def speed(self) -> float:
@@ -184,6 +183,9 @@ def inequalities(p: Mapping[str, float], frozen: bool) -> tuple[str, ...]:
 
 def _broken(p: Mapping[str, float], frozen: bool) -> Iterator[str]:
     fall, a = Fall(p), p["half_width"]
+    if math.isinf(fall.touch):
+        yield "the box rolls over before it touches"
+        return
     if not 0.0 < fall.tilt < math.atan2(a, p["half_height"]) or not fall.spin < 0.0:
         yield f"the box must lean on its left corner and turn to the right, but touches at {fall.tilt:.3g} rad"
         return

@@ -105,6 +105,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         collisions=rule,
         closed_form=motion if sliders and rule in FROZEN else None,
         claims=_claims(variant, balls, rule),
-        limits=limits(variant, rule),
+        limits=limits(variant, rule, balls.gap),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

@@ -15,6 +15,9 @@ class Run(Protocol):
     Attributes:
         engine, profile: who runs it.
         settings: what was really used, for provenance (tolerance, step, solver, ...).
+
+    A run may have `follows`, a case: the same scene under the machine, the collision rule and the law that the engine
+    really integrates, where they are not the case's own. Its discretisation error is then measured against those.
     """
 
     engine: str

@@ -133,30 +133,34 @@ class Pendulums(Chain):
 
     length: float
 
-    def _apart(self, q: Floats) -> tuple[Floats, Floats]:
-        """Vector from each ball to its right neighbour (2, ..., n - 1), and its length."""
-        d = np.stack((self.spacing + self.length * np.diff(np.sin(q)), -self.length * np.diff(np.cos(q))))
-        return d, np.sqrt((d * d).sum(axis=0))
+    def _apart(self, sin: Floats, cos: Floats) -> tuple[Floats, Floats, Floats]:
+        """Vector (x, z) from each ball to its right neighbour, and its length (..., n - 1), m."""
+        L = self.length
+        x = self.spacing + L * (sin[..., 1:] - sin[..., :-1])
+        z = L * (cos[..., :-1] - cos[..., 1:])
+        return x, z, np.sqrt(x * x + z * z)
 
     def heights(self, q: Floats) -> Floats:
         """See `Chain`."""
-        h: Floats = self._apart(q)[1] - 2.0 * self.radius
+        h: Floats = self._apart(np.sin(q), np.cos(q))[2] - 2.0 * self.radius
         return h
 
     def slopes(self, q: Floats) -> tuple[Floats, Floats]:
         """See `Chain`: the normal times L (cos q, sin q)."""
-        d, far = self._apart(q)
-        normal, turn = d / far, self.length * np.stack((np.cos(q), np.sin(q)))
-        return -(normal * turn[:, :-1]).sum(axis=0), (normal * turn[:, 1:]).sum(axis=0)
+        sin, cos = np.sin(q), np.cos(q)
+        x, z, far = self._apart(sin, cos)
+        x, z = self.length * x / far, self.length * z / far
+        return -(x * cos[:-1] + z * sin[:-1]), x * cos[1:] + z * sin[1:]
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """See `Chain`: with s = d', h'' at v' = 0 is (|s|^2 - (n.s)^2)/|d| + n.s'."""
-        d, far = self._apart(q)
-        normal, L = d / far, self.length
-        s = L * np.diff(np.stack((np.cos(q), np.sin(q))) * v)
-        bend = L * np.diff(np.stack((-np.sin(q), np.cos(q))) * v * v)
-        along = (normal * s).sum(axis=0)
-        total: Floats = ((s * s).sum(axis=0) - along * along) / far + (normal * bend).sum(axis=0)
+        sin, cos = self.length * np.sin(q), self.length * np.cos(q)
+        x, z, far = self._apart(sin / self.length, cos / self.length)
+        x, z, v2 = x / far, z / far, v * v
+        sx, sz, ax, az = cos * v, sin * v, sin * v2, cos * v2
+        sx, sz = sx[1:] - sx[:-1], sz[1:] - sz[:-1]
+        along = x * sx + z * sz
+        total: Floats = (sx * sx + sz * sz - along * along) / far + z * (az[1:] - az[:-1]) - x * (ax[1:] - ax[:-1])
         return total
 
     def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:

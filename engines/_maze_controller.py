@@ -75,7 +75,8 @@ def balance(
     Args:
         plant: masses, inertias and gravity.
         limits: bounds on acceleration and torque.
-        q, v: (theta, x, y, phi) and rates.
+        q: theta, x, y, phi.
+        v: their rates.
         face: radius R of the face, radius rho of the ball's path on it, m, and s (+1 on top, -1 at the bottom).
         gains: k2, k1, k0.
         omega: rate at which the maze shall turn, rad/s.
@@ -98,7 +99,8 @@ def snatch(plant: Plant, limits: Limits, q: State, v: State, target: float, wn: 
     Args:
         plant: inertia of the maze.
         limits: bounds on acceleration and torque.
-        q, v: (theta, ...) and rates.
+        q: theta, x, y, phi.
+        v: their rates.
         target: angle of the maze that puts the middle of the gap under the ball, rad.
         wn: speed of both poles, rad/s.
     """

@@ -82,10 +82,18 @@ class MazeMachine:
     def __init__(self, maze: BallMaze, accelerate: Accelerate) -> None:
         self.maze, self.rings, self.accelerate = maze, maze.rings, accelerate
 
-    def watch(self, q: State, v: State, memory: Memory) -> list[float]:
-        """The (16,) functions whose zeros are where the machine must look, positive until then where it matters."""
+    def watch(self, q: State, v: State, memory: Memory, lam: Floats | None = None) -> list[float]:
+        """The (16,) functions whose zeros are where the machine must look, positive until then where it matters.
+
+        Args:
+            q: theta, x, y, phi.
+            v: their rates.
+            memory: discrete state.
+            lam: multipliers there (nc,), if they are known.
+        """
         out = [1.0] * NG
-        lam = self.accelerate(q, v, memory)[1] if CONTACT in memory.modes else None
+        if lam is None and CONTACT in memory.modes:
+            lam = self.accelerate(q, v, memory)[1]
         for i, formula in self.maze.rows.at(memory.place).items():
             if i in NORMALS:
                 out[2 * i], out[2 * i + 1] = self._pair(i, formula, q, v, memory, lam)
@@ -97,20 +105,31 @@ class MazeMachine:
         memory = Memory(modes=(FREE,) * self.maze.nc, place=place_of(self.rings, q))
         if not self.maze.driver.on:
             return memory
-        return self._controlled(replace(memory, control=BALANCE if memory.place.channel else CENTRE), q, touched=False)
+        return self.controlled(replace(memory, control=BALANCE if memory.place.channel else CENTRE), q, touched=False)
 
     def first(self, q: State, v: State) -> Settled:
         """The memory at the start, settled."""
         memory = self.untouched(q)
-        lost = self._places(q, memory)[-1] <= 0.0
-        return replace(self.settle(0.0, q, v, memory), switches=(), lost=lost)
+        return replace(self.settle(0.0, q, v, memory), switches=(), lost=self.strayed(q, memory))
+
+    def strayed(self, q: State, memory: Memory) -> bool:
+        """Whether the ball is where the controller cannot bring it back from."""
+        return self._places(q, memory)[-1] <= 0.0
+
+    def seen(self, memory: Memory, q: State) -> Memory:
+        """Place and controller of a ball that is looked at now and then, instead of at its events."""
+        place = place_of(self.rings, q)
+        moved = place.channel != memory.place.channel and memory.control != OFF
+        memory = replace(memory, place=place, control=SNATCH if moved else memory.control)
+        return self.controlled(memory, q, touched=False)
 
     def settle(self, t: float, q: State, v: State, memory: Memory, fired: Collection[int] = ()) -> Settled:
         """Switch until nothing changes.
 
         Args:
             t: instant, s.
-            q, v: state.
+            q: theta, x, y, phi.
+            v: their rates.
             memory: before.
             fired: indices of the watched functions that reached zero here.
         """
@@ -127,9 +146,9 @@ class MazeMachine:
             switched.update(e.contact for e in new)
             memory = after
             if not new:
-                return Settled(memory, tuple(events), _switches(t, start, memory))
+                return Settled(memory, tuple(events), switches(t, start, memory))
             if memory.modes in seen:
-                return Settled(memory, tuple(events), _switches(t, start, memory), cycle=True)
+                return Settled(memory, tuple(events), switches(t, start, memory), cycle=True)
             seen.add(memory.modes)
 
     def _pair(
@@ -173,10 +192,10 @@ class MazeMachine:
             memory = replace(memory, control=SNATCH if self.maze.driver.on else OFF)
         if memory is before:
             return memory
-        return rolling(self._controlled(memory, q, touched=False), self.maze.rows.rolling)
+        return rolling(self.controlled(memory, q, touched=False), self.maze.rows.rolling)
 
-    def _controlled(self, memory: Memory, q: State, touched: bool) -> Memory:
-        """The controller's mode: a gap below is snatched, a face ends it."""
+    def controlled(self, memory: Memory, q: State, touched: bool) -> Memory:
+        """The controller's mode: a gap below is snatched, the touch of a face ends that."""
         place = memory.place
         if memory.control == BALANCE and place.below != SOLID:
             off = angle(q) - self.rings[place.channel - 1].centre(place.below)
@@ -203,7 +222,7 @@ class MazeMachine:
                 modes[i] = self._from_ballistic(q, v, memory, i, (h, hd), fired, i in switched)
         after = replace(memory, modes=tuple(modes))
         touched = CONTACT in (modes[BELOW], modes[ABOVE])
-        return rolling(self._controlled(after, q, touched), self.maze.rows.rolling)
+        return rolling(self.controlled(after, q, touched), self.maze.rows.rolling)
 
     def _from_ballistic(
         self, q: State, v: State, memory: Memory, i: int, at: tuple[float, float], fired: Collection[int], now: bool
@@ -211,9 +230,10 @@ class MazeMachine:
         h, hd = at
         if h > 0.0 or (2 * i in fired and hd >= 0.0):
             return FREE
-        if now or not hd < 0.0:
+        if now:
             return BALLISTIC
-        return CONTACT if 2 * i + 1 in fired or self._would_push(q, v, memory, i) > 0.0 else BALLISTIC
+        returns = 2 * i + 1 in fired or (hd < 0.0 and self._would_push(q, v, memory, i) > 0.0)
+        return CONTACT if returns else BALLISTIC
 
     def _would_push(self, q: State, v: State, memory: Memory, i: int) -> float:
         """Multiplier that a row would have with the others and the torque as they are, N."""
@@ -238,14 +258,15 @@ def _released(lam: float, hd: float, now: bool, fired: bool) -> bool:
 
 
 def _transitions(t: float, before: Memory, after: Memory) -> list[Event]:
+    """Of the rows that decide for themselves: slip follows its face without an event of its own."""
     return [
         Event(t=t, contact=i, before=Mode(b), after=Mode(a))
         for i, (b, a) in enumerate(zip(before.modes, after.modes, strict=True))
-        if b != a
+        if b != a and i in NORMALS
     ]
 
 
-def _switches(t: float, before: Memory, after: Memory) -> tuple[Switch, ...]:
+def switches(t: float, before: Memory, after: Memory) -> tuple[Switch, ...]:
     """Channel, sectors below and above, mode of the controller."""
     pairs = zip(_discrete(before), _discrete(after), strict=True)
     return tuple(Switch(t=t, variable=i, before=b, after=a) for i, (b, a) in enumerate(pairs) if a != b)

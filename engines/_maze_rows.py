@@ -110,6 +110,16 @@ class MazeRows:
         """Radius of the face in slot `BELOW` or `ABOVE`, m."""
         return self.rings[place.channel - 1].outer if slot == BELOW else self.rings[place.channel].inner
 
+    def tips(self, place: Place) -> list[tuple[int, Ring, float]]:
+        """Slot, ring, and angle in the maze's frame of every tip that can be touched at a place."""
+        sides = [(ABOVE, self.rings[place.channel], place.above)]
+        if place.channel:
+            sides.append((BELOW, self.rings[place.channel - 1], place.below))
+        return [
+            (slot + k, ring, angle)
+            for slot, ring, gap in sides if gap != SOLID for k, angle in enumerate(ring.tips(gap), start=1)
+        ]  # fmt: skip
+
     def _below(self, place: Place) -> dict[int, Formula]:
         if place.channel == 0:
             return {}

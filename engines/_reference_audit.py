@@ -11,7 +11,7 @@ from crossbody.reference import System
 
 
 def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
-    """Constants, start, and functions of the state at zero input: M (n, n), bias (n,) = -f, H (nc, n), lam (nc,) N.
+    """Constants, start, and functions at zero input: M (n, n), bias (n,) = -f, H (nc, n), lam (nc,) N, gap (nc,) m.
 
     Constants and lam are those of rows just entered, with the fast constants where a row has two sets. lam has every
     row active; NaN where the rows are dependent.
@@ -28,6 +28,9 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
     def H(q: Floats) -> Floats:
         return system.constraint(q)[0]
 
+    def gap(q: Floats) -> Floats:
+        return system.gap(q)[0]
+
     def lam(q: Floats, v: Floats) -> Floats:
         mass, f = system.terms(q, v)
         rows, h, Hdv = system.constraint(q, v)
@@ -40,4 +43,4 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
             return np.full(system.nc, np.nan)
 
     constants = dict(zip(("a0", "a1", "a2"), law.T, strict=True))
-    return {"constants": constants, "q0": q0, "v0": v0, "M": M, "bias": bias, "H": H, "lam": lam}
+    return {"constants": constants, "q0": q0, "v0": v0, "M": M, "bias": bias, "H": H, "lam": lam, "gap": gap}

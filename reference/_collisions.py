@@ -54,7 +54,7 @@ class Jump:
 
     Attributes:
         v (n,): velocities behind it.
-        impulses: of the rows that collide, N s.
+        impulses: of the rows that collide, those that approached, N s.
         captured: those that stay in contact.
         dropped: held rows that would have pulled, in the order in which they left.
         work (nc,): done by every row's impulse, J.
@@ -132,5 +132,5 @@ def _jump(
     work = np.zeros(e.system.nc)
     work[rows] = 0.5 * P * (H @ (v + after))
     least = NONE * np.abs(P).max()
-    collide = {i: float(x) for i, x in zip(rows, P, strict=True) if i not in now.held and i in kept and x > least}
+    collide = {i: float(x) for i, x in zip(rows, P, strict=True) if i in now.approaching and i in kept and x > least}
     return Jump(after, collide, captured & {*collide}, [i for i in now.held if i not in kept], work)

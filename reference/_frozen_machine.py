@@ -32,12 +32,14 @@ class FrozenMachine(LevelMachine):
         system: the mechanism.
         equations: its equations.
         collisions: "sequential" or "simultaneous".
+        rtol: of the integrator: so deep may a row in contact drift, and no deeper, m.
     """
 
-    def __init__(self, system: System, equations: Equations, collisions: str) -> None:
+    def __init__(self, system: System, equations: Equations, collisions: str, rtol: float) -> None:
         super().__init__(system, equations)
         self.rule = RULES[collisions]
         self.frozen = frozenset(i for i in self.rows if equations.fast[i, 0] > 0.0)
+        self.deep = max(DEEP, rtol)
         self.strongest = 0.0
         self._located: set[int] = set()
         self._collided: list[int] = []
@@ -63,7 +65,7 @@ class FrozenMachine(LevelMachine):
 
     def _presses(self, i: int, h: float, t: float, q: Floats, v: Floats) -> bool:
         """At rest the law has nothing to add: a row presses if its gap would close without it."""
-        if i not in self.frozen or h < -DEEP:
+        if i not in self.frozen or h < -self.deep:
             return super()._presses(i, h, t, q, v)
         return self.equations.row_acceleration(t, q, v, i) < -SLOW * self.strongest
 
@@ -119,7 +121,7 @@ class FrozenMachine(LevelMachine):
 
     def _parted(self, i: int, view: View) -> Mode:
         """Where a row goes that an impulse has relieved."""
-        return Mode.BALLISTIC if view.gap[i] < -DEEP else Mode.FREE
+        return Mode.BALLISTIC if view.gap[i] < -self.deep else Mode.FREE
 
     def _collide(self, t: float, q: Floats, v: Floats, view: View, now: Touching) -> None:
         """One collision: velocities, modes, work. Rows without pressure are let go first."""

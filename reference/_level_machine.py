@@ -57,6 +57,7 @@ class LevelMachine:
         modes: of every row.
         events: transitions in order.
         frozen: rows whose collisions take no time; none in this machine.
+        deep: depth beyond which a gap that does not close was started in penetration, m.
         work (nc,): done by the impulses of every row so far, J.
     """
 
@@ -69,6 +70,7 @@ class LevelMachine:
         self.events: list[Event] = []
         self.frozen: frozenset[int] = frozenset()
         self.work = np.zeros(system.nc)
+        self.deep = DEEP
         self.fastest = 0.0
         self._instant = -np.inf
         self._seen: set[tuple[int, ...]] = set()
@@ -147,7 +149,7 @@ class LevelMachine:
             return self._active_mode(i) if closing and presses() else mode
         if closing:
             return self._active_mode(i)
-        if h < -DEEP:
+        if h < -self.deep:
             return self._active_mode(i) if presses() else Mode.BALLISTIC
         return self._active_mode(i) if rate <= self.slow and presses() else Mode.FREE
 

@@ -80,8 +80,8 @@ class SundialsRun:
         self.told = 0  # events of which the mechanism's `switch` knows
 
     def _machine(self, e: Equations) -> LevelMachine:
-        rule = self.options.collisions
-        return LevelMachine(self.system, e) if rule == "resolved" else FrozenMachine(self.system, e, rule)
+        rule, rtol = self.options.collisions, self.options.rtol
+        return LevelMachine(self.system, e) if rule == "resolved" else FrozenMachine(self.system, e, rule, rtol)
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""

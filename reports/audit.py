@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ LAM_TOLERANCE = 1e-8
 NUMBERS = ("masses", "gravity", "constants", "q0", "v0")
 FUNCTIONS = ("M", "bias", "H", "lam")
 STATES = 20
+NEWTON = 20
 SEED = 20240917
 
 
@@ -72,16 +74,33 @@ def difference(mine: Any, theirs: Any) -> float:
     return worst / scale if scale else worst
 
 
-def states(case: Case) -> list[tuple[Floats, Floats]]:
-    """Random states in which every contact is entered, the same for all engines; near the start if none can open."""
+def states(case: Case, theirs: Mapping[str, Any] = MappingProxyType({})) -> list[tuple[Floats, Floats]]:
+    """Random states in which every contact is entered, the same for all engines; near the start if none can open.
+
+    Args:
+        case: the scene.
+        theirs: the reference's audit; where it shows gap(q) and H(q), several contacts are entered together.
+    """
     draw = np.random.default_rng(SEED)
     n = len(case.q0)
     if len(case.law.a0) and not case.law.unilateral.any():
         return [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, n)) for _ in range(STATES)]
+    if len(case.law.a0) > 1 and "gap" in theirs:
+        return [_entered(case, theirs["gap"], theirs["H"], draw) for _ in range(STATES)]
     reach = 1e-2 * np.maximum(np.abs(case.q0), 1e-3)
     return [
         (-reach * draw.uniform(0.01, 1.0, len(case.q0)), -draw.uniform(0.0, 1.0, len(case.v0))) for _ in range(STATES)
     ]
+
+
+def _entered(case: Case, gap: Any, H: Any, draw: np.random.Generator) -> tuple[Floats, Floats]:
+    """A state near the start with gaps and rates that are drawn below zero: by Newton, in the least change of q."""
+    wanted = -1e-2 * np.maximum(np.abs(gap(case.q0)), 1e-3) * draw.uniform(0.01, 1.0, len(case.law.a0))
+    q: Floats = np.array(case.q0)
+    for _ in range(NEWTON):
+        q = q + np.linalg.lstsq(H(q), wanted - gap(q))[0]
+    rates = -draw.uniform(0.0, 1.0, len(case.law.a0))
+    return q, np.linalg.lstsq(H(q), rates)[0]
 
 
 def _numbers(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[AuditRow]:
@@ -101,7 +120,7 @@ def _numbers(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[AuditRo
 def _function(key: str, mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case) -> AuditRow:
     worst = np.nan
     if key in mine:
-        arguments = [(q,) if key in ("M", "H") else (q, v) for q, v in states(case)]
+        arguments = [(q,) if key in ("M", "H") else (q, v) for q, v in states(case, theirs)]
         values = [(mine[key](*a), theirs[key](*a)) for a in arguments]
         a, b = (np.concatenate([_flat(value[i]) for value in values]) for i in (0, 1))
         worst = difference(a, b)

@@ -111,6 +111,23 @@ def report(folder: Path) -> int:
     return 0
 
 
+@cli.group()
+def log() -> None:
+    """Look at logs of hardware."""
+
+
+@log.command("info")
+@click.argument("path", metavar="LOG", type=click.Path(path_type=Path))
+@click.option("--columns", metavar="MAP", help="Column map (TOML) to check it by.")
+@click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart.")
+@click.option("--draft", is_flag=True, help="Print a draft of a column map and nothing else.")
+def log_info(path: Path, columns: str | None, part: int | None, draft: bool) -> int:
+    """Show channels, rates, gaps and ranges of LOG, what is wrong with it, and a draft of a column map."""
+    from crossbody.reports.log import info
+
+    return info(path, columns, part, draft)
+
+
 def _command() -> str:
     return shlex.join(["crossbody", *sys.argv[1:]])
 

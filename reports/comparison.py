@@ -30,6 +30,7 @@ class Entry:
         skipped: why, in one sentence.
         audit: what reached the engine beside the reference.
         refined: the same engine with a much finer step or tolerance, to tell model from discretisation.
+        own: truth of the equations that the engine really integrates; None where they are the case's own.
     """
 
     engine: str
@@ -39,6 +40,7 @@ class Entry:
     skipped: str = ""
     audit: tuple[AuditRow, ...] = ()
     refined: Trajectory | None = None
+    own: Truth | None = None
 
 
 def compare(
@@ -173,7 +175,10 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterable[Verdict
 
 
 def _split(judge_: _Judge) -> Iterable[Verdict]:
-    """Discretisation error (run against its refined self) apart from model error (refined against the truth)."""
+    """Discretisation error apart from model error (refined against the truth).
+
+    Discretisation is the run against the truth of the equations that the engine follows, or against its refined self.
+    """
     from crossbody.cases import Tier
     from crossbody.reports.truth import from_run
 
@@ -181,7 +186,9 @@ def _split(judge_: _Judge) -> Iterable[Verdict]:
     if entry.refined is None or entry.run is None:
         return
     sides = [("model", judge_.truth, entry.refined)]
-    if "dt" in entry.settings:  # a tolerance is refined to rounding: what is left is the model error alone
+    if entry.own is not None:
+        sides.append(("discretisation", entry.own, entry.run))
+    elif "dt" in entry.settings:  # a tolerance is refined to rounding: what is left is the model error alone
         sides.append(("discretisation", from_run(entry.refined, Tier.D, "the same engine refined"), entry.run))
     for name in ("position", "event_times"):
         metric = metrics.load(name)

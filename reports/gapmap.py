@@ -7,7 +7,7 @@ some units, where they are over before the next begins (spec 2.2).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,6 +28,8 @@ BESIDE = tuple(rule for rule in RULES if rule not in ("block", "memoryless"))
 """Rules whose own answer is laid beside; block gives what simultaneous does, memoryless is a line of its own."""
 LONGER = 6
 """How often the horizon is doubled while gaps still close."""
+TIE = 1e-6
+"""Rules no further apart than this are told apart by their order: with springs and gaps all give the ideal pattern."""
 PATTERN = "to_sequential"
 
 COLUMNS = (
@@ -129,7 +131,12 @@ def _run(line: Line, case: Case) -> tuple[Case, Trajectory, str]:
         if not run.outcome.ok or over(run):
             break
         case = replace(case, t_end=2.0 * case.t_end)
-    return case, run, str(prepared.settings.get("law", case.fsm if case.collisions == "resolved" else case.collisions))
+    return case, run, _followed(prepared.settings, case)
+
+
+def _followed(settings: Mapping[str, Any], case: Case) -> str:
+    """The machine of an engine's own, impacts where a restitution stands for the law, else the case's machine."""
+    return "impacts" if "restitution" in settings else str(settings.get("law", case.fsm))
 
 
 def over(run: Trajectory) -> bool:
@@ -152,8 +159,14 @@ def _measured(case: Case, run: Trajectory) -> dict[str, Any]:
         "energy_created": float(run.total_energy[-1]) / brought - 1.0,
         "energy_switching": math.nan if jumps is None else jumps / brought,
         "momentum": float(run.v[-1] @ balls.masses) / momentum - 1.0,
-        "nearest": min(known, key=lambda name: known[name]).removeprefix("to_"),
+        "nearest": _nearest(known),
     }  # fmt: skip
+
+
+def _nearest(apart: Mapping[str, float]) -> str:
+    """The rule that is followed most closely; of those equally close the first."""
+    least = min(apart.values())
+    return next(name.removeprefix("to_") for name, value in apart.items() if value <= least + TIE)
 
 
 def summary(rows: pd.DataFrame, ideal: float = 1e-3) -> pd.DataFrame:
@@ -179,8 +192,9 @@ def _line_summary(done: pd.DataFrame, ideal: float) -> dict[str, Any]:
     peak = done.iloc[int(np.argmax(done["energy_created"].astype(float)))]
     beyond = done[done[PATTERN].astype(float) > ideal]["s"]
     later = done[done["s"] > (beyond.max() if len(beyond) else -1.0)]["s"]
+    touching = done[done["s"] == 0.0]["nearest"]
     return {
-        "most": float(peak["energy_created"]), "at_s": float(peak["s"]), "at_touch": str(done.iloc[0]["nearest"]),
+        "most": float(peak["energy_created"]), "at_s": float(peak["s"]), "at_touch": "".join(touching),
         "ideal_from": float(later.min()) if len(later) else math.nan,
     }  # fmt: skip
 

@@ -11,7 +11,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName, Value
 from crossbody.reports.audit import AuditRow, audit
 from crossbody.reports.comparison import Entry
-from crossbody.reports.truth import Truth, sample_times, truth_of, with_both_sides
+from crossbody.reports.truth import Truth, law_of, sample_times, truth_of, with_both_sides
 
 DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
@@ -136,6 +136,7 @@ def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, A
         run=_dense(case, pick, prepared),
         audit=rows,
         refined=_refined(case, pick, prepared.settings),
+        own=None if (followed := getattr(prepared, "follows", None)) is None else law_of(followed),
     )
 
 

@@ -16,7 +16,7 @@ Table = Mapping[str, NDArray[Any]]
 """Columns by name; "t" is the time, s."""
 
 UNITS = {"t": "s", "angle": "rad", "torque": "N m", "count": "1", "touch": "1"}
-NANO = 1_000_000_000
+MILLI = 1_000_000  # ns
 
 
 def table(rows: int = 1000, seed: int = 7) -> dict[str, NDArray[Any]]:
@@ -57,7 +57,9 @@ def write_mat73(path: Path, data: Table) -> None:
     classes = {"float64": "double", "float32": "single"}
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in data.items():
-            item = file.create_dataset(name, data=values[None, :], chunks=(1, 256), compression="gzip")
+            item = file.create_dataset(
+                name, data=values[None, :], chunks=(1, min(256, len(values))), compression="gzip"
+            )
             item.attrs["MATLAB_class"] = np.bytes_(classes.get(values.dtype.name, values.dtype.name))
     with path.open("r+b") as raw:
         raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
@@ -68,18 +70,20 @@ def write_hdf5(path: Path, data: Table) -> None:
 
     with h5py.File(path, "w") as file:
         for name, values in data.items():
-            file.create_dataset(f"rig/{name}", data=values, chunks=(256,), shuffle=True, compression="gzip")
+            file.create_dataset(
+                f"rig/{name}", data=values, chunks=(min(256, len(values)),), shuffle=True, compression="gzip"
+            )
 
 
 def write_mcap(path: Path, data: Table) -> None:
     from mcap_ros2.writer import Writer
 
-    definition = "float64 t\nfloat64 angle\nfloat32 torque\nint32 count\nuint8 touch\n"
+    definition = _definition(data)
     with path.open("wb") as file, Writer(file, chunk_size=4096) as writer:
         schema = writer.register_msgdef("rig_msgs/msg/State", definition)
         for i in range(len(data["t"])):
             message = {name: values[i].item() for name, values in data.items()}
-            when = round(data["t"][i] * NANO)
+            when = i * MILLI
             writer.write_message("/rig", schema, message, log_time=when, publish_time=when)
 
 
@@ -93,16 +97,19 @@ def write_mcap_json(path: Path, data: Table) -> None:
         channel = writer.register_channel("/rig", "json", schema)
         for i in range(len(data["t"])):
             text = json.dumps({name: values[i].item() for name, values in data.items()}).encode()
-            when = round(data["t"][i] * NANO)
+            when = i * MILLI
             writer.add_message(channel, log_time=when, publish_time=when, data=text)
         writer.finish()
 
 
-def _ros_type(store: Any) -> Any:
+def _definition(data: Table) -> str:
+    return "".join(f"{values.dtype.name} {name}\n" for name, values in data.items())
+
+
+def _ros_type(store: Any, data: Table) -> Any:
     from rosbags.typesys import get_types_from_msg
 
-    definition = "float64 t\nfloat64 angle\nfloat32 torque\nint32 count\nuint8 touch\n"
-    store.register(get_types_from_msg(definition, "rig_msgs/msg/State"))
+    store.register(get_types_from_msg(_definition(data), "rig_msgs/msg/State"))
     return store.types["rig_msgs/msg/State"]
 
 
@@ -111,13 +118,13 @@ def write_ros1(path: Path, data: Table) -> None:
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC)
-    kind = _ros_type(store)
+    kind = _ros_type(store, data)
     with Writer(path) as bag:
         link = bag.add_connection("/rig", kind.__msgtype__, typestore=store)
         for i in range(len(data["t"])):
             message = kind(**{name: values[i] for name, values in data.items()})
             raw = store.serialize_ros1(message, kind.__msgtype__)
-            bag.write(link, round(data["t"][i] * NANO), raw)
+            bag.write(link, i * MILLI, raw)
 
 
 def write_ros2(path: Path, data: Table, storage: str = "sqlite3") -> None:
@@ -125,13 +132,13 @@ def write_ros2(path: Path, data: Table, storage: str = "sqlite3") -> None:
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    kind = _ros_type(store)
+    kind = _ros_type(store, data)
     with Writer(path, version=9, storage_plugin=StoragePlugin[storage.upper()]) as bag:
         link = bag.add_connection("/rig", kind.__msgtype__, typestore=store)
         for i in range(len(data["t"])):
             message = kind(**{name: values[i] for name, values in data.items()})
             raw = store.serialize_cdr(message, kind.__msgtype__)
-            bag.write(link, round(data["t"][i] * NANO), raw)
+            bag.write(link, i * MILLI, raw)
 
 
 def write_ros2_mcap(path: Path, data: Table) -> None:

@@ -145,7 +145,7 @@ def shuttle(bound: float = 1e3) -> System:
     )  # fmt: skip
 
 
-# A mass above two floors of which one is there: p = (gravity m/s^2, height of the other m; which, switches; speed kept).
+# A mass above two floors of which one is there: p = (gravity m/s^2, height of the lower m; which, changes; speed).
 
 
 @kernels.dynamics
@@ -178,8 +178,8 @@ def _trapdoor_energy(q: Any, v: Any, p: Any, e: Any) -> None:
 
 @kernels.switch
 def _trapdoor_switch(t: float, q: Any, v: Any, p: Any, mode: Any, fired: int) -> int:
-    """Count what rows do; at the fourth time the upper floor is gone, whatever the mode of its row."""
-    if fired != kernels.TOUCHED or p[2] != 0.0:
+    """Count what rows do to the speed since the count before; at the fourth time the upper floor is gone."""
+    if fired != kernels.TOUCHED or p[2] != 0.0 or abs(v[0] - p[4]) < 0.1:
         return 0
     p[3] += 1.0
     p[4] = v[0]
@@ -190,9 +190,84 @@ def _trapdoor_switch(t: float, q: Any, v: Any, p: Any, mode: Any, fired: int) ->
 
 
 def trapdoor(b0: float = 0.0) -> System:
-    """A ball bounces on a floor that opens when the rows have switched four times, and falls on the one below."""
+    """A ball bounces on a floor that opens at the fourth change of its speed, and falls on the one below."""
     return System(
         n=1, parameters=[9.81, -0.5], discrete=[0.0, 0.0], latched=1, a0=[1e4, 1e4], a1=20.0, b0=b0, b1=0.2 * b0**0.5,
         dynamics=_trapdoor_dynamics, gaps=_trapdoor_gaps, rows=_trapdoor_rows, energy=_trapdoor_energy,
         switch=_trapdoor_switch,
+    )  # fmt: skip
+
+
+# Two floors at one place that exchange roles whenever a row switches: nothing ever settles.
+
+
+@kernels.switch
+def _restless_switch(t: float, q: Any, v: Any, p: Any, mode: Any, fired: int) -> int:
+    if fired != kernels.TOUCHED:
+        return 0
+    p[2] = 1.0 - p[2]
+    mode[:] = 0
+    return 1
+
+
+def restless() -> System:
+    """A ball that falls on floors of which the one it touches vanishes and the other appears."""
+    return System(
+        n=1, parameters=[9.81, 0.0], discrete=[0.0, 0.0], latched=1, a0=[1e4, 1e4], a1=20.0,
+        dynamics=_trapdoor_dynamics, gaps=_trapdoor_gaps, rows=_trapdoor_rows, energy=_trapdoor_energy,
+        switch=_restless_switch,
+    )  # fmt: skip
+
+
+# Constant M and H: p = (M row by row, H row by row, gap offsets, force).
+
+
+@kernels.dynamics
+def _constant_dynamics(t: float, q: Any, v: Any, u: Any, p: Any, M: Any, f: Any, w: Any) -> None:
+    n = len(q)
+    for i in range(n):
+        for j in range(n):
+            M[i, j] = p[i * n + j]
+        f[i] = p[len(p) - n + i]
+
+
+@kernels.gaps
+def _constant_gaps(t: float, q: Any, v: Any, p: Any, h: Any, hd: Any) -> None:
+    n, nc = len(q), len(h)
+    for i in range(nc):
+        h[i] = p[n * n + nc * n + i]
+        hd[i] = 0.0
+        for j in range(n):
+            h[i] = h[i] + p[n * n + i * n + j] * q[j]
+            hd[i] = hd[i] + p[n * n + i * n + j] * v[j]
+
+
+@kernels.rows
+def _constant_rows(t: float, q: Any, v: Any, p: Any, w: Any, idx: Any, na: int, H: Any, h: Any, Hdv: Any) -> None:
+    n = len(q)
+    nc = (len(p) - n * n - n) // (n + 1)
+    for k in range(na):
+        i = idx[k]
+        h[k], Hdv[k] = p[n * n + nc * n + i], 0.0
+        for j in range(n):
+            H[k, j] = p[n * n + i * n + j]
+            h[k] = h[k] + H[k, j] * q[j]
+
+
+@kernels.energy
+def _constant_energy(q: Any, v: Any, p: Any, e: Any) -> None:
+    n = len(q)
+    e[0], e[1] = 0.0, 0.0
+    for i in range(n):
+        for j in range(n):
+            e[0] = e[0] + 0.5 * v[i] * p[i * n + j] * v[j]
+        e[1] = e[1] - p[len(p) - n + i] * q[i]
+
+
+def constant(M: Any, H: Any, offsets: Any, force: Any, *, zeta: float, b0: float = 1e6) -> System:
+    """M q'' = force beside planes H q + offsets >= 0; every row bounces."""
+    return System(
+        n=len(M), parameters=np.concatenate([np.ravel(M), np.ravel(H), offsets, force]), a0=np.ones(len(H)), a1=1.0,
+        b0=b0, b1=2.0 * zeta * b0**0.5, dynamics=_constant_dynamics, gaps=_constant_gaps, rows=_constant_rows,
+        energy=_constant_energy,
     )  # fmt: skip

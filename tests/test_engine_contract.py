@@ -24,7 +24,13 @@ def installed(name: str) -> Engine | None:
 
 
 FOUND = {name: engine for name in engines.names() if (engine := installed(name)) is not None}
-PAIRS = [(name, profile) for name, engine in FOUND.items() for profile in engine.profiles]
+BALL = cases.load("bouncing_ball")
+PAIRS = [
+    (name, profile)
+    for name, engine in FOUND.items()
+    for profile in engine.profiles
+    if engine.why_not(BALL, profile) is None  # a rule for several contacts has nothing to do here
+]
 each_variant = pytest.mark.parametrize("variant", cases.variants("bouncing_ball"))
 each_profile = pytest.mark.parametrize(("name", "profile"), PAIRS)
 

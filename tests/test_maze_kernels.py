@@ -29,7 +29,7 @@ GEOMETRY = maze_of(load("ball_maze", variant="solve").parameters)
 
 def there(channel, lower, upper, mode=0, target=0.3, touching=0.0, system=SYSTEM):
     p = system.p.copy()
-    p[layout.CHANNEL :] = channel, lower, upper, mode, target, touching
+    p[layout.CHANNEL : layout.ANGLE] = channel, lower, upper, mode, target, touching
     return p
 
 
@@ -129,7 +129,7 @@ def test_rows_that_cannot_be_touched_are_far_and_still(p, states):
     there_now = {0, 6} if lower < 0 else {1, 2}
     there_now = (there_now if channel > 0 else set()) | ({3, 7} if upper < 0 else {4, 5})
     away = sorted(set(range(8)) - there_now)
-    np.testing.assert_array_equal(h[away], GEOMETRY.wall)
+    np.testing.assert_array_equal(h[away], [GEOMETRY.wall if i < 6 else 0.0 for i in away])
     np.testing.assert_array_equal(hd[away], 0.0)
 
 

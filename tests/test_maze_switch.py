@@ -23,7 +23,7 @@ PASSIVE = maze.build({**CASE.parameters, "controller": "off"}, CASE.law)
 
 def numbers(channel, lower, upper, mode=0, target=0.0, touching=0.0, system=SYSTEM):
     p = system.p.copy()
-    p[layout.CHANNEL :] = channel, lower, upper, mode, target, touching
+    p[layout.CHANNEL : layout.ANGLE] = channel, lower, upper, mode, target, touching
     return p
 
 
@@ -35,7 +35,10 @@ def ball(rho, b, theta=0.0):
     return np.array([theta, rho * math.cos(b), rho * math.sin(b), 0.0])
 
 
-def guards(q, p):
+def guards(q, p, latch=False):
+    """Every guard; `latch` counts from here, where the ball just got."""
+    if latch:
+        machine._latch(q, p)
     g = np.full(machine.GUARDS, np.nan)
     machine.watch(0.0, q, np.zeros(4), p, g)
     return g
@@ -91,7 +94,7 @@ def test_a_contact_goes_from_face_to_tip_and_back_at_an_edge(ring, end, contact,
     channel, sector = ring + 1 if below else ring, layout.BELOW if below else layout.ABOVE
     p = numbers(channel, -1, -1, system=PASSIVE)
     q, _ = crossing(ring, end, True, below)
-    assert guards(q, p)[guard] < 0.0
+    assert guards(q, p, latch=True)[guard] < 0.0
     modes = [0] * 6
     modes[face] = contact
     code, after = fire(q, p, modes, guard)
@@ -139,6 +142,7 @@ def test_ring_is_passed_inside_its_gap_only():
 def test_snatch_aims_the_gap_at_the_ball_as_it_was_on_the_edge():
     p = numbers(4, -1, -1, mode=1)
     q, wall = crossing(3, 1, True, below=True)
+    machine._latch(q, p)
     fire(q, p, [CONTACT, 0, 0, 0, 0, 0], machine.EDGE_BELOW)
     assert state(p)[3] == layout.SNATCH
     target = p[layout.TARGET]
@@ -194,3 +198,25 @@ def test_channels_of_any_number_of_rings(rings):
         h = np.zeros(8)
         maze.gaps(0.0, ball(wall.outer + geometry.ball, 1.2), np.zeros(4), p, h, np.zeros(8))
         assert (h > -1e-15).all()
+
+
+@pytest.mark.parametrize("turn", [0.2, 1.0, -1.0, 5.0, -7.0, 40.0])
+def test_an_edge_that_was_passed_stays_passed_however_far_the_maze_turns(turn):
+    """Steps of a quiet ball are longer than the time between gaps; an edge must not be missed for it."""
+    q, p = ball(above(3), 0.5 * math.pi), numbers(4, 0, 0)
+    fire(q, p, [0] * 6, START)
+    g = guards(q + np.array([turn, 0.0, 0.0, 0.0]), p)
+    assert (g[machine.EDGE_BELOW] < 0.0) == (abs(turn) > math.pi / 4 - GEOMETRY.rings[3].reach)
+    assert g[machine.EDGE_ABOVE] == 1.0
+
+
+def test_a_ball_whose_angle_jumps_at_the_axis_finds_its_sector():
+    p = numbers(0, -1, -1, mode=3)
+    q = ball(1e-6, math.pi, 0.0)  # gap 0 of ring 0 stands there
+    fire(q, p, [0] * 6, START)
+    assert state(p)[2] == 0
+    q = ball(1e-6, 0.1, 0.0)
+    assert guards(q, p)[machine.EDGE_ABOVE] < 0.0
+    fire(q, p, [0] * 6, machine.EDGE_ABOVE)
+    assert state(p)[2] == -1
+    assert (guards(q, p) > 0.0).all()

@@ -11,6 +11,8 @@ from crossbody.cases import Law
 
 MAX_IMPEDANCE = 0.9999
 """MuJoCo clamps d there; it leaves R = (1 - d)/d diagA, a bias of 1e-4 in lam."""
+IMPEDANCE = (MAX_IMPEDANCE, MAX_IMPEDANCE, 1e-3, 0.5, 1.0)
+"""The solimp that goes with it: the same impedance at every depth."""
 REMAINING = 1e-7
 """Factor on R. With PGS on one row the error of lam falls with it: 2e-8, 2e-11, 6e-13 at 1e-4, 1e-7, 1e-9."""
 

@@ -12,6 +12,7 @@ import mujoco
 
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory, _registry
 from crossbody.engines import _settings
+from crossbody.engines._contract import Run
 from crossbody.engines.mujoco._globals import captured, hooked
 from crossbody.engines.mujoco._march import March
 from crossbody.engines.mujoco._scene import Scene
@@ -29,6 +30,7 @@ class MujocoRun:
     profile: str
     settings: Mapping[str, Any]
     said: tuple[str, ...]
+    follows: Case | None = None
     engine: str = "mujoco"
 
     def run(self) -> Trajectory:
@@ -52,7 +54,11 @@ class MujocoRun:
 
 
 class Mujoco:
-    """MuJoCo 4; see `crossbody.engines.Engine`."""
+    """MuJoCo 4; see `crossbody.engines.Engine`.
+
+    A mechanism is a module here with `default_step(case, profile)` and `build(case, profile, dt) -> Scene`; or, with a
+    machine of its own, `prepare(case, profile, used) -> Run`. It may say `why_not(case, profile)`.
+    """
 
     name = "mujoco"
     profiles: Mapping[str, str] = {
@@ -66,10 +72,11 @@ class Mujoco:
         _settings.profile_of(self.name, self.profiles, profile)
         known = _mechanisms()
         if case.mechanism in known:
-            return None
+            own = getattr(_mechanism(case.mechanism), "why_not", None)
+            return own(case, profile) if own else None
         return f"MuJoCo has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
 
-    def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> MujocoRun:
+    def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> Run:
         """Compile the model of a case.
 
         Args:
@@ -89,12 +96,19 @@ class Mujoco:
         used = _settings.chosen(self.name, profile, _known(case, mechanism.default_step(case, profile)), settings)
         with captured() as said:
             try:
+                if hasattr(mechanism, "prepare"):
+                    run: Run = mechanism.prepare(case, profile, used)
+                    return run
                 scene: Scene = mechanism.build(case, profile, float(used["dt"]))
             except CrossbodyError:
                 raise  # ours, and it is a ValueError too
             except ValueError as error:
                 raise CaseUnsupported(f"MuJoCo refuses the model of {case.label}: {error}.") from None
-        return MujocoRun(case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said))
+        followed = getattr(mechanism, "followed", None)
+        return MujocoRun(
+            case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said),
+            follows=followed(case, profile) if followed else None,
+        )  # fmt: skip
 
 
 def _known(case: Case, step: float) -> dict[str, Parameter]:

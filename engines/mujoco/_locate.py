@@ -12,12 +12,13 @@ from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._scene import Scene
 
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
+COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 Sign = tuple[int, int, float]
 """(row, 0 for its gap or 1 for its multiplier, sign that it has in its present mode)."""
 WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
     FREE: ((0, 1.0),),
-    CONTACT: ((0, -1.0), (1, 1.0)),
-    BALLISTIC: ((0, -1.0), (1, -1.0)),
+    **dict.fromkeys((CONTACT, COLLISION), ((0, -1.0), (1, 1.0))),
+    **dict.fromkeys((BALLISTIC, SEPARATED), ((0, -1.0), (1, -1.0))),
 }
 
 
@@ -39,14 +40,22 @@ class Locator:
         self.advance, self.rewind = advance, rewind
 
     def beyond(self, modes: Modes) -> Modes:
-        """The modes just behind the event: those rows that crossed are taken by their gap and multiplier."""
+        """The modes just behind the event: those rows that crossed are taken by their gap and multiplier.
+
+        What pushes is in CONTACT here: only the scene knows of COLLISION.
+        """
         return tuple(
             mode if mode not in WATCHED else FREE if h > 0.0 else CONTACT if lam > 0.0 else BALLISTIC
             for mode, (h, lam) in zip(modes, self.margins(), strict=True)
         )
 
     def land(self, modes: Modes) -> int:
-        """Redo the step so that it ends just behind its first event; returns the trials that it took."""
+        """Redo the step so that it ends just behind its first event; returns the trials that it took.
+
+        A change of constants alone (COLLISION to CONTACT) crosses nothing: it is taken at the end of the step.
+        """
+        if not self._crossed(modes):
+            return 0
         full, trials = self.model.opt.timestep, 0
 
         def value(tau: float, row: int, which: int) -> float:

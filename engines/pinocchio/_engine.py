@@ -15,6 +15,7 @@ import sksundae
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory, _registry
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _settings
+from crossbody.engines._contract import Run
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
@@ -97,7 +98,11 @@ class PinocchioRun:
 
 
 class Pinocchio:
-    """Pinocchio 4; see `crossbody.engines.Engine`."""
+    """Pinocchio 4; see `crossbody.engines.Engine`.
+
+    A mechanism is a module here with `build(case, algebra) -> Scene`; or `smooth(case, model) -> Smooth`, where no row
+    ever opens; or, with a machine of its own, `SETTINGS`, `why_not(case, profile)` and `prepare(case, used) -> Run`.
+    """
 
     name = "pinocchio"
     profiles: Mapping[str, str] = {
@@ -115,15 +120,20 @@ class Pinocchio:
         known = _registry.plugin_names(PACKAGE, _path())
         if case.mechanism not in known:
             return f"Pinocchio has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
+        if hasattr(_mechanism(case), "why_not"):
+            own: str | None = _mechanism(case).why_not(case, profile)
+            return own
         if profile == "admm" and not hasattr(_mechanism(case), "build"):
             return "The profile admm steps contacts in time: the loops of this mechanism never open."
         if profile in RULES and not case.law.unilateral.all():
             return "An impact needs a contact that opens: a row that is always on has none."
+        if profile == "impulse_simultaneous" and int(case.law.unilateral.sum()) < 2:
+            return "One contact collides with no other: the profile impulse is the same."
         if profile == "law" and case.fsm != "level":
             return f"The profile law switches by the machine 'level' and not by {case.fsm!r}."
         return None
 
-    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> PinocchioRun | SmoothRun:
+    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> Run:
         """Build the model of a case.
 
         Args:
@@ -144,6 +154,9 @@ class Pinocchio:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
         mechanism = _mechanism(case)
+        if hasattr(mechanism, "prepare"):
+            run: Run = mechanism.prepare(case, used)
+            return run
         if hasattr(mechanism, "smooth"):
             smooth: Smooth = mechanism.smooth(case, str(used["model"]))
             return SmoothRun(case=case, scene=smooth, profile=profile, settings=used)
@@ -170,6 +183,9 @@ def _mechanism(case: Case) -> ModuleType:
 
 def _known(case: Case, profile: str) -> dict[str, Parameter]:
     """The settings of a profile."""
+    if hasattr(_mechanism(case), "SETTINGS"):
+        own: dict[str, Parameter] = _mechanism(case).SETTINGS
+        return own
     models = getattr(_mechanism(case), "MODELS", None)
     if models is not None:
         model = Parameter(default=next(iter(models)), doc="source of the model", choices=tuple(models))

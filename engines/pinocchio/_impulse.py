@@ -21,8 +21,12 @@ FREE, CONTACT, COLLISION = int(Mode.FREE), int(Mode.CONTACT), int(Mode.COLLISION
 GAP, TURN = 0, 1
 PUSH = 1
 """The functions watched of a row that is free, and of one that is held."""
-SLOW = 1e-12
+SLOW = 1e-9
 """Part of the largest rate of a gap below which it stands still."""
+WEAK = 1e-7
+"""Part of the largest acceleration of a gap below which a row at rest is not pressed: an integration's error may be."""
+TIES = 1e-12
+"""Part of an approach within which two rows approach equally."""
 PER_ROW = 1000
 """Impacts of one row at one instant that make a cycle."""
 
@@ -54,11 +58,14 @@ class Instant:
         modes: of every row; they change.
         passed: transitions so far.
         touching: the rows whose gap is closed.
+        slow: rate below which a gap stands still, m/s.
+        weak: acceleration below which a row at rest is not pressed, m/s^2.
         dropped: rows that were let go here: they are not caught again unless they approach.
     """
 
-    def __init__(self, rows: PinRows, q: Floats, v: Floats, modes: Modes, slow: float) -> None:
-        self.rows, self.q, self.v, self.modes, self.slow = rows, q, v, list(modes), slow
+    def __init__(self, rows: PinRows, q: Floats, v: Floats, modes: Modes) -> None:
+        self.rows, self.q, self.v, self.modes = rows, q, v, list(modes)
+        self.slow = self.weak = 0.0
         self.passed: list[Passed] = []
         self.touching: list[int] = []
         self.dropped: set[int] = set()
@@ -100,10 +107,10 @@ class Instant:
                 self.release(i)
 
     def hold_resting(self) -> bool:
-        """Hold the touching rows that rest and are pressed (lam > 0), one after another; whether there was one."""
-        hd, (press, noise) = self.rates(), self.press()
+        """Hold a touching row that rests and is pressed; whether there was one."""
+        hd, press = self.rates(), self.press()[0]
         for i in self.touching:
-            if self.modes[i] == FREE and i not in self.dropped and hd[i] == 0.0 and press[i] > noise[i]:
+            if self.modes[i] == FREE and i not in self.dropped and hd[i] == 0.0 and press[i] > self.weak:
                 self.move(i, CONTACT)
                 return True
         return False
@@ -120,7 +127,7 @@ def sequential(at: Instant, a0: list[float], e: list[float]) -> bool:
     if not coming:
         return False
     fastest = min(hd[i] for i in coming)
-    i = next(j for j in coming if hd[j] <= fastest * (1.0 - 1e-12))
+    i = next(j for j in coming if hd[j] <= fastest * (1.0 - TIES))
     captured = e[i] <= 0.0 or -hd[i] < capture_speed(float(at.press()[0][i]), a0[i], e[i])
     at.move(i, COLLISION)
     while True:
@@ -183,13 +190,13 @@ class ImpulseMachine:
     """Rows are FREE or, once captured, held rigidly (CONTACT) until they would have to pull.
 
     A struck row passes through COLLISION within the instant. The rule strikes until no touching row approaches.
-    One run uses one machine: it remembers the largest rate that it saw, and which free gaps are closed.
+    One run uses one machine: it remembers the largest rates and accelerations that it saw, and which gaps are closed.
     """
 
     def __init__(self, rows: PinRows, a0: list[float], e: list[float], rule: Impact = sequential) -> None:
         self.rows: PinRows = rows
         self.own, self.a0, self.e, self.rule = switched(rows), a0, e, rule
-        self.slow = 0.0
+        self.slow = self.weak = 0.0
         self._closed: set[int] = set()
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
@@ -206,15 +213,16 @@ class ImpulseMachine:
                 out[at + PUSH] = lam[i]
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = frozenset()) -> Settled:
-        """Release what pulls, then strike or hold what touches."""
+        """Release what pulls; hold what rests and is pressed; strike what approaches, until nothing does."""
         h, hd = self.rows.gaps(q, v)
-        self.slow = max(self.slow, SLOW * float(np.abs(hd).max(initial=0.0)))
-        at, rounding = Instant(self.rows, q, v, modes, self.slow), 8.0 * ULP * float(np.abs(q).max(initial=0.0))
+        at, rounding = Instant(self.rows, q, v, modes), 8.0 * ULP * float(np.abs(q).max(initial=0.0))
+        at.slow = self.slow = max(self.slow, SLOW * float(np.abs(hd).max(initial=0.0)))
+        at.weak = self.weak = max(self.weak, WEAK * float(np.abs(at.press()[0]).max(initial=0.0)))
         at.release_pulling(fired)
         at.touching = [i for i in self.own if h[i] <= rounding or (i, GAP) in fired]
         cycle = True
         for _ in range(PER_ROW * len(modes)):
-            if not self.rule(at, self.a0, self.e) and not at.hold_resting():
+            if not at.hold_resting() and not self.rule(at, self.a0, self.e):
                 cycle = False
                 break
         self._closed = set(at.touching)

@@ -11,14 +11,27 @@ A format is a module here with these public names; its third-party library is im
 from __future__ import annotations
 
 import stat
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from crossbody.cases import FormatUnavailable, LogFormatError, _registry
-from crossbody.hw.formats._contract import Column, Group, Reader
+from crossbody.cases import ColumnMapError, FormatUnavailable, LogFormatError, _registry
+from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group, Reader
 
-__all__ = ["Column", "Group", "Reader", "load", "names", "open_log", "recognise", "summary"]
+__all__ = [
+    "BLOCK_ROWS",
+    "Block",
+    "Column",
+    "Group",
+    "Reader",
+    "load",
+    "names",
+    "open_log",
+    "options",
+    "recognise",
+    "summary",
+]
 
 HEAD = 4096
 
@@ -72,7 +85,7 @@ def recognise(path: Path) -> str:
         raise LogFormatError(path, "is a folder; name a file, or the folder of a ROS 2 bag (with its metadata.yaml).")
     promised = [name for name in names() if path.suffix.lower() in load(name).SUFFIXES]
     if promised:
-        raise LogFormatError(path, f"does not begin as a {'/'.join(promised)} file does: damaged, or not what it says.")
+        raise LogFormatError(path, f"does not begin as {' or '.join(promised)} files do: damaged, or not what it says.")
     known = ", ".join(f"{name} ({' '.join(load(name).SUFFIXES)})" for name in names())
     raise LogFormatError(path, f"is in no known log format (it begins with {head[:8].hex(' ')}). Known: {known}.")
 
@@ -100,6 +113,22 @@ def _unreadable(path: Path, error: Exception) -> Exception:
     return LogFormatError(path, f"cannot be read: {reason}.")
 
 
+def options(name: str, given: Mapping[str, Any]) -> Any:
+    """The options of a format, as its own type.
+
+    Raises:
+        ColumnMapError: for one that it does not have, or of a wrong type.
+    """
+    import msgspec
+
+    try:
+        return msgspec.convert(given, load(name).Options, strict=True)
+    except msgspec.ValidationError as error:
+        told, _, where = str(error).partition(" - at `$")
+        known = ", ".join(load(name).Options.__struct_fields__) or "none"
+        raise ColumnMapError("column map", "$.options" + where.rstrip("`"), f"{told}; {name} has: {known}.") from None
+
+
 def open_log(path: Path, name: str | None = None, options: Any = None) -> Reader:
     """Open a log for reading.
 
@@ -113,9 +142,9 @@ def open_log(path: Path, name: str | None = None, options: Any = None) -> Reader
         FormatUnavailable: if the format's package is not installed.
         UnknownName: for a format that does not exist.
     """
-    if name is not None:
-        _head(path)
     module = load(name or recognise(path))
+    if name is not None and not module.recognises(path, _head(path)):
+        raise LogFormatError(path, f"does not begin as {name} files do: damaged, or in another format.")
     try:
         reader: Reader = module.open_log(path, module.Options() if options is None else options)
     except ModuleNotFoundError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from pathlib import Path
 from crossbody.cases import CrossbodyError, LogFormatError
 
 LENGTH = 160  # of a library's own words
+LOGGERS = ("asammdf", "nptdms")
 
 
 @contextmanager
@@ -30,13 +32,33 @@ def parsing(path: Path, what: str, row: int | None = None, column: str = "") -> 
         LogFormatError: for whatever the parser raised.
     """
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a parser's doubts about the file are its exceptions' business
+        with warnings.catch_warnings(), _silent():
+            warnings.simplefilter("ignore")
             yield
     except (CrossbodyError, ModuleNotFoundError):
         raise
     except Exception as error:
-        raise LogFormatError(path, f"is not a readable {what}: {words(error)}.", row, column) from error
+        raise fault(path, what, error, row, column) from error
+
+
+def fault(path: Path, what: str, error: Exception, row: int | None = None, column: str = "") -> LogFormatError:
+    """The error for what a parser raised; see `parsing`."""
+    return LogFormatError(path, f"is not a readable {what}: {words(error)}.", row, column)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep the loggers of the parsers from writing to stderr: what matters about a file becomes our one sentence."""
+    found = list(logging.root.manager.loggerDict.items())
+    loggers = [one for name, one in found if name.startswith(LOGGERS) and isinstance(one, logging.Logger)]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def words(error: BaseException) -> str:

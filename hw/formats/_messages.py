@@ -12,6 +12,7 @@ import numpy as np
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats._contract import Block, Column, Group
+from crossbody.hw.formats._guard import fault
 from crossbody.hw.formats._names import WIDEST
 
 BLOCK_MESSAGES = 8192
@@ -106,13 +107,14 @@ def _at(message: Any, leaf: Leaf) -> Any:
 
 
 def rows_of(
-    path: Path, messages: Iterable[tuple[Mapping[str, int], Callable[[], Any]]], group: Group,
+    path: Path, what: str, messages: Iterable[tuple[Mapping[str, int], Callable[[], Any]]], group: Group,
     leaves: Mapping[str, Leaf], columns: Sequence[str],
 ) -> Iterator[Block]:  # fmt: skip
     """Blocks out of a topic's messages.
 
     Args:
         path: the log, for messages of errors.
+        what: name of its format, for those too.
         messages: for each, its clocks (column -> ns) and a function that decodes it.
         group: the topic's columns.
         leaves: where a message holds each.
@@ -126,7 +128,10 @@ def rows_of(
     kept: dict[str, list[Any]] = {name: [] for name in columns}
     fields = [name for name in columns if name in leaves]
     for clocks, decode in messages:
-        message = decode() if fields else None
+        try:
+            message = decode() if fields else None
+        except Exception as error:  # see `parsing`, which is too slow to be entered for every message
+            raise fault(path, what, error, row) from error
         for name in columns:
             kept[name].append(_value(path, row, message, leaves[name]) if name in leaves else clocks[name])
         row += 1

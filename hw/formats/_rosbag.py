@@ -60,7 +60,7 @@ class RosbagReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`."""
-        found = rows_of(self._path, self._rows(group.name), group, self._leaves[group.name], columns)
+        found = rows_of(self._path, self._what, self._rows(group.name), group, self._leaves[group.name], columns)
         while True:
             with parsing(self._path, self._what):
                 block = next(found, None)

@@ -59,9 +59,7 @@ class CsvReader:
         self._delimiter = options.delimiter or _delimiter(path, options)
         self.library = library("pyarrow")
         self.refused: dict[str, str] = {}
-        with parsing(path, "CSV file"), self._stream() as stream:
-            batch = next(iter(stream), None)
-            schema = stream.schema
+        batch, schema = self._first()
         if len(set(schema.names)) < len(schema.names):
             twice = next(name for name in schema.names if schema.names.count(name) > 1)
             raise LogFormatError(path, "is the name of two columns; names must differ.", column=twice)
@@ -70,6 +68,18 @@ class CsvReader:
         self._types = {f.name: _type(f, batch) for f in schema}
         columns = tuple(Column(name=n, type=t, unit=header_unit(n)) for n, t in self._types.items())
         self.groups = (Group(name="", rows=None, columns=columns),)
+
+    def _first(self) -> tuple[Any, Any]:
+        """The first batch, None if there is none, and the schema that its cells suggest."""
+        import pyarrow as pa
+
+        try:
+            with parsing(self._path, "CSV file"), self._stream() as stream:
+                return next(iter(stream), None), stream.schema
+        except LogFormatError as error:
+            if isinstance(error.__cause__, pa.ArrowException):
+                raise find_fault(self._path, self._options, self._delimiter, (), error.__cause__) from error
+            raise
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`."""

@@ -14,6 +14,7 @@ from crossbody.hw.formats._messages import Leaf, rows_of, topic_group
 
 SUFFIXES = (".mcap",)
 MAGIC = b"\x89MCAP0\r\n"
+WHAT = "MCAP file"
 CLOCKS = ("log_time", "publish_time")
 
 
@@ -93,9 +94,9 @@ class McapReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`."""
-        found = rows_of(self._path, self._rows(group.name), group, self._leaves[group.name], columns)
+        found = rows_of(self._path, WHAT, self._rows(group.name), group, self._leaves[group.name], columns)
         while True:
-            with parsing(self._path, "MCAP file"):
+            with parsing(self._path, WHAT):
                 block = next(found, None)
             if block is None:
                 return

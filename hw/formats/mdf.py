@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from traceback import walk_tb
 from typing import Any
 
 import msgspec
@@ -42,19 +43,17 @@ class MdfReader:
     """Numeric channels, in blocks of rows."""
 
     def __init__(self, path: Path) -> None:
-        from asammdf import MDF
-
         self._path = path
         self.library = library("asammdf")
         self.refused: dict[str, str] = {}
         self._place: dict[str, tuple[int, int]] = {}
-        with parsing(path, WHAT):
-            self._file = MDF(path, raise_on_multiple_occurrences=False)
+        self._raw = path.open("rb")  # a file of our own is closed whatever happens in there
         try:
             with parsing(path, WHAT):
+                self._file = _opened(self._raw)
                 self.groups = tuple(g for i in range(len(self._file.groups)) if (g := self._group(i)).columns)
         except BaseException:
-            self.close()
+            self._raw.close()
             raise
 
     def _group(self, index: int) -> Group:
@@ -114,3 +113,18 @@ class MdfReader:
     def close(self) -> None:
         """See `Reader`."""
         self._file.close()
+        self._raw.close()
+
+
+def _opened(raw: Any) -> Any:
+    from asammdf import MDF
+
+    try:
+        return MDF(raw, raise_on_multiple_occurrences=False)
+    except Exception as error:
+        for frame, _ in walk_tb(error.__traceback__):
+            half: Any = frame.f_locals.get("self")
+            if hasattr(half, "_closed") and hasattr(half, "_tempfile"):  # its finaliser would complain on stderr
+                half._closed = True
+                half._tempfile.close()
+        raise

@@ -42,15 +42,15 @@ class TdmsReader:
         self.library = library("npTDMS")
         self.refused: dict[str, str] = {}
         self._channels: dict[str, Any] = {}
-        with parsing(path, WHAT):
-            self._file = TdmsFile.open(path)
+        self._raw = path.open("rb")  # a file of our own is closed whatever happens in there
         try:
             with parsing(path, WHAT):
+                self._file = TdmsFile.open(self._raw)
                 if self._file.file_status.incomplete_final_segment:
                     raise LogFormatError(path, "was cut off: its last segment is incomplete.")
                 self.groups = tuple(self._groups())
         except BaseException:
-            self.close()
+            self._raw.close()
             raise
 
     def _groups(self) -> Iterator[Group]:
@@ -92,3 +92,4 @@ class TdmsReader:
     def close(self) -> None:
         """See `Reader`."""
         self._file.close()
+        self._raw.close()

@@ -82,13 +82,15 @@ def _dense(blocks: Array) -> Array:
     M = np.zeros((count, k, count, k), blocks.dtype)
     each = np.arange(count)
     M[each, :, each, :] = blocks
-    return M.reshape(count * k, count * k)
+    dense: Array = M.reshape(count * k, count * k)
+    return dense
 
 
 def _law(at: Point, H: Array, v: Array, h: Array, drift: Array) -> Array:
     """H' v + a1 h' + a0 h + a2 h^3 of the active rows."""
     a0, a1, a2 = at.system.alpha[at.active].T
-    return drift + a1 * (H @ v) + (a0 + a2 * h * h) * h
+    law: Array = drift + a1 * (H @ v) + (a0 + a2 * h * h) * h
+    return law
 
 
 def _residual(at: Point, q: Array, v: Array, u: Array, vd: Floats, lam: Floats) -> Array:
@@ -143,7 +145,7 @@ def derivatives(at: Point) -> Derivatives:
         columns[:, k] = _residual(at, q, v, u, vd, lam).imag / STEP
         if k < 2 * n:
             gaps[:, k] = _gaps(at, q, v).imag / STEP
-    solved = -np.linalg.solve(K, columns)
+    solved = -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
     return Derivatives(
         vd=vd, lam=lam, vd_x=solved[:n, : 2 * n], vd_u=solved[:n, 2 * n :], lam_x=solved[n:, : 2 * n],
         lam_u=solved[n:, 2 * n :], gap_x=gaps[:nc], rate_x=gaps[nc:],

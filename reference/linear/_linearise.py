@@ -30,7 +30,9 @@ def linearise(
 
     Args:
         system: the mechanism with the law of its rows.
-        q: positions (n,). v: velocities (n,), zero if not given. u: inputs (nu,), zero if not given.
+        q: positions (n,).
+        v: velocities (n,), zero if not given.
+        u: inputs (nu,), zero if not given.
         active: rows that are on, all others are free; those that are always on (not unilateral), if not given.
         outputs: which of "q", "v", "gap", "lam" make up y, in this order; gap and lam of every row.
         reduce: hold the active rows at rest (dh = 0, dh' = 0) instead of following their law: a minimal set of states

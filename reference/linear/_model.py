@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crossbody.cases import SceneError, UnknownName
+from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases._arrays import frozen
 from crossbody.reference._kinds import Floats, Index
 
@@ -66,10 +66,21 @@ class LinearModel:
         return found[np.lexsort((-found.imag, -found.real))]
 
     def response(self, omega: ArrayLike) -> Complex:
-        """Frequency response C (i w - A)^-1 B + D (m, ny, nu) at angular frequencies omega (m,), rad/s."""
-        w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+        """Frequency response C (i w - A)^-1 B + D (m, ny, nu) at angular frequencies omega (m,), rad/s.
+
+        Raises:
+            InvalidValue: if a frequency is not finite, or is itself a pole.
+        """
+        w: Floats = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+        if not np.all(np.isfinite(w)):
+            raise InvalidValue(f"LinearModel.response: omega is {w.tolist()}; every frequency must be finite.")
         resolvent = 1j * w[:, None, None] * np.eye(len(self.states)) - self.A
-        found: Complex = self.C @ np.linalg.solve(resolvent, np.broadcast_to(self.B, (len(w), *self.B.shape))) + self.D
+        driven = np.broadcast_to(self.B.astype(np.complex128), (len(w), *self.B.shape))
+        try:
+            solved = np.linalg.solve(resolvent, driven)
+        except np.linalg.LinAlgError:
+            raise InvalidValue("LinearModel.response: a frequency is a pole, where there is no response.") from None
+        found: Complex = (self.C @ solved + self.D).astype(np.complex128)
         return found
 
     def pick(self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None) -> LinearModel:

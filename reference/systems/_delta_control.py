@@ -50,7 +50,7 @@ def _row(rows: Any, w: Any) -> Any:
 
 
 @kernels.helper
-def _reflected(p: Floats, T: Any, X: Any, i: int, a: Any, rate: Any, exact: bool, friction: bool) -> Any:
+def reflected(p: Floats, T: Any, X: Any, i: int, a: Any, rate: Any, exact: bool, friction: bool) -> Any:
     """Part of arm i in S^T (M S a + D S rate), D the viscous friction; its own row alone if not exact."""
     A, B, C = inertia(p)
     c1, s1, c2, s2, c3, s3 = T[i]
@@ -140,7 +140,7 @@ def command(
     b = dot(D[0], a) / (l1 * along[0]), dot(D[1], a) / (l1 * along[1]), dot(D[2], a) / (l1 * along[2])
     tau[0], tau[1], tau[2] = holding(p, T, X)
     for i in range(3):
-        m = _reflected(p, T, X, i, b, w, exact, friction)
+        m = reflected(p, T, X, i, b, w, exact, friction)
         tau[0], tau[1], tau[2] = tau[0] + m[0], tau[1] + m[1], tau[2] + m[2]
     return 0
 

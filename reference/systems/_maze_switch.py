@@ -3,6 +3,9 @@
 A ball that rolls over the edge of a gap keeps its contact: the row of the face hands its mode to the row of the tip
 there, and back. In a gap the ball's centre passes the circle of the tips' centres: the ring below becomes the ring
 above, and the tips keep their modes in the other slots.
+
+The maze may turn by many gaps within one step. The distance to a sector's edges is therefore counted from where the
+ball entered the sector, without wrapping the maze's angle: once passed, an edge stays passed.
 """
 
 from __future__ import annotations
@@ -13,15 +16,18 @@ import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Bytes, Floats
-from crossbody.reference.kernels import CHANGED, LOST, START, UNCHANGED
+from crossbody.reference.kernels import CHANGED, LOST, START, TOUCHED, UNCHANGED
 from crossbody.reference.systems._maze_layout import (
     ABOVE,
+    ANGLE,
     BALANCE,
     BELOW,
     CENTRE,
     CHANNEL,
     FACE_ABOVE,
     FACE_BELOW,
+    FROM_ABOVE,
+    FROM_BELOW,
     GAPS,
     INNER,
     KIND,
@@ -49,6 +55,8 @@ INWARD, OUTWARD, EDGE_BELOW, EDGE_ABOVE, STRAYED = range(5)
 GUARDS = 5
 BAND = 1e-12
 """Dead band: metres on a radius of a tenth, radians."""
+JUMPED = 1e-6
+"""Angle from an edge at which the ball did not come there by moving, rad."""
 STRAY = 0.5
 """Cosine of the angle from the top beyond which the balance has no way back: 60 degrees."""
 FREE, CONTACT = 0, 1
@@ -85,12 +93,41 @@ def _sector(q: Any, p: Any, line: int) -> int:
 
 
 @kernels.helper
-def _edge(q: Any, p: Any, line: int, sector: int) -> float:
-    """Angle to the edge at which the sector changes."""
+def _half(p: Any, line: int, sector: int) -> float:
+    """Half the angle of a gap, or of the solid wall between two."""
+    return float(np.pi / p[line + GAPS] - p[line + REACH] if sector == SOLID else p[line + REACH])
+
+
+@kernels.helper
+def _turned(q: Any, p: Any) -> float:
+    """Angle by which the ball went round since it was latched, within half a turn."""
+    a = np.arctan2(q[2], q[1]) - p[ANGLE]
+    return float(a - 2.0 * np.pi * np.rint(a / (2.0 * np.pi)))
+
+
+@kernels.helper
+def _edge(q: Any, p: Any, line: int, sector: int, origin: int) -> float:
+    """Angle to the nearer edge of the sector that the ball is in."""
     if p[line + GAPS] == 0.0:
         return 1.0
-    outside = abs(_offset(q, p, line)) - p[line + REACH]
-    return float((outside if sector == SOLID else -outside) + BAND)
+    return float(_half(p, line, sector) - abs(p[origin] + _turned(q, p) - q[0]) + BAND)
+
+
+@kernels.helper
+def _latch_one(q: Any, p: Any, line: int, sector: int, origin: int) -> None:
+    if p[line + GAPS] > 0.0:
+        a = _offset(q, p, line)
+        middle = np.copysign(np.pi / p[line + GAPS], a) if sector == SOLID else 0.0
+        p[origin] = a - middle + q[0]
+
+
+@kernels.helper
+def _latch(q: Any, p: Any) -> None:
+    """Count the distances to the edges from here."""
+    p[ANGLE] = np.arctan2(q[2], q[1])
+    if number(p[CHANNEL]) > 0:
+        _latch_one(q, p, below(p), number(p[BELOW]), FROM_BELOW)
+    _latch_one(q, p, above(p), number(p[ABOVE]), FROM_ABOVE)
 
 
 @kernels.helper
@@ -107,8 +144,8 @@ def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
     inside = number(p[CHANNEL]) == 0
     g[INWARD] = 1.0 if inside or lower == SOLID else rho - _middle(p, below(p)) + BAND
     g[OUTWARD] = 1.0 if upper == SOLID else _middle(p, above(p)) - rho + BAND
-    g[EDGE_BELOW] = 1.0 if inside else _edge(q, p, below(p), lower)
-    g[EDGE_ABOVE] = _edge(q, p, above(p), upper)
+    g[EDGE_BELOW] = 1.0 if inside else _edge(q, p, below(p), lower, FROM_BELOW)
+    g[EDGE_ABOVE] = _edge(q, p, above(p), upper, FROM_ABOVE)
     g[STRAYED] = 1.0 if inside or p[KIND] == OFF else _cosine(q) - STRAY
 
 
@@ -145,15 +182,23 @@ def _take_charge(q: Any, p: Any) -> None:
 
 
 @kernels.helper
+def _beyond(q: Any, p: Any, line: int, sector: int) -> int:
+    """The sector that follows: across the edge, or where the ball is if its angle jumped, as it does at the axis."""
+    if abs(abs(_offset(q, p, line)) - p[line + REACH]) > JUMPED:
+        return _sector(q, p, line)
+    return _nearest(q, p, line) if sector == SOLID else SOLID
+
+
+@kernels.helper
 def _cross_edge(q: Any, p: Any, mode: Any, line: int, variable: int, face: int, tips: int) -> None:
     """Hand a contact from the face to the tip at this edge, or back."""
     tip = tips if _offset(q, p, line) < 0.0 else tips + 1
-    if number(p[variable]) == SOLID:
-        p[variable] = _nearest(q, p, line)
+    before, after = number(p[variable]), _beyond(q, p, line, number(p[variable]))
+    p[variable] = after
+    if before == SOLID and after != SOLID:
         mode[tip] = mode[face]
         mode[face] = FREE
-    else:
-        p[variable] = SOLID
+    elif before != SOLID and after == SOLID:
         mode[face] = mode[tip]
         mode[tips], mode[tips + 1] = FREE, FREE
 
@@ -189,7 +234,7 @@ def _landed(p: Any, mode: Any) -> None:
 @kernels.switch
 def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> int:
     """Apply what fired; a ball that strays outside ring 0 is lost."""
-    target, touching, state = p[TARGET], p[TOUCHING], (p[CHANNEL], p[BELOW], p[ABOVE], p[MODE])
+    before = p[TOUCHING], p[MODE]
     if fired == START:
         _locate(q, p)
         _take_charge(q, p)
@@ -201,10 +246,11 @@ def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -
         _cross_edge(q, p, mode, above(p), ABOVE, FACE_ABOVE, TIPS_ABOVE)
     elif fired in (INWARD, OUTWARD):
         _cross_ring(q, p, mode, fired == INWARD)
+    if fired != TOUCHED:
+        _latch(q, p)
     if p[KIND] != OFF and number(p[CHANNEL]) > 0 and (fired == STRAYED or _cosine(q) <= STRAY):
         return int(LOST)
     _landed(p, mode)
     p[TOUCHING] = 1.0 if mode[FACE_BELOW] == CONTACT or mode[FACE_ABOVE] == CONTACT else 0.0
-    same = target == p[TARGET] and touching == p[TOUCHING]
-    same = same and state == (p[CHANNEL], p[BELOW], p[ABOVE], p[MODE])
+    same = fired == TOUCHED and before == (p[TOUCHING], p[MODE])
     return int(UNCHANGED) if same else int(CHANGED)

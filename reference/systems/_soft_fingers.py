@@ -1,12 +1,11 @@
-"""Two fingers with soft pads around a block, their sensors and the tactile loop (spec 2.6; Bortoff, Modeling Contact
-and Collisions for Robotic Assembly Control, American Modelica Conference 2020).
+"""Two fingers with soft pads around a block, their sensors and the tactile loop (spec 2.6).
 
-Each pad is a small mass before a spring and a damper on its finger; the faces of the pads and the block are what
-touches. With w(t) the offset of the jaw, z a common shift of both fingers, x the flange:
+Bortoff, Modeling Contact and Collisions for Robotic Assembly Control, American Modelica Conference 2020. Each pad is a
+small mass before a spring and a damper on its finger; the faces of the pads and the block are what touches.
+With w(t) the offset of the jaw, z a common shift of both fingers and x the flange:
 
-    fL = kp (x + z - w - l/2 - pL) + cp (x' + z' - w' - pL')      fR = kp (x + z + w + l/2 - pR) + cp (x' + z' + w' - pR')
-    mp pL'' = fL - lam_L         mp pR'' = fR + lam_R
-    hL = b - l/2 - pL            hR = pR - b - l/2
+    fL = kp (x + z - w - l/2 - pL) + cp (x' + z' - w' - pL')      mp pL'' = fL - lam_L      hL = b - l/2 - pL
+    fR = kp (x + z + w + l/2 - pR) + cp (x' + z' + w' - pR')      mp pR'' = fR + lam_R      hR = pR - b - l/2
 
 A sensor reads y' = ks (lam - y). No force may depend on lam, so the state carried is s_L = y_L + ks mp pL' and
 s_R = y_R - ks mp pR', for which the pads' equations of motion give, exactly and in every mode,
@@ -18,6 +17,7 @@ The numbers stand in the parameters p from a place o on, in the order of `NAMES`
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from crossbody.reference import kernels
@@ -82,3 +82,9 @@ def pid(p: Array, o: int, integral: Any, error: Any, rate: Any) -> Any:
 def half_width(p: Array, o: int) -> Any:
     """Half the width of the block, m."""
     return 0.5 * p[o + _WIDTH]
+
+
+def values(parameters: Mapping[str, Any], names: Sequence[str]) -> list[float]:
+    """Numbers of a case in the order of `names`; k, (m/s)/N, from kstar, cm/(s N)."""
+    given = {"k": 0.01 * float(parameters["kstar"]), **parameters}
+    return [float(given[name]) for name in names]

@@ -119,7 +119,6 @@ def _faces(q: Any, v: Any, p: Any, i: int, h: Any, hd: Any) -> None:
     hd[i] = -s * (q[1] * v[1] + q[2] * v[2]) / rho
     if len(h) > NORMAL:
         j = SLIP_BELOW if i == FACE_BELOW else SLIP_ABOVE
-        h[j] = 0.0
         hd[j] = (q[1] * v[2] - q[2] * v[1]) / rho + s * p[RADIUS] * v[3] - R * v[0]
 
 
@@ -136,7 +135,7 @@ def _pair(q: Any, v: Any, p: Any, i: int, h: Any, hd: Any) -> None:
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
     """Of the two rings beside the ball: the face, or the two tips of the gap it is in; the rest is far away."""
     for i in range(len(h)):
-        h[i], hd[i] = far(p), 0.0
+        h[i], hd[i] = far(p) if i < NORMAL else 0.0 * far(p), 0.0
     if number(p[CHANNEL]) > 0:
         if number(p[BELOW]) == SOLID:
             _faces(q, v, p, FACE_BELOW, h, hd)
@@ -154,7 +153,7 @@ def _row(q: Any, v: Any, p: Any, w: Any, i: int) -> Any:
     line, sector, there = _side(p, i)
     zero = 0.0 * q[0]
     if not there:
-        return zero, zero, zero, zero, far(p), zero
+        return zero, zero, zero, zero, far(p) if i < NORMAL else zero, zero
     if sector != SOLID:
         second = i in (TIPS_BELOW + 1, TIPS_ABOVE + 1)
         nx, ny, arm, gap, _, curved = _tip(q, v, p, line, sector, second)

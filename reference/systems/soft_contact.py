@@ -101,11 +101,11 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
     """The mechanism of a case.
 
     Args:
-        parameters: of the case, with the names of `PARAMETERS`.
+        parameters: of the case, with the names of `PARAMETERS`, and kstar for k.
         law: of the two rows.
     """
     return System(
-        n=len(COORDINATES), parameters={name: float(parameters[name]) for name in PARAMETERS},
+        n=len(COORDINATES), parameters=_fingers.values(parameters, PARAMETERS),
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral, mass_block=1, inputs=1, constant_mass=True,
         **KERNELS,
     )  # fmt: skip

@@ -12,6 +12,7 @@ is constant; where G depends on q lam does work besides, O(a0^-1/2) of it: a con
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from itertools import groupby
 from typing import Any
@@ -25,7 +26,7 @@ from crossbody.reports.metrics._contacts import CLOSED
 
 
 def made(run: Trajectory, case: Case) -> float | None:
-    """Sum of the jumps over all instants at which rows are switched, J.
+    """Sum of the jumps over all instants at which rows are switched, J; NaN if the motion is not finite.
 
     None where the law has no such potential (unequal a0, a cubic term), where rows are always on or collide in no
     time, and where the run knows no modes.
@@ -36,6 +37,8 @@ def made(run: Trajectory, case: Case) -> float | None:
         return None
     if (run.mode < 0).any() or case.inputs is not None:
         return None
+    if not np.isfinite(run.q).all():
+        return math.nan
     system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, law)
     total, on = 0.0, np.zeros(len(law.a0), dtype=bool)
     for t, events in groupby(run.events, key=lambda event: event.t):

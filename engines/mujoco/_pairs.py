@@ -1,0 +1,120 @@
+"""Many contacts in MuJoCo, each a pair of geoms: one row a pair, without friction the case's law exactly.
+
+MuJoCo's row is J v' = -a1 h' - a0 (h - margin): the margin is taken out again, and H' v, which it leaves out for
+contacts, is added, in `hook`. A row must outlive its gap by a step, or the stages of the step that leaves it see
+different equations: `reach` is how far above its gap it still exists.
+
+A gap and a multiplier count as zero below `small`: what rounding makes of balls that touch at rest is no event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Law, Mode
+from crossbody.cases._arrays import Floats
+from crossbody.engines._log import Modes
+from crossbody.engines.mujoco._direct import IMPEDANCE, direct_solref
+
+FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
+FAR = 1e10
+"""Margin that no gap falls below: the pair is never a contact, m."""
+
+
+class Pairs:
+    """The rows of a compiled model whose contacts are its pairs, in order; the functions are those of a `Scene`.
+
+    Args:
+        model: MjModel; where it follows the case's law, with one pair a row, in order, as of `add_pairs`.
+        data: MjData.
+        geoms: of every row, two names.
+        law: constants of every row, linear.
+        small: gap, m, and multiplier, N, that count as zero.
+        gaps: -> gap of every row (nc,), m, at the present state.
+        drift: -> H' v of every row (nc,), m/s^2, at the present state; None where it is 0.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        data: Any,
+        geoms: Sequence[tuple[str, str]],
+        law: Law,
+        small: tuple[float, float],
+        gaps: Callable[[], Floats],
+        drift: Callable[[], Floats] | None = None,
+    ) -> None:
+        self.model, self.data, self.small, self.gaps, self.drift = model, data, small, gaps, drift
+        self.nc, self.a0 = len(geoms), np.array(law.a0)
+        self.margin: Floats = model.pair_margin
+        # The compiler sorts pairs by the bodies that they join.
+        self.order = np.array([model.pair(f"pair {i}").id for i in range(model.npair)])
+        ids = [[model.geom(name).id for name in pair] for pair in geoms]
+        self._row = {(a, b): i for i, pair in enumerate(ids) for a, b in (pair, pair[::-1])}
+
+    def _there(self) -> tuple[list[int], list[int]]:
+        """Rows that have a contact now, and where they stand among the constraints."""
+        contacts, rows, at = self.data.contact, [], []
+        for geoms, address in zip(contacts.geom.tolist(), contacts.efc_address.tolist(), strict=True):
+            row = self._row.get((geoms[0], geoms[1]))
+            if row is not None and address >= 0:
+                rows.append(row)
+                at.append(address)
+        return rows, at
+
+    def lam(self) -> Floats:
+        """Multiplier of every row (nc,), N."""
+        lam = np.zeros(self.nc)
+        if self.data.nefc:
+            rows, at = self._there()
+            lam[rows] = self.data.efc_force[at]
+        return lam
+
+    def modes(self) -> Modes:
+        """Free while the gap is open; closed, in contact while it pushes (MuJoCo keeps no memory)."""
+        lam = self.lam()
+        return tuple(
+            FREE if h > self.small[0] else CONTACT if push > self.small[1] else BALLISTIC
+            for h, push in zip(self.gaps().tolist(), lam.tolist(), strict=True)
+        )
+
+    def arm(self, reach: float) -> Callable[[Modes], None]:
+        """What opens and closes rows to suit their modes; a closed one exists up to a gap of `reach`, m."""
+
+        def arm(modes: Modes) -> None:
+            self.margin[self.order] = [-FAR if mode == FREE else reach for mode in modes]
+
+        return arm
+
+    def margins(self) -> list[tuple[float, float]]:
+        """Gap, m, and multiplier of every row, both less `small`; where it does not push, minus what is in excess."""
+        d = self.data
+        push = np.zeros(self.nc)
+        if d.nefc:
+            rows, at = self._there()
+            lam = d.efc_force[at]
+            excess = d.efc_aref[at] - d.efc_J.reshape(-1, self.model.nv)[at] @ d.qacc
+            push[rows] = np.where(lam > 0.0, lam, np.minimum(excess, 0.0))
+        h, push = self.gaps() - self.small[0], push - self.small[1]
+        return list(zip(h.tolist(), push.tolist(), strict=True))
+
+    def hook(self, _model: Any, d: Any) -> None:
+        """Correct the reference accelerations: positions are counted from the margin, and H' v is missing."""
+        if d.nefc:
+            rows, at = self._there()
+            d.efc_aref[at] -= self.a0[rows] * self.margin[self.order[rows]]
+            if self.drift is not None:
+                d.efc_aref[at] -= self.drift()[rows]
+
+
+def add_pairs(spec: Any, geoms: Sequence[tuple[str, str]], law: Law) -> None:
+    """One frictionless pair a row, with that row's law, for geoms that collide with nothing else."""
+    for i, (left, right) in enumerate(geoms):
+        for name in (left, right):
+            spec.geom(name).contype = spec.geom(name).conaffinity = 0
+        spec.add_pair(
+            name=f"pair {i}", geomname1=left, geomname2=right, condim=1, solref=direct_solref(law, i), solimp=IMPEDANCE
+        )

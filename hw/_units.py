@@ -1,0 +1,103 @@
+"""Units, by pint: needed once, while a log is read; afterwards everything is SI."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import InvalidValue
+from crossbody.hw.formats import unavailable
+
+Floats = NDArray[np.float64]
+
+# Whatever else stands in a file's unit field is not handed to a parser: no numbers but small exponents.
+WRITTEN = re.compile(r"(?:[A-Za-z_µμΩ°%]+|\s|[*/·()]|(?:\*\*|\^)\s*-?\d|[²³]|(?<![\w.])1(?![\w.]))*")
+LONGEST = 40
+PREFERRED = ("N", "N m", "N s", "N/m", "N s/m", "Pa", "W", "V", "ohm", "kg", "A", "m", "s", "K")
+SPELLED = {"°": "degree", "%": "percent", "Nm": "newton * meter", "": "dimensionless", "1": "dimensionless"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conversion:
+    """SI value = factor * value + shift.
+
+    Attributes:
+        si: name of the SI unit; "1" for a pure number.
+        factor: SI units in one unit.
+        shift: SI value of zero (temperatures).
+    """
+
+    si: str
+    factor: float
+    shift: float = 0.0
+
+    def apply(self, values: Floats) -> Floats:
+        """Convert; where the unit is a whole fraction of the SI unit, by a division, which rounds once."""
+        if self.factor != 1.0:
+            inverse = round(1.0 / self.factor) if abs(self.factor) < 1.0 else 0
+            values = values / inverse if inverse and 1.0 / inverse == self.factor else values * self.factor
+        return values + self.shift if self.shift else values
+
+
+def to_si(unit: str) -> Conversion:
+    """The conversion of a unit to SI.
+
+    Args:
+        unit: as people write it: "deg", "rpm", "N m", "m/s^2", "mm", "degC", "1".
+
+    Raises:
+        InvalidValue: if it is no unit.
+        FormatUnavailable: if pint is not installed.
+    """
+    try:
+        return _convert(unit.strip())
+    except ModuleNotFoundError as error:
+        raise unavailable("Reading units", error) from None
+    except Exception as error:  # pint raises its own, tokenizer's and arithmetic errors
+        known = "rad, deg, rpm, m, mm, N, N m, s, ms, V, A, 1 for a pure number"
+        raise InvalidValue(f"{unit!r} is no unit; write for example {known}.") from error
+
+
+def is_time(unit: str) -> bool:
+    """Whether a unit measures time."""
+    return to_si(unit).si == "s"
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+@lru_cache(maxsize=256)
+def _convert(unit: str) -> Conversion:
+    if len(unit) > LONGEST or not WRITTEN.fullmatch(unit):
+        raise ValueError(unit)
+    registry = _registry()
+    text = re.sub(r"(?<=[A-Za-z)])\s+(?=[A-Za-z(])", " * ", SPELLED.get(unit, unit)).replace("·", "*")
+    parsed = registry.Unit(text)
+    zero, one = (registry.Quantity(x, parsed).to_base_units() for x in (0.0, 1.0))
+    if zero.magnitude:
+        return Conversion(si=_name(one.units), factor=one.magnitude - zero.magnitude, shift=zero.magnitude)
+    return Conversion(si=_name(one.units), factor=one.magnitude)
+
+
+@lru_cache(maxsize=256)
+def _name(base: Any) -> str:
+    """The SI name of a product of base units: N m where the parts are kg m2/s2, rad/s as it is."""
+    if base.dimensionless and not base._units:
+        return "1"
+    for name in PREFERRED:
+        if _registry().Unit(name.replace(" ", "*")).is_compatible_with(base) and _angles(base) == 0:
+            return name
+    return f"{base:~C}".replace("**", "^").replace("*", " ")
+
+
+def _angles(base: Any) -> int:
+    return int(base._units.get("radian", 0))

@@ -1,0 +1,22 @@
+"""Largest difference of the contact forces on the two sides of a block."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.reports.metrics._soft import imbalance
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.truth import Truth
+
+UNIT = "N"
+CLAIMED = True
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max |lam_L - lam_R| over samples, N."""
+    difference = imbalance(run, case)
+    return None if difference is None else float(np.max(np.abs(difference)))

@@ -1,0 +1,145 @@
+"""The exact motion of the cradle under the frozen rules, and the answers of the others, against known numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crossbody.cases import Case, load
+from crossbody.cases._cradle_impact import delassus, pushes
+from crossbody.cases._cradle_motion import Motion
+from crossbody.cases._cradle_rules import RULES, answer, block, simultaneous
+from crossbody.cases._cradle_scene import Row
+
+ONE = Row(masses=np.full(5, 0.1), lifted=1, speed=1.0, gap=0.0, a0=1e6, zeta=0.0)
+THREE = replace(ONE, masses=np.ones(3))
+
+
+def heap(n: int, k: int, gap: float = 0.0) -> Motion:
+    motion = load("newtons_cradle", n=n, lifted=k, gap=gap).closed_form
+    assert isinstance(motion, Motion)
+    return motion
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-3])
+@pytest.mark.parametrize("n", range(2, 11))
+def test_as_many_out_as_in(n: int, gap: float) -> None:
+    for k in range(1, n):
+        motion = heap(n, k, gap)
+        out = np.where(np.arange(n) < n - k, 0.0, 1.0)
+        np.testing.assert_allclose(motion.final, out, atol=1e-12)
+        assert len(motion.events) == 2 * k * (n - k)
+
+
+def test_unequal_masses() -> None:
+    motion = load("newtons_cradle", n=3, masses="4,2,1").closed_form
+    assert isinstance(motion, Motion)
+    np.testing.assert_allclose(motion.final, [1 / 3, 4 / 9, 16 / 9], rtol=1e-14)
+
+
+@pytest.mark.parametrize("rule", ["sequential", "simultaneous"])
+@pytest.mark.parametrize("zeta", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(5))
+def test_impacts_keep_momentum_and_their_account(rule: str, zeta: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    row = Row(masses=rng.uniform(0.1, 3.0, 7), lifted=3, speed=1.0, gap=1e-3 * (seed % 2), a0=1e6, zeta=zeta)
+    motion = Motion(row, rule)
+    run = motion(np.linspace(0.0, 2.0 * motion.last + 1.0, 50))
+    np.testing.assert_allclose(run.v @ row.masses, row.masses @ row.v0, rtol=1e-13)
+    assert run.ledger is not None
+    change = run.total_energy - run.total_energy[0]
+    np.testing.assert_allclose(change, run.ledger.contact.sum(axis=1), atol=1e-14)
+    assert (run.gap > -1e-12).all()
+    assert (np.diff(motion.final) > -1e-11).all()
+    assert all(event.impulse > 0.0 for event in run.events[1::2])
+    if rule == "sequential":
+        impulse = np.zeros(8)
+        for event in run.events:
+            impulse[event.contact + 1] += event.impulse
+        np.testing.assert_allclose(row.masses * (motion.final - row.v0), -np.diff(impulse), atol=1e-12)
+
+
+@pytest.mark.parametrize("n", range(2, 11))
+def test_all_at_once_is_two_nths(n: int) -> None:
+    row = replace(ONE, masses=np.ones(n))
+    expected = np.r_[(2 - n) / n, np.full(n - 1, 2 / n)]
+    np.testing.assert_allclose(simultaneous(row), expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("k", range(1, 6))
+@pytest.mark.parametrize("zeta", [0.0, 0.5])
+def test_balls_that_collide_at_once_are_blocks(k: int, zeta: float) -> None:
+    row = Row(masses=np.array([3.0, 1.0, 2.0, 0.5, 4.0, 1.0]), lifted=k, speed=2.0, gap=0.0, a0=1e4, zeta=zeta)
+    np.testing.assert_allclose(simultaneous(row), block(row), atol=1e-13)
+
+
+def test_a_chain_of_three_springs() -> None:
+    found = answer("linear", THREE)
+    assert found is not None
+    np.testing.assert_allclose(found, [-0.1303, 0.1502, 0.9800], atol=5e-5)
+    assert found @ found == pytest.approx(1.0, abs=1e-10)
+    assert found.sum() == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("n", "k"), [(3, 1), (5, 1), (5, 2)])
+@pytest.mark.parametrize("rule", ["linear", "hertz"])
+def test_chains_keep_energy_and_momentum(rule: str, n: int, k: int) -> None:
+    found = answer(rule, replace(ONE, masses=np.ones(n), lifted=k))
+    assert found is not None
+    assert found @ found == pytest.approx(k, abs=1e-9)
+    assert found.sum() == pytest.approx(k, abs=1e-11)
+
+
+def test_stiffness_does_not_matter_to_touching_chains() -> None:
+    for rule in ("linear", "hertz"):
+        soft, stiff = (answer(rule, replace(THREE, a0=a0, speed=v)) for a0, v in ((1e2, 1.0), (1e8, 3.0)))
+        assert soft is not None
+        assert stiff is not None
+        np.testing.assert_allclose(3.0 * soft, stiff, atol=1e-10)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_two_balls_collide_alike_under_every_rule(rule: str) -> None:
+    found = answer(rule, replace(ONE, masses=np.array([2.0, 1.0])))
+    assert found is not None
+    np.testing.assert_allclose(found, [1 / 3, 4 / 3], atol=1e-9)
+
+
+@pytest.mark.parametrize(("n", "s", "gain"), [(3, 0.2, 0.135), (5, 0.1, 0.27), (3, 1.6, 0.0)])
+def test_energy_of_the_memoryless_law(n: int, s: float, gain: float) -> None:
+    row = replace(ONE, masses=np.ones(n), gap=s / 1e3)
+    found = answer("memoryless", row)
+    assert found is not None
+    assert found @ found - 1.0 == pytest.approx(gain, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_pushes_solve_the_complementarity_problem(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    G, b = delassus(rng.uniform(0.1, 5.0, 8)), rng.normal(size=7)
+    x = pushes(G, b)
+    rest = G @ x + b
+    assert x.min() >= 0.0
+    assert rest.min() > -1e-12
+    assert abs(x @ rest) < 1e-12
+
+
+@pytest.mark.parametrize(("n", "k"), [(200, 1), (200, 3), (60, 30)])
+@pytest.mark.parametrize("gap", [0.0, 1e-3])
+def test_long_rows(n: int, k: int, gap: float) -> None:
+    np.testing.assert_allclose(heap(n, k, gap).final, np.where(np.arange(n) < n - k, 0.0, 1.0), atol=1e-11)
+
+
+def test_an_impact_stands_before_and_after_where_it_is_asked_twice() -> None:
+    case: Case = load("newtons_cradle", n=2, gap=0.1)
+    assert case.closed_form is not None
+    run = case.closed_form(np.array([0.1, 0.1]))
+    np.testing.assert_allclose(run.v, [[1.0, 0.0], [0.0, 1.0]], atol=1e-15)
+
+
+def test_collapse_in_no_time_ends() -> None:
+    row = replace(ONE, zeta=3.0)
+    motion = Motion(row, "sequential")
+    np.testing.assert_allclose(motion.final, 0.2, atol=1e-9)

@@ -1,0 +1,153 @@
+"""The machines of the engines on more than one row: two sets of constants, followers, what pulls, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crossbody.cases import Law, Mode, Outcome
+
+pin = pytest.importorskip("pinocchio")
+from crossbody.engines._level_machine import EPS, LevelMachine  # noqa: E402 - they import the engine's package
+from crossbody.engines._log import Log  # noqa: E402
+from crossbody.engines.pinocchio._flow import Flow  # noqa: E402
+from crossbody.engines.pinocchio._impulse import ImpulseMachine, sequential, simultaneous  # noqa: E402
+from crossbody.engines.pinocchio._rows import PinRows  # noqa: E402
+from crossbody.engines.pinocchio._scene import World  # noqa: E402
+
+FREE, CONTACT, COLLISION, SEPARATED = Mode.FREE, Mode.CONTACT, Mode.COLLISION, Mode.COLLISION_SEPARATION
+Array = np.ndarray[Any, Any]
+
+
+def law(a0: Sequence[float], a1: Sequence[float], **fast: Any) -> Law:
+    return Law(
+        a0=np.array(a0), a1=np.array(a1), a2=np.zeros(len(a0)), unilateral=np.ones(len(a0), dtype=bool),
+        **{name: np.array(value) for name, value in fast.items()},
+    )  # fmt: skip
+
+
+def rows(masses: Sequence[float], H: Array, start: Array, its_law: Law, force: Sequence[float], **more: Any) -> PinRows:
+    """Rows h = start + H q on independent masses, q along one axis each, pushed by constant forces."""
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    for i, mass in enumerate(masses):
+        joint = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), f"mass {i}")
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(mass, 0.1), pin.SE3.Identity())
+    found = PinRows(
+        model, jacobian=lambda q: H, heights=lambda q: start + H @ q, drift=lambda q, v: np.zeros(len(H)),
+        law=its_law, **more,
+    )  # fmt: skip
+    found.tau[:] = force
+    return found
+
+
+def flow(machine: Any, q0: Sequence[float], v0: Sequence[float], t_end: float, world: World | None = None) -> Flow:
+    n = len(q0)
+    found = Flow(machine, Log(), 1e-12, np.full(2 * n, 1e-14), "Adams", 100_000, world)
+    found.run(np.array(q0), np.array(v0), t_end)
+    return found
+
+
+def test_a_collision_hands_over_when_its_elastic_part_is_spent() -> None:
+    b0, b1, m, g = 1e4, 300.0, 2.0, 9.81
+    ball = rows([m], np.eye(1), np.zeros(1), law([100.0], [20.0], b0=[b0], b1=[b1]), [-m * g])
+    found = flow(LevelMachine(ball), [0.01], [0.0], 1.0)
+    assert [(e.before, e.after) for e in found.log.events] == [(FREE, COLLISION), (COLLISION, CONTACT)]
+    k = next(i for i, mode in enumerate(found.log.mode) if mode == (CONTACT,))
+    _, q, v = found.log.motion[k - 1]
+    elastic, lam = b1 * abs(v[0]) + b0 * abs(q[0]), found.log.lam[k - 1][0]
+    assert elastic == pytest.approx(EPS * lam / m, rel=1e-6)
+    assert found.log.lam[-1][0] == pytest.approx(m * g, rel=1e-3)
+
+
+def test_a_damped_collision_that_leaves_below_the_surface_is_a_collision_separation() -> None:
+    ball = rows([1.0], np.eye(1), np.zeros(1), law([100.0], [20.0], b0=[1e4], b1=[20.0]), [-9.81])
+    found = flow(LevelMachine(ball), [0.0], [-1.0], 0.1)
+    assert [(e.before, e.after) for e in found.log.events] == [
+        (FREE, COLLISION), (COLLISION, SEPARATED), (SEPARATED, FREE),
+    ]  # fmt: skip
+
+
+def test_a_row_that_follows_another_is_active_with_it() -> None:
+    H = np.array([[0.0, 1.0], [1.0, 0.0]])  # a floor below y, and slip along x
+    its_law = Law(a0=np.array([1e4, 0.0]), a1=np.array([0.0, 50.0]), a2=np.zeros(2), unilateral=np.array([True, True]))
+    found = flow(
+        LevelMachine(rows([1.0, 1.0], H, np.zeros(2), its_law, [0.0, 0.0], follows=(-1, 0))), [0, 0], [1, -1], 0.1
+    )
+    (touch, leave) = (e.t for e in found.log.events)
+    assert {e.contact for e in found.log.events} == {0}
+    assert leave - touch == pytest.approx(np.pi / 100, rel=1e-9)
+    assert found.log.motion[-1][2][0] == pytest.approx(np.exp(-50 * (leave - touch)), rel=1e-9)
+    assert all(mode[0] == mode[1] for mode in found.log.mode)
+
+
+def test_neighbours_that_touch_at_rest_are_free_until_they_are_pressed() -> None:
+    H = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
+    chain = rows([1.0, 1.0, 1.0], H, np.zeros(2), law([1e4, 1e4], [0.0, 0.0]), [0.0] * 3)
+    settled = LevelMachine(chain).settle(np.zeros(3), np.array([1.0, 0.0, 0.0]), (FREE, FREE))
+    assert settled.modes == (CONTACT, FREE)
+    assert LevelMachine(chain).settle(np.zeros(3), np.zeros(3), (FREE, FREE)).modes == (FREE, FREE)
+
+
+# A bar on supports at -1 and 1 (height y, tilt of inertia J), struck from above at b by a third mass: rows y -+ tilt
+# and z - y - b tilt. Beyond a support the bar tilts over it and leaves the other.
+BAR = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]])
+
+
+def bar(b: float) -> PinRows:
+    H = np.vstack((BAR, [-1.0, -b, 1.0]))
+    slow = law([100.0] * 3, [20.0] * 3)
+    return rows([2.0, 0.5, 1.0], H, np.zeros(3), slow, [-20.0, 0.0, 0.0]).rigid()
+
+
+def exact_strike(b: float, held: Sequence[int]) -> Array:
+    """V+ = v - 2 h_n' M^-1 Ha^T (Ha M^-1 Ha^T)^-1 e_n of an elastic strike at -1 m/s."""
+    H, inverse = np.vstack((BAR[list(held)], [-1.0, -b, 1.0])), np.diag([0.5, 2.0, 1.0])
+    G, end = H @ inverse @ H.T, np.eye(len(held) + 1)[-1]
+    v: Array = np.array([0.0, 0.0, -1.0]) + 2.0 * inverse @ H.T @ np.linalg.solve(G, end)
+    return v
+
+
+@pytest.mark.parametrize(("b", "held"), [(0.5, (0, 1)), (1.5, (1,)), (-1.5, (0,))])
+def test_a_held_row_that_would_pull_is_let_go_by_a_strike(b: float, held: tuple[int, ...]) -> None:
+    machine = ImpulseMachine(bar(b), [1e4] * 3, [1.0] * 3)
+    settled = machine.settle(np.zeros(3), np.array([0.0, 0.0, -1.0]), (CONTACT, CONTACT, FREE))
+    np.testing.assert_allclose(settled.v, exact_strike(b, held), atol=1e-12)
+    assert [i for i, mode in enumerate(settled.modes) if mode == CONTACT] == list(held)
+    let_go = {i for i, before, after, _ in settled.passed if (before, after) == (CONTACT, FREE)}
+    assert let_go == {0, 1} - set(held)
+    bounced = [p for i, before, _, p in settled.passed if i == 2 and before == COLLISION]
+    assert bounced == [pytest.approx(1.0 * (settled.v[2] + 1.0))]
+
+
+@pytest.mark.parametrize("rule", [sequential, simultaneous])
+def test_a_slow_strike_is_captured_and_a_pressed_row_is_held(rule: Any) -> None:
+    H, m, g = np.array([[1.0, 0.0], [-1.0, 1.0]]), 1.0, 9.81
+    stack = rows([m, m], H, np.zeros(2), law([1e4] * 2, [0.0] * 2), [-m * g, -m * g]).rigid()
+    machine = ImpulseMachine(stack, [1e4] * 2, [1.0] * 2, rule)
+    settled = machine.settle(np.zeros(2), np.array([0.0, -0.01]), (FREE, FREE))
+    assert settled.modes == (CONTACT, CONTACT)
+    np.testing.assert_allclose(settled.v, 0.0, atol=1e-12)
+
+
+def test_inputs_change_where_they_are_told_to() -> None:
+    mass = rows([2.0], np.eye(1), np.array([10.0]), law([1e4], [0.0]), [0.0])
+
+    def change(t: float, _q: Array, _v: Array) -> None:
+        mass.tau[:] = {0.0: 2.0, 0.5: -4.0}[t]
+
+    found = flow(LevelMachine(mass), [0.0], [0.0], 1.0, World(instants=(0.0, 0.5), change=change))
+    t, _, v = found.log.motion[-1]
+    assert (t, v[0]) == (1.0, pytest.approx(0.5 * 1.0 - 0.5 * 2.0, abs=1e-10))
+    assert sum(t == 0.5 for t, _, _ in found.log.motion) == 2
+
+
+def test_a_state_that_the_scene_cannot_reach_is_an_outcome() -> None:
+    mass = rows([1.0], np.eye(1), np.array([10.0]), law([1e4], [0.0]), [1.0])
+    world = World(safe=lambda q, _v: bool(q[0] < 0.1))
+    found = flow(LevelMachine(mass), [0.0], [0.0], 10.0, world)
+    assert found.outcome is Outcome.DIVERGED
+    assert "t = " in found.message
