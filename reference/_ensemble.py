@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from queue import SimpleQueue
 from typing import Any
 
@@ -21,7 +22,7 @@ from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import Options
 from crossbody.reference._program import program
 from crossbody.reference._run import OUTCOMES, CompiledRun
-from crossbody.reference._system import System
+from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core.layout import MORE, open_buffers, open_model, open_work
 
 CONSTANTS = ("a0", "a1", "a2", "b0", "b1", "b2")
@@ -65,7 +66,8 @@ def ensemble(
 
     Args:
         system: the mechanism; what is not given below is its own.
-        q0, v0 (N, n): starts; N is the number of runs.
+        q0: positions at the start (N, n); N is the number of runs.
+        v0: velocities at the start (N, n).
         t_end: horizon, s.
         parameters: name -> (N,) values of the system's named parameters.
         law: a0, a1, a2, b0, b1, b2 -> (N,) or (N, nc).
@@ -90,7 +92,7 @@ def ensemble(
     edges = np.unique(np.linspace(0, job.size, count * CHUNKS + 1).astype(int))
     began = time.perf_counter()
     with ThreadPoolExecutor(count) as pool:
-        list(pool.map(lambda ends: job.call(loop, spaces, *ends), zip(edges[:-1], edges[1:], strict=True)))
+        list(pool.map(lambda ends: job.call(loop, spaces, *ends), pairwise(edges)))
     return job.result(time.perf_counter() - began)
 
 
@@ -149,7 +151,7 @@ class _Job:
         try:
             loop(
                 first, last, run.template, run.state, *run.tables, self.p, self.laws, self.starts,
-                run.buffers["mode"].copy(), self.out, self.counts, min(run.options.max_steps, 2**62),
+                initial_modes(self.system), self.out, self.counts, min(run.options.max_steps, 2**62),
             )  # fmt: skip
         finally:
             spaces.put(run)

@@ -93,8 +93,9 @@ class CompiledRun:
             "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
-            "ledger": options.ledger, "keep_events": options.events, "has_control": system.control is not None, "rtol": options.rtol,
-            "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step, "tick": system.tick,
+            "ledger": options.ledger, "keep_events": options.events, "has_control": system.control is not None,
+            "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
+            "tick": system.tick,
         }  # fmt: skip
         for name, value in values.items():
             state[name] = value

@@ -28,7 +28,9 @@ from crossbody.reference.core.guards import (
     SWITCH,
     TOUCH,
     TOUCH_INSIDE,
+    dead_band,
     guard,
+    rise,
     root,
 )
 from crossbody.reference.core.layout import (
@@ -98,7 +100,7 @@ def _leave(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """First rise above the surface."""
     for node in range(NODES - 1):
         a, b = _place(node), _place(node + 1)
-        ha, hb = w.gaps[node, i], w.gaps[node + 1, i]
+        ha, hb = w.gaps[node, i] - rise(s), w.gaps[node + 1, i] - rise(s)
         start = max(-ha, 1e-300)
         if hb > 0.0:
             return root(K, s, m, w, mode, LEAVE, i, a, start, b, -hb)
@@ -128,13 +130,14 @@ def _by_nodes(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int)
 @inlined
 def _release(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """First loss of pressure of an active row; a dip between nodes is looked for at its parabola's vertex."""
+    dead = dead_band(s, w, i)
     for node in range(NODES - 1):
         a, b = _place(node), _place(node + 1)
-        la, lb = max(w.lams[node, i], 1e-300), w.lams[node + 1, i]
+        la, lb = max(w.lams[node, i] + dead, 1e-300), w.lams[node + 1, i] + dead
         if not lb >= 0.0:
             return root(K, s, m, w, mode, RELEASE, i, a, la, b, lb)
-        if node + 2 < NODES and lb < la and lb < w.lams[node + 2, i]:
-            dip = _vertex(b, b - a, la, lb, w.lams[node + 2, i])
+        if node + 2 < NODES and lb < la and lb < w.lams[node + 2, i] + dead:
+            dip = _vertex(b, b - a, la, lb, w.lams[node + 2, i] + dead)
             value = guard(K, s, m, w, mode, RELEASE, i, dip)
             if value < 0.0:
                 left, g_left = (a, la) if dip <= b else (b, max(lb, 1e-300))
@@ -295,10 +298,10 @@ def _all_free(s: Any, m: Model, mode: Bytes) -> bool:
     """Whether nothing but free flight in closed form is under way."""
     if s.method != EXACT or s.na > 0 or s.fsm == EDGE:
         return False
+    others = 0
     for i in range(s.nc):
-        if m.unilateral[i] and m.follows[i] < 0 and mode[i] != FREE:
-            return False
-    return True
+        others += m.unilateral[i] and m.follows[i] < 0 and mode[i] != FREE
+    return others == 0
 
 
 @inlined

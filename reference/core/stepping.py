@@ -79,6 +79,8 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
 def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Take one step of the present method within the tolerance; y1 and the end's derivative are there afterwards."""
     s.have_dense = 0
+    if s.h == 0.0:
+        s.h = choice.first_step(K, s, m, w)
     if s.has_control and s.method == EXPLICIT and _short_step(K, s, m, w):
         return _finish(K, s, m, w)
     s.end = esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES
