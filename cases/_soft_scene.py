@@ -34,6 +34,9 @@ FINGERS = {
 }
 AXIS = {
     "flange_mass": Parameter(default=0.7, unit="kg", doc="mass of the flange", low=0.0, open_low=True),
+    "rate_share": Parameter(
+        default=1.0, doc="share of x_ref' in the derivative term; 0 for the measured velocity alone", low=0.0, high=1.0
+    ),
     "probe": Parameter(default=0.0, unit="m/s", doc="amplitude of a sinusoidal velocity of both fingers"),
     "probe_rate": Parameter(default=0.0, unit="rad/s", doc="its angular frequency", low=0.0),
 }

@@ -72,7 +72,7 @@ def _start(variant: str, balls: Row, parameters: Mapping[str, Value]) -> tuple[F
     return np.where(np.arange(balls.n) < balls.lifted, float(parameters["angle"]), 0.0), np.zeros(balls.n)
 
 
-def _claims(variant: str, balls: Row, rule: str) -> tuple[Claim, ...]:
+def _claims(balls: Row, rule: str) -> tuple[Claim, ...]:
     """What the presentation of the law says of the cradle: as many out as in."""
     if rule != "sequential" or balls.e != 1.0 or np.ptp(balls.masses) > 0.0:
         return ()
@@ -90,6 +90,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     if t_end == AUTO:
         t_end = horizon(balls, motion) if sliders else PENDULUMS_S
     q0, v0 = _start(variant, balls, parameters)
+    claims = _claims(balls, rule)
     return Case(
         name="newtons_cradle",
         variant=variant,
@@ -104,7 +105,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         law=law(balls, rule),
         collisions=rule,
         closed_form=motion if sliders and rule in FROZEN else None,
-        claims=_claims(variant, balls, rule),
-        limits=limits(variant, rule, balls.gap),
+        claims=claims,
+        limits=limits(variant, rule, balls.gap, claims),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

@@ -170,6 +170,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         law=law(p),
         collisions=_RULES[variant],
         claims=claims,
-        limits=limits(variant),
+        limits=limits(variant, claims),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

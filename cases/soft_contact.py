@@ -58,7 +58,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         collisions="resolved",
         tight=1e-11 if whole else 1e-12,
         claims=claims(variant, parameters, PARAMETERS, VARIANTS[variant]),
-        limits=limits(variant),
+        limits=limits(p["kstar"]),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )
 

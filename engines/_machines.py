@@ -85,7 +85,10 @@ class Settled:
 class Machine(Protocol):
     """Switches the rows of a mechanism."""
 
-    rows: Rows
+    @property
+    def rows(self) -> Rows:
+        """The mechanism, row by row."""
+        ...
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
         """Fill out (nc * WATCHED,) with functions that are positive until the machine must look."""

@@ -212,9 +212,9 @@ class MazeMachine:
             if i not in NORMALS:
                 continue
             h, H, Hdv = formula(q, v)
-            h = 0.0 if 2 * i in fired or abs(h) < ROUNDING else h
+            near = 0.0 if 2 * i in fired or abs(h) < ROUNDING else h
             hd, mode = _dot(H, v), modes[i]
-            if mode == FREE and _touches(h, hd, lambda H=H, Hdv=Hdv: _dot(H, vd) + Hdv):  # type: ignore[misc]
+            if mode == FREE and _touches(near, hd, lambda H=H, Hdv=Hdv: _dot(H, vd) + Hdv):  # type: ignore[misc]
                 modes[i] = CONTACT
             elif mode == CONTACT and _released(float(lam[i]), hd, i in switched, 2 * i + 1 in fired):
                 modes[i] = FREE if h > 0.0 else BALLISTIC

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from crossbody.hw._rows import Rows
     from crossbody.hw._store import store
     from crossbody.hw._survey import GroupSurvey, Survey, survey
+    from crossbody.hw._synthetic_log import Sensors, delta_log
+    from crossbody.hw._synthetic_plant import Plant, Push, delta_plant
 
 _HOMES = {
     "_columns": ("Columns", "Role", "Signal", "Time", "dump_columns", "load_columns", "maps", "parse_columns"),
@@ -30,6 +32,8 @@ _HOMES = {
     "_read": ("Scan", "check", "parts", "read", "scan"),
     "_rows": ("Rows",),
     "_store": ("store",),
+    "_synthetic_log": ("Sensors", "delta_log"),
+    "_synthetic_plant": ("Plant", "Push", "delta_plant"),
     "_survey": ("GroupSurvey", "Survey", "survey"),
 }
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}
@@ -40,15 +44,20 @@ __all__ = [
     "Finding",
     "GroupSurvey",
     "Log",
+    "Plant",
     "Provenance",
+    "Push",
     "Repair",
     "Role",
     "Rows",
     "Scan",
+    "Sensors",
     "Signal",
     "Survey",
     "Time",
     "check",
+    "delta_log",
+    "delta_plant",
     "draft_text",
     "dump_columns",
     "load_columns",

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from crossbody.hw._check_clock import ClockCheck
 from crossbody.hw._check_rates import RateCheck
 from crossbody.hw._check_values import ValueCheck
@@ -33,11 +35,12 @@ class Checks:
 
     def see(self, block: Rows) -> None:
         """Take in the next block of the log."""
-        self.clock.see(block.rows, block.time)
-        for check, values in zip(self._values, block.values, strict=True):
-            check.see(block.rows, block.time, values)
-        for rate, q, v in self._rates:
-            rate.see(block.rows, block.time, block.values[q], block.values[v])
+        with np.errstate(over="ignore", invalid="ignore"):  # what is that large has a check that tells it
+            self.clock.see(block.rows, block.time)
+            for check, values in zip(self._values, block.values, strict=True):
+                check.see(block.rows, block.time, values)
+            for rate, q, v in self._rates:
+                rate.see(block.rows, block.time, block.values[q], block.values[v])
 
     def refuse(self, path: Path) -> None:
         """Raise the first fault that was found, if there is one.

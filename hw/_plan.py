@@ -52,9 +52,10 @@ class Source:
     def to_si(self, raw: Floats) -> Floats:
         """Stored numbers to SI; a step that changes nothing is left out, so that bits stay as they are."""
         values = raw.astype(np.float64, copy=False)
-        values = values * self.signal.scale if self.signal.scale != 1.0 else values
-        values = values + self.signal.offset if self.signal.offset else values
-        return self.conversion.apply(-values if self.signal.sign < 0 else values)
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not finite, which a check tells
+            values = values * self.signal.scale if self.signal.scale != 1.0 else values
+            values = values + self.signal.offset if self.signal.offset else values
+            return self.conversion.apply(-values if self.signal.sign < 0 else values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -110,10 +110,12 @@ def read(
         LogFormatError: for a log that cannot be read or trusted, with row and column of the first offence.
         FormatUnavailable: if the format's package is not installed; the message names the extra.
         UnknownName: for a repair that does not exist.
-        InvalidValue: if the map tells runs apart and none was named, or the reverse.
+        InvalidValue: if the map tells runs apart and none was named, or the reverse; for repairs of a stored log.
     """
     _repair.check_names(repair)
     stored = _store.about(Path(path)) if columns is None else None
+    if stored is not None and repair:
+        raise InvalidValue(f"{path} is a stored log, which is never repaired; repair {stored.provenance.file} instead.")
     with _opened(Path(path), columns, part) as found:
         plan = found.plan
         block, repairs, checks = _gather(found, repair, limit)

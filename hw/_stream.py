@@ -62,8 +62,9 @@ class Stream:
             raise LogFormatError(self.plan.path, f"holds {raw.dtype}, not times.", column=column)
         times: Floats = raw.astype(np.float64, copy=False)
         scale = self.plan.columns.time.scale
-        times = times * scale if scale != 1.0 else times
-        return times * self.plan.step if self.plan.step else self.plan.ticks.apply(times)
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not finite, which a check tells
+            times = times * scale if scale != 1.0 else times
+            return times * self.plan.step if self.plan.step else self.plan.ticks.apply(times)
 
     def joined(self, sources: Sequence[Source]) -> Iterator[Rows]:
         """Rows of signals with times of their own, all of one group and clock; after `rows` has begun."""

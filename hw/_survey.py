@@ -132,11 +132,12 @@ def _group(reader: Reader, group: Group, refused: dict[str, str], findings: list
         size = len(next(iter(block.values())))
         at = np.arange(rows, rows + size, dtype=np.int64)
         clock = guess_clock(columns, block) if not rows else clock
-        times = _times(clock, group, block, at)
-        if clock is not None or group.step:
-            check.see(at, times)
-        for name, one in checks.items():
-            one.see(at, times, block[name].astype(np.float64))
+        with np.errstate(over="ignore", invalid="ignore"):
+            times = _times(clock, group, block, at)
+            if clock is not None or group.step:
+                check.see(at, times)
+            for name, one in checks.items():
+                one.see(at, times, block[name].astype(np.float64))
         rows += size
     findings += check.findings() if clock else []
     findings += [f for one in checks.values() for f in one.findings() if f.channel != (clock.column if clock else "")]

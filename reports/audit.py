@@ -122,8 +122,10 @@ def _function(key: str, mine: Mapping[str, Any], theirs: Mapping[str, Any], case
     if key in mine:
         arguments = [(q,) if key in ("M", "H") else (q, v) for q, v in states(case, theirs)]
         values = [(mine[key](*a), theirs[key](*a)) for a in arguments]
-        a, b = (np.concatenate([_flat(value[i]) for value in values]) for i in (0, 1))
-        worst = difference(a, b)
+        known = [pair for pair in values if np.isfinite(_flat(pair[1])).all()]  # dependent rows have no one lam
+        if known:
+            a, b = (np.concatenate([_flat(pair[i]) for pair in known]) for i in (0, 1))
+            worst = difference(a, b)
     return AuditRow(
         quantity=key,
         mine=f"{STATES} states" if key in mine else "not shown",

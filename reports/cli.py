@@ -102,6 +102,27 @@ def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: P
 
 
 @cli.command()
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+def stability(wanted: tuple[str, ...], out: Path) -> int:
+    """Map from which scenes the closed-loop ball maze still comes to its centre."""
+    from crossbody.reports.commands import stability_map as work
+
+    return work(wanted, out, _command())
+
+
+@cli.command()
+@click.argument("name", metavar="CASE")
+@click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
+    """Frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
+    from crossbody.reports.bode_command import bode as work
+
+    return work(name, pairs, out, _command())
+
+
+@cli.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> int:
     """Make the page of an earlier run again."""

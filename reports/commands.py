@@ -95,6 +95,22 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
     return 0
 
 
+def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
+    """Run the closed-loop maze with one thing changed at a time; writes the table and the page."""
+    from crossbody.reports import stability
+
+    picks = jobs.picks(wanted) if wanted else (stability.DEFAULT,)
+    output.check(out)
+    with progress(len(picks) * len(stability.POINTS)) as tell:
+        rows = stability.stability_map(picks, stability.POINTS, tell)
+    told = provenance(command, rtol=stability.RTOL)
+    with output.folder(out) as made:
+        study.write(made, [], study.judge([], {}), told)
+        study.write_table(made / "stability", rows, told)
+        page.write(made)
+    return show_stability(rows, stability.surprises(rows), out)
+
+
 def repeat(case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None) -> str:
     """The command that reproduces the rows of one case, but for its engine."""
     source = next((name for name in names if name.endswith(".py") and Path(name).stem == case.name), case.name)
@@ -173,6 +189,16 @@ def show_gap_map(lines: pd.DataFrame, out: Path) -> None:
     for line in lines[lines["why"] != ""].to_dict(orient="records"):
         print(f"{line['n']} balls, {line['engine']}:{line['profile']}, {line['machine']}: {line['why']}")
     print(f"Report: {(out / page.PAGE).absolute()}")
+
+
+def show_stability(rows: pd.DataFrame, surprises: pd.DataFrame, out: Path) -> int:
+    """One line a scene in the terminal, then those that ended otherwise than published; 1 if there are any."""
+    table = rows.drop(columns=["change", "why"])
+    print(table.to_string(index=False, float_format=lambda x: f"{x:.4g}"))
+    for row in surprises.to_dict(orient="records"):
+        print(f"outside: {row['engine']}:{row['profile']} {row['scene']}: {row['expected']} expected. {row['why']}")
+    print(f"Report: {(out / page.PAGE).absolute()}")
+    return int(len(surprises) > 0)
 
 
 def show_bench(rows: pd.DataFrame, orders: pd.DataFrame, out: Path) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from crossbody.cases import Case, Trajectory
+from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.audit import AuditRow
 from crossbody.reports.truth import Truth, truth_of
@@ -30,6 +31,7 @@ class Entry:
         skipped: why, in one sentence.
         audit: what reached the engine beside the reference.
         refined: the same engine with a much finer step or tolerance, to tell model from discretisation.
+        stepped: ends of the run's own steps, s, where `run` was asked for other instants; None where they are its own.
         own: truth of the equations that the engine really integrates; None where they are the case's own.
     """
 
@@ -40,6 +42,7 @@ class Entry:
     skipped: str = ""
     audit: tuple[AuditRow, ...] = ()
     refined: Trajectory | None = None
+    stepped: Floats | None = None
     own: Truth | None = None
 
 

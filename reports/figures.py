@@ -171,10 +171,27 @@ def _by_mode(run: Trajectory, row: int) -> dict[Mode, list[tuple[float, float]]]
     return found
 
 
+def steps(traces: Sequence[Trace]) -> go.Figure:
+    """Length of every step at its start: small while a collision lasts, large again when it is over."""
+    figure = _frame(["step size [s]"], "Step size of each engine")
+    for i, trace in enumerate(traces):
+        starts, lengths = trace.about.get("steps", ((), ()))
+        if len(starts):
+            name = label(trace)
+            figure.add_trace(
+                go.Scatter(
+                    x=starts, y=lengths, name=name, legendgroup=name, mode="lines", line=_style(i) | {"shape": "hv"}
+                )
+            )
+    figure.update_yaxes(type="log", exponentformat="power")
+    return figure
+
+
 FIGURES: dict[str, Callable[[Sequence[Trace]], go.Figure]] = {
     "motion": motion,
     "force": force,
     "energy": energy,
     "modes": modes,
     "penetration": penetration,
+    "steps": steps,
 }

@@ -129,11 +129,13 @@ def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, A
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     rows: tuple[AuditRow, ...] = audit(prepared.audit(), reference, case) if reference else ()
+    natural: Trajectory = prepared.run()
     return Entry(
         engine=pick.engine,
         profile=pick.profile,
         settings=prepared.settings,
-        run=_dense(case, pick, prepared),
+        run=_dense(case, pick, prepared, natural),
+        stepped=natural.t,
         audit=rows,
         refined=_refined(case, pick, prepared.settings),
         own=None if (followed := getattr(prepared, "follows", None)) is None else law_of(followed),
@@ -149,9 +151,8 @@ def prepare(case: Case, pick: Pick, rtol: float | None) -> Any:
     return prepared
 
 
-def _dense(case: Case, pick: Pick, prepared: Any) -> Trajectory:
+def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory) -> Trajectory:
     """The run; where the engine can be asked for samples, again with enough of them to be drawn."""
-    natural: Trajectory = prepared.run()
     if "samples" not in prepared.settings or not natural.outcome.ok:
         return natural
     asked = {key: prepared.settings[key] for key in ("rtol",) if key in prepared.settings}
@@ -163,11 +164,11 @@ def _dense(case: Case, pick: Pick, prepared: Any) -> Trajectory:
 
 
 def _refined(case: Case, pick: Pick, settings: Mapping[str, Any]) -> Trajectory | None:
-    """The same engine with a step four times finer or a tolerance of 1e-12; None if it has neither."""
+    """The same engine with a step four times finer or the tightest tolerance; None if it has neither."""
     if "dt" in settings:
         finer = {"dt": float(settings["dt"]) / FINER_STEP}
     elif "rtol" in settings:
-        finer = {"rtol": min(FINEST_TOLERANCE, float(settings["rtol"]))}
+        finer = {"rtol": min(max(FINEST_TOLERANCE, case.tight), float(settings["rtol"]))}
     else:
         return None
     if "time_limit" in settings:

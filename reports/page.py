@@ -56,6 +56,8 @@ def render(out: Path) -> str:
         cases=_cases([load(path) for path in sorted((out / "traces").glob("*.parquet"))]),
         bench=_bench(out),
         gapmap=_gap_map(out),
+        stability=_stability(out),
+        bode=_bode(out),
         provenance=read_json(out / "provenance.json"),
         script=SCRIPT,
     )
@@ -82,6 +84,27 @@ def _gap_map(out: Path) -> dict[str, Any]:
 
     rows = pd.DataFrame(read_json(out / "gapmap.json")["rows"])
     return {"rows": _records(summary(rows)), "plot": plot("gap-map", gap_map(rows))}
+
+
+def _stability(out: Path) -> dict[str, Any]:
+    """Context of the stability map; empty where there is none."""
+    if not (out / "stability.json").is_file():
+        return {}
+    from crossbody.reports.stability_figure import stability
+
+    rows = pd.DataFrame(read_json(out / "stability.json")["rows"])
+    return {"rows": _records(rows), "plot": plot("stability-map", stability(rows))}
+
+
+def _bode(out: Path) -> dict[str, Any]:
+    """Context of the frequency responses; empty where there are none."""
+    if not (out / "bode.json").is_file():
+        return {}
+    from crossbody.reports.bode import growths
+    from crossbody.reports.bode_figure import bode
+
+    rows, poles = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("bode", "poles"))
+    return {"growth": _records(growths(poles)), "plot": plot("bode-soft-contact", bode(rows))}
 
 
 def _records(rows: pd.DataFrame) -> list[dict[str, Any]]:

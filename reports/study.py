@@ -7,15 +7,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from crossbody.cases import Case, OutputError
+from crossbody.cases._arrays import Floats
 from crossbody.reports.comparison import Entry, table, verdicts
 from crossbody.reports.figures import TRUTH
 from crossbody.reports.jobs import CaseResult
 from crossbody.reports.store import Trace, save
+from crossbody.reports.thin import keep
 from crossbody.reports.truth import Truth
 
 
@@ -82,8 +85,17 @@ def _traces(result: CaseResult) -> list[Trace]:
 def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
     assert entry.run is not None
     about = _about(case, entry.engine, entry.profile) | {"settings": dict(entry.settings)}
+    about["steps"] = _steps(entry.run.t if entry.stepped is None else entry.stepped)
     inside = bool(len(entry.run.t)) and entry.run.t[-1] <= case.t_end
     return Trace(about=about, run=entry.run, truth=truth.at(entry.run.t) if inside else None)
+
+
+def _steps(t: Floats) -> list[list[float]]:
+    """Start and length of the steps between the instants t, s: no more of them than a plot shows."""
+    ends = np.unique(t)
+    starts, lengths = ends[:-1], np.diff(ends)
+    kept = keep(starts, np.log(lengths), np.zeros(0))
+    return [starts[kept].tolist(), lengths[kept].tolist()]
 
 
 def read_json(path: Path) -> Any:

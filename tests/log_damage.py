@@ -110,21 +110,21 @@ def _contents(case: str, change: Callable[[dict[str, np.ndarray]], None], folder
 # What is wrong with the bytes.
 
 
-def _bytes_of(path: Path) -> Path:
+def bytes_of(path: Path) -> Path:
     """The file that holds the numbers."""
     return next(p for p in path.iterdir() if p.suffix in (".db3", ".mcap")) if path.is_dir() else path
 
 
 def _cut(case: str, share: float, folder: Path) -> Path:
     path = log_files.write(case, folder, motion())
-    file = _bytes_of(path)
+    file = bytes_of(path)
     os.truncate(file, int(file.stat().st_size * share))
     return path
 
 
 def _rubbish(case: str, keep: int, folder: Path) -> Path:
     path = log_files.write(case, folder, motion())
-    file = _bytes_of(path)
+    file = bytes_of(path)
     noise = np.random.default_rng(5).bytes(file.stat().st_size)
     file.write_bytes(file.read_bytes()[:keep] + noise)
     return path
@@ -132,21 +132,21 @@ def _rubbish(case: str, keep: int, folder: Path) -> Path:
 
 def _zeros(case: str, folder: Path) -> Path:
     path = log_files.write(case, folder, motion())
-    file = _bytes_of(path)
+    file = bytes_of(path)
     file.write_bytes(bytes(file.stat().st_size))
     return path
 
 
 def _empty(case: str, folder: Path) -> Path:
     path = log_files.write(case, folder, motion())
-    _bytes_of(path).write_bytes(b"")
+    bytes_of(path).write_bytes(b"")
     return path
 
 
 def _sparse(case: str, keep: int, folder: Path) -> Path:
     """The beginning of a log, then a hole of 10 GB."""
     path = log_files.write(case, folder, motion())
-    file = _bytes_of(path)
+    file = bytes_of(path)
     os.truncate(file, keep)
     os.truncate(file, 10_000_000_000)
     return path
@@ -260,7 +260,7 @@ def _parquet_text(folder: Path) -> Path:
 
 def _bag_without(name: str, folder: Path) -> Path:
     path = log_files.write("ros2", folder, motion())
-    target = path / name if name else _bytes_of(path)
+    target = path / name if name else bytes_of(path)
     target.unlink()
     return path
 

@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
 Table = Mapping[str, NDArray[Any]]
 """Columns by name; "t" is the time, s."""
 
 UNITS = {"t": "s", "angle": "rad", "torque": "N m", "count": "1", "touch": "1"}
+STEADY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # other work may share the machine
 MILLI = 1_000_000  # ns
 
 

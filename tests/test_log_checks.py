@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import LogFormatError, SceneError, UnknownName
@@ -61,6 +62,7 @@ def told(check: Any) -> list[tuple[str, int, int]]:
 cuts = st.lists(st.integers(0, 300), max_size=6)
 
 
+@STEADY
 @given(cuts, st.integers(1, 299), st.sampled_from(["nan", "back", "same", "gap", "late"]))
 def test_a_broken_clock_is_found_at_its_row_wherever_blocks_are_cut(at: list[int], row: int, kind: str) -> None:
     t = np.arange(300) * STEP
@@ -81,6 +83,7 @@ def test_a_broken_clock_is_found_at_its_row_wherever_blocks_are_cut(at: list[int
     assert set(found) <= {check, "drift"}
 
 
+@STEADY
 @given(cuts)
 def test_clock_figures_do_not_depend_on_the_cuts(at: list[int]) -> None:
     random = np.random.default_rng(3)
@@ -114,6 +117,7 @@ def test_a_wrong_unit_of_time_is_a_fault(factor: float) -> None:
     assert (finding.check, finding.fault) == ("sample_time", True)
 
 
+@STEADY
 @given(cuts, st.integers(0, 299), st.sampled_from([np.nan, np.inf, 7.0, -7.0]))
 def test_a_bad_value_is_found_at_its_row_wherever_blocks_are_cut(at: list[int], row: int, value: float) -> None:
     t = np.arange(300) * STEP
@@ -125,6 +129,7 @@ def test_a_bad_value_is_found_at_its_row_wherever_blocks_are_cut(at: list[int], 
     assert {(f.row, f.t, f.count, f.fault) for f in found} == {(row, t[row], 1, True)}
 
 
+@STEADY
 @given(cuts, st.integers(1, 150), st.integers(1, 150))
 def test_runs_do_not_depend_on_the_cuts(at: list[int], start: int, length: int) -> None:
     t = np.arange(300) * STEP
@@ -135,6 +140,7 @@ def test_runs_do_not_depend_on_the_cuts(at: list[int], start: int, length: int) 
     assert stuck == ([(start, length)] if length >= 100 else [])
 
 
+@STEADY
 @given(cuts)
 def test_a_saturated_channel_is_found_at_its_first_run(at: list[int]) -> None:
     t = np.arange(300) * STEP
@@ -232,7 +238,7 @@ def test_a_repair_that_does_not_exist_is_refused(tmp_path: Path) -> None:
         hw.read(tmp_path / "log.parquet", columns(), repair=("fill_droped",))
 
 
-@settings(max_examples=25)
+@settings(STEADY, max_examples=25)
 @given(st.floats(0.0, 1.7), st.floats(0.0, 1.7))
 def test_a_window_holds_the_rows_of_its_times(start: float, stop: float) -> None:
     data = motion()

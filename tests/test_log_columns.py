@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import ColumnMapError, InvalidValue
@@ -100,12 +101,14 @@ signals = st.builds(
 names = st.text(min_size=1, max_size=64)
 
 
+@STEADY
 @given(st.dictionaries(names, signals, min_size=1, max_size=3), st.text(), st.floats(1e-9, 1e3))
 def test_what_is_written_is_what_is_read(found: dict[str, hw.Signal], about: str, step: float) -> None:
     columns = hw.Columns(about=about, time=hw.Time(column="t", sample_time=step), coordinates=found, sensors=found)
     assert hw.parse_columns(hw.dump_columns(columns)) == columns
 
 
+@STEADY
 @given(st.text(max_size=60))
 def test_any_text_is_a_unit_or_a_sentence(text: str) -> None:
     with contextlib.suppress(InvalidValue):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import log_damage
 import log_files
+import numpy as np
 import pytest
 
 from crossbody import hw
@@ -80,6 +82,22 @@ def test_a_damaged_log_is_refused_with_its_place_in_one_sentence_and_exit_code_2
     assert path.name in shown.err
     assert "\x1b" not in shown.out + shown.err
     assert listing(columns.parent) == before
+
+
+@pytest.mark.parametrize("case", log_files.WRITERS)
+def test_flipped_bytes_are_read_or_refused_and_nothing_else(case: str, tmp_path: Path) -> None:
+    path = log_files.write(case, tmp_path, log_damage.motion())
+    columns = hw.parse_columns(log_damage.column_map(case))
+    file = log_damage.bytes_of(path)
+    whole, random = file.read_bytes(), np.random.default_rng(17)
+    for _ in range(12):
+        damaged = bytearray(whole)
+        for at in random.integers(0, len(damaged), 3):
+            damaged[at] = random.integers(0, 256)
+        file.write_bytes(bytes(damaged))
+        for look in (lambda: hw.read(path, columns), lambda: hw.survey(path).draft()):
+            with contextlib.suppress(LogFormatError):
+                look()
 
 
 CHILD = """

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from crossbody import hw
-from crossbody.cases import LogFormatError, OutputError
+from crossbody.cases import InvalidValue, LogFormatError, OutputError
 
 TEXT = """about = "a rig"
 synthetic = true
@@ -76,6 +76,12 @@ def test_a_changed_number_is_noticed(log: hw.Log, row: int, tmp_path: Path) -> N
 def test_a_log_that_was_not_stored_needs_a_map(tmp_path: Path, log: hw.Log) -> None:
     with pytest.raises(LogFormatError, match="column map"):
         hw.read(tmp_path / "raw.parquet")
+
+
+def test_a_stored_log_is_not_repaired(log: hw.Log, tmp_path: Path) -> None:
+    hw.store(log, tmp_path / "log.parquet")
+    with pytest.raises(InvalidValue, match=r"raw\.parquet"):
+        hw.read(tmp_path / "log.parquet", repair=("fill_dropped",))
 
 
 def test_nothing_half_written_is_left(log: hw.Log, tmp_path: Path) -> None:

@@ -139,6 +139,20 @@ def test_ball_dropped_over_a_gap_falls_through_without_a_touch():
     assert change.t == pytest.approx(math.sqrt(2.0 * (0.0875 - 0.0789) / G), abs=1e-10)
 
 
+def test_slip_at_a_landing_decays_and_dissipates_as_an_inelastic_impulse():
+    """Work -slip^2/(2 G_tt) (1 - exp(-2 a1_slip t)), 1/G_tt from R^2/Jm + 1/mb + r^2/Jb: -1.189e-5 J on ring 2."""
+    case, system = passive(ring=2, theta=0.4, angle=0.0, a1_slip=2000.0, maze_inertia=1e-3)
+    motion = start(system, case.q0, [0.0, -0.1, -0.186, 0.0], 2e-3, rtol=1e-11)
+    mobility = 0.0613**2 / 1e-3 + (1.0 + 2.5) / 8.4e-3
+    assert (motion.mode[1:-1, 6] == Mode.CONTACT).all()
+    slip = [system.gap(q, v)[1][6] for q, v in zip(motion.q, motion.v, strict=True)]
+    np.testing.assert_allclose(slip, 0.1 * np.exp(-2000.0 * motion.t), atol=1e-9)
+    expected = -0.5 * 0.1**2 / mobility * (1.0 - math.exp(-8.0))
+    assert expected == pytest.approx(-1.189e-5, rel=1e-3)
+    assert motion.ledger.contact[-1, 6] == pytest.approx(expected, rel=2e-3)
+    assert ledger_residual(motion) < 1e-14
+
+
 def test_ball_that_rolls_into_a_gap_turns_about_its_tip():
     """Over the edge the contact goes to the tip at the same instant, without a FREE between or a jump of the motion."""
     case, system = passive()

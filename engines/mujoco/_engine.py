@@ -34,7 +34,10 @@ class MujocoRun:
     engine: str = "mujoco"
 
     def run(self) -> Trajectory:
-        """Integrate from the start. Forces are memoryless: lam = max(0, law) wherever a gap is closed (spec 4.1)."""
+        """Integrate from the start.
+
+        Forces are memoryless, lam = max(0, law) wherever a gap is closed (spec 4.1), unless the scene says otherwise.
+        """
         case, scene = self.case, self.scene
         dt, limit = float(self.settings["dt"]), int(self.settings["max_steps"])
         tape = Tape(scene.model, scene.data, min(limit, int(1.1 * case.t_end / dt) + 64, 1_000_000))
@@ -125,7 +128,7 @@ def _options(scene: Scene) -> dict[str, Any]:
         "integrator": mujoco.mjtIntegrator(opt.integrator).name.removeprefix("mjINT_"),
         "solver": mujoco.mjtSolver(opt.solver).name.removeprefix("mjSOL_"),
         "located_events": scene.arm is not None,
-        "law": "memoryless",
+        "law": scene.machine,
     }
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases import Outcome
+from crossbody.cases import Mode, Outcome
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._locate import Locator
 from crossbody.engines.mujoco._scene import Scene
@@ -56,6 +56,7 @@ class March:
         if instants and instants[0] == 0.0:
             scene.change(instants.pop(0))
         self.now = self._settled(scene.modes())
+        self.tape.switch(0.0, tuple(m if m == Mode.BILATERAL else int(Mode.FREE) for m in self.now), self.now)
         self.tape.record(scene.lam(), self.now)
         for instant in instants:
             if not self._until(instant):

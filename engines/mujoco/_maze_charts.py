@@ -40,6 +40,7 @@ class Charts:
     Attributes:
         model, data: MuJoCo's.
         memory: the discrete state that is in force.
+        rate: sqrt(a0) of faces and tips, 1/s.
         face: slot of the face that the ball on the chain is held by; None while it flies.
     """
 
@@ -51,6 +52,7 @@ class Charts:
         self.geoms = [self.model.geom(name).id for name in TIPS]
         self.slots = {pair: int(name[3]) for pair, name in zip(self.geoms, TIPS, strict=True)}
         self.a0 = float(case.law.a0[0])
+        self.rate = math.sqrt(self.a0)
         self.face: int | None = None
 
     def state(self) -> tuple[State, State]:

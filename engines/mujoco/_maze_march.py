@@ -12,7 +12,7 @@ from crossbody.cases import Outcome
 from crossbody.cases._arrays import Floats
 from crossbody.engines._maze_log import MazeLog
 from crossbody.engines._maze_machine import MazeMachine, Settled
-from crossbody.engines._maze_memory import FREE
+from crossbody.engines._maze_memory import CONTACT, FREE
 from crossbody.engines._maze_rows import NORMALS
 from crossbody.engines.mujoco._march import SAME_INSTANT
 from crossbody.engines.mujoco._maze_charts import Charts
@@ -21,6 +21,10 @@ State = tuple[float, ...]
 FULL = mujoco.mjtState.mjSTATE_INTEGRATION
 TOGETHER = 1e-12
 """Events closer than this are one, as a part of the step."""
+FINER = 16
+"""Steps in the place of one while a contact is lively."""
+SETTLED = 1e-6
+"""What is left of an approach, |h'| + sqrt(a0) |h|, when a ball has settled on a face, m/s."""
 FASTEST = 1e4
 """Speed at which a run has diverged, rad/s and m/s."""
 
@@ -37,6 +41,7 @@ class MazeMarch:
         self.charts, self.log, self.dt, self.max_steps = charts, log, dt, max_steps
         self.machine = MazeMachine(charts.maze, charts.probe)
         self.saved = np.empty(mujoco.mj_stateSize(charts.model, FULL))
+        self.now: tuple[State, State, Floats]
         self.steps = self.trials = self.still = 0
         self.outcome, self.message = Outcome.FINISHED, ""
 
@@ -51,7 +56,7 @@ class MazeMarch:
         while t_end - t > 1e-9 * self.dt and self.outcome.ok:
             if self.steps >= self.max_steps:
                 return self._end(Outcome.STEP_LIMIT, t, f"{self.max_steps} steps of {self.dt:g} s were not enough")
-            step = min(self.dt, t_end - t)
+            step = min(self.dt / FINER if self._lively() else self.dt, t_end - t)
             mujoco.mj_getState(self.charts.model, self.charts.data, self.saved, FULL)
             ahead = self._try(step)
             if not self._sound():
@@ -84,7 +89,18 @@ class MazeMarch:
         return self._try(step)
 
     def _watch(self) -> list[float]:
-        return self.machine.watch(*self.charts.state(), self.charts.memory, self.charts.multipliers())
+        """The functions watched; state and multipliers are kept for the record."""
+        q, v = self.charts.state()
+        self.now = q, v, self.charts.multipliers()
+        return self.machine.watch(q, v, self.charts.memory, self.now[2])
+
+    def _lively(self) -> bool:
+        """Whether a tip is touched, or a face by a ball that has not settled on it."""
+        charts, q, v = self.charts, self.now[0], self.now[1]
+        if charts.face is None:
+            return CONTACT in charts.memory.modes
+        h, H, _ = charts.maze.rows.at(charts.memory.place)[charts.face](q, v)
+        return abs(H[1] * v[1] + H[2] * v[2]) + charts.rate * abs(h) > SETTLED
 
     def _crossed(self, before: Sequence[float], after: Sequence[float]) -> list[int]:
         """Functions that changed sign; of a free row's h' only a rise through zero below the surface counts."""
@@ -127,6 +143,7 @@ class MazeMarch:
 
     def _pass(self, t: float, q: State, v: State, settled: Settled) -> None:
         self.charts.arm(settled.memory, q, v)
+        self.now = *self.charts.state(), self.charts.multipliers()
         self.log.pass_to(settled)
         if settled.changed or t == 0.0:
             self._record(t)
@@ -136,8 +153,8 @@ class MazeMarch:
             self._end(Outcome.MODE_CYCLE, t, f"the rows come back to {settled.memory.modes} at one instant")
 
     def _record(self, t: float) -> None:
-        q, v = self.charts.state()
-        self.log.note(t, np.array(q), np.array(v), self.charts.multipliers(), self.charts.memory)
+        q, v, lam = self.now
+        self.log.note(t, np.array(q), np.array(v), lam, self.charts.memory)
 
     def _sound(self) -> bool:
         return bool(np.abs(self.charts.data.qvel).max() < FASTEST)

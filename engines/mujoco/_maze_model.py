@@ -18,7 +18,8 @@ from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, direct_solref
 FAR = 1e10
 """Margin that no gap falls below, m."""
 TIPS = ("tip1", "tip2", "tip4", "tip5")
-"""Spheres in the slots of the rows, put where the gaps of the moment are."""
+"""Spheres in the slots of the rows, put where the gaps of the moment are. In the model they must stand off the axis:
+MuJoCo skips the position of a geom that was compiled onto its body's own frame."""
 THETA, B, RHO, PSI, X, Y, PHI = range(7)
 """Coordinates of the model, which are its degrees of freedom as well."""
 
@@ -77,7 +78,7 @@ def compiled(maze: BallMaze, law: Law) -> Any:
         solimp=f"{MAX_IMPEDANCE} {MAX_IMPEDANCE} 0.001 0.5 1",
         normal=_pair(direct_solref(law, 0)),
         slip=_pair(direct_solref(law, 6)) if maze.rows.rolling else "0 0",
-        tips="".join(f'<geom name="{tip}" size="1"/>' for tip in TIPS),
+        tips="".join(f'<geom name="{tip}" size="1" pos="1 1 0"/>' for tip in TIPS),
         pairs="".join(f'<pair name="{tip}" geom1="{tip}" geom2="ball"/>' for tip in TIPS),
     )  # fmt: skip
     model = mujoco.MjModel.from_xml_string(text)

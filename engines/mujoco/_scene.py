@@ -35,6 +35,7 @@ class Scene:
         arm: opens and closes rows to suit their modes (matched profile only).
         margins: -> for every row its gap, m, and the sign of the multiplier that it would have without the bound
             lam >= 0 (matched profile only).
+        machine: which state machine the rows follow.
         audit: the physics read back from the compiled model.
     """
 
@@ -52,4 +53,5 @@ class Scene:
     hook: Hook | None = None
     arm: Callable[[Modes], None] | None = None
     margins: Callable[[], list[tuple[float, float]]] | None = None
+    machine: str = "memoryless"
     audit: Mapping[str, Any] = field(default_factory=dict)

@@ -194,6 +194,7 @@ def _follow(scene: Scene, own: RedBody, case: Case, dt: float) -> TwoSets:
         restart()
         pairs.reset()
 
+    scene.machine = "level"
     scene.start, scene.modes, scene.lam = start, pairs.modes, pairs.lam
     scene.hook, scene.margins, scene.arm = pairs.hook, pairs.margins, pairs.arm(reach=8.0 * dt * own.speed)
     return pairs

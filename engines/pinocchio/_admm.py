@@ -89,7 +89,7 @@ class TimeStepper:
         if rows.unilateral[i]:
             return self.e[i] * hd
         h = float(rows.heights(q)[i])
-        a0, a1, a2 = rows.slow[:, i].tolist()
+        a0, a1, a2 = (float(x) for x in rows.slow[:, i])
         k = a0 + a2 * h * h
         return (k * dt * h - hd) / (1.0 + a1 * dt + k * dt * dt)
 

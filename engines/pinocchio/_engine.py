@@ -42,7 +42,7 @@ class Solver(Protocol):
     message: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class SmoothRun:
     """One prepared run of rows that are always on; see `crossbody.engines.Run`."""
 
@@ -70,7 +70,7 @@ class SmoothRun:
         return found
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class PinocchioRun:
     """One prepared run; see `crossbody.engines.Run`."""
 

@@ -88,11 +88,12 @@ class PinRows:
     ) -> None:
         self.model, self.data = model, model.createData()
         self.jacobian, self.heights, self.drift, self.forces = jacobian, heights, drift, forces
-        self.nc, self.unilateral = len(law.a0), law.unilateral.tolist()
-        self.follows = tuple(follows) or (-1,) * self.nc
+        self.nc = len(law.a0)
+        self.unilateral: Sequence[bool] = law.unilateral.tolist()
+        self.follows: Sequence[int] = tuple(follows) or (-1,) * self.nc
         self.tau = np.zeros(model.nv)
         self.slow = np.stack((law.a0, law.a1, law.a2))
-        self.fast = (law.b0 > 0.0).tolist()
+        self.fast: Sequence[bool] = (law.b0 > 0.0).tolist()
         quick = np.stack((law.b0, law.b1, np.zeros(self.nc)))
         self.entered = np.where(law.b0 > 0.0, quick, self.slow)  # what a row has that is just entered
         self._sets: dict[Modes, Any] = {}
@@ -178,5 +179,5 @@ class PinRows:
             after = pin.impulseDynamics(self.model, self.data, q, v, J, max(bounce, default=0.0), 0.0)
             return np.array(after), np.array(self.data.impulse_c)
         X = np.linalg.solve(mass_matrix(self.model, self.data, q), J.T)
-        p: Floats = np.linalg.solve(J @ X, -(1.0 + np.array(e)) * (J @ v))
+        p: Floats = np.asarray(np.linalg.solve(J @ X, -(1.0 + np.array(e)) * (J @ v)))
         return v + X @ p, p

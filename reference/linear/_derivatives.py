@@ -111,13 +111,16 @@ def _saddle(at: Point) -> tuple[Floats, Floats, Floats]:
     """K, and the v' and lam that solve K (v', lam) = (f, -law).
 
     Raises:
-        SceneError: if the active rows are redundant here, or nothing has a finite value.
+        SceneError: if the active rows are redundant here, a coordinate has no inertia, or a value is not finite.
     """
-    blocks, f, H, h, drift = _terms(at, at.q, at.v, at.u)
-    M, na = _dense(blocks), len(at.active)
-    right = np.concatenate([f, -_law(at, H, at.v, h, drift)])
+    with np.errstate(over="ignore", invalid="ignore"):
+        blocks, f, H, h, drift = _terms(at, at.q, at.v, at.u)
+        M, na = _dense(blocks), len(at.active)
+        right = np.concatenate([f, -_law(at, H, at.v, h, drift)])
     if not (np.all(np.isfinite(M)) and np.all(np.isfinite(H)) and np.all(np.isfinite(right))):
         raise SceneError(f"linearise: the equations have no finite value at q = {at.q.tolist()}, v = {at.v.tolist()}.")
+    if not np.linalg.matrix_rank(M, hermitian=True) == len(M):
+        raise SceneError(f"linearise: a coordinate has no inertia at q = {at.q.tolist()}.")
     if na and not np.linalg.cond(H @ np.linalg.solve(M, H.T)) <= ILL_POSED:
         raise SceneError(
             f"linearise: the active rows {at.active.tolist()} are redundant at q = {at.q.tolist()}; "
@@ -132,7 +135,7 @@ def derivatives(at: Point) -> Derivatives:
     """All first derivatives at a point.
 
     Raises:
-        SceneError: if the active rows are redundant there, or nothing has a finite value.
+        SceneError: if the active rows are redundant there, a coordinate has no inertia, or a value is not finite.
     """
     n, nu, nc = at.system.n, at.system.inputs, at.system.nc
     K, vd, lam = _saddle(at)

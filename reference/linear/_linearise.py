@@ -93,6 +93,7 @@ def _outputs(
     for name in outputs:
         if name not in known:
             raise UnknownName("output of linearise", name, known)
-    parts = [known[name] for name in outputs]
+    none: tuple[str, ...] = ()
+    parts = [(np.zeros((0, 2 * n)), np.zeros((0, nu)), none), *(known[name] for name in outputs)]
     C, D = np.vstack([part[0] for part in parts]), np.vstack([part[1] for part in parts])
     return C, D, tuple(name for part in parts for name in part[2])

@@ -49,13 +49,15 @@ def number(x: Any) -> int:
 @kernels.helper
 def below(p: Any) -> int:
     """Line of the ring below in the table; what it points to in channel 0 must not be read."""
-    return TABLE + STRIDE * (number(p[CHANNEL]) - 1)
+    line: int = TABLE + STRIDE * (number(p[CHANNEL]) - 1)
+    return line
 
 
 @kernels.helper
 def above(p: Any) -> int:
     """Line of the ring above, or of the wall."""
-    return TABLE + STRIDE * number(p[CHANNEL])
+    line: int = TABLE + STRIDE * number(p[CHANNEL])
+    return line
 
 
 @kernels.helper

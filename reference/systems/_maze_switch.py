@@ -63,7 +63,7 @@ FREE, CONTACT = 0, 1
 
 
 @kernels.helper
-def _middle(p: Any, line: int) -> float:
+def _middle(p: Any, line: int) -> Any:
     """Radius of the circle on which a ring's tips lie."""
     return 0.5 * (p[line + INNER] + p[line + OUTER])
 
@@ -77,7 +77,7 @@ def _offset(q: Any, p: Any, line: int) -> float:
 
 
 @kernels.helper
-def _nearest(q: Any, p: Any, line: int) -> int:
+def _nearest(q: Any, p: Any, line: int) -> Any:
     """Number of the gap whose centre is nearest to the ball's angle."""
     n = number(p[line + GAPS])
     a = np.arctan2(q[2], q[1]) - q[0] - p[line + PHASE]
@@ -85,7 +85,7 @@ def _nearest(q: Any, p: Any, line: int) -> int:
 
 
 @kernels.helper
-def _sector(q: Any, p: Any, line: int) -> int:
+def _sector(q: Any, p: Any, line: int) -> Any:
     """Number of the gap that the ball's angle is in, or SOLID."""
     if p[line + GAPS] == 0.0 or abs(_offset(q, p, line)) >= p[line + REACH]:
         return SOLID
@@ -182,7 +182,7 @@ def _take_charge(q: Any, p: Any) -> None:
 
 
 @kernels.helper
-def _beyond(q: Any, p: Any, line: int, sector: int) -> int:
+def _beyond(q: Any, p: Any, line: int, sector: int) -> Any:
     """The sector that follows: across the edge, or where the ball is if its angle jumped, as it does at the axis."""
     if abs(abs(_offset(q, p, line)) - p[line + REACH]) > JUMPED:
         return _sector(q, p, line)

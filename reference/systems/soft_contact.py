@@ -6,7 +6,7 @@ q = (x flange, pL, pR faces of the pads, b block, I, SL, SR, Z). The last four c
     SL' = s_L, SR' = s_R of `_soft_fingers`;  Z' = z, the shift of the fingers, and z' = u + probe sin(probe_rate t)
 
 so that every equation keeps the form M v' = f + H^T lam; the positions SL, SR, Z themselves act on nothing. The flange
-obeys mf x'' = mf (ki I + kp e + kd (x_ref' - x')) - fL - fR, the block mb b'' = lam_L - lam_R - bt b'.
+obeys mf x'' = mf (ki I + kp e + kd (share x_ref' - x')) - fL - fR, the block mb b'' = lam_L - lam_R - bt b'.
 Parameters p are those of `PARAMETERS`; input u = velocity of the fingers, m/s. Kinetic energy is that of the four
 bodies; the pads' springs are tied to the moving jaws, so their work counts as the inputs'.
 """
@@ -26,9 +26,9 @@ from crossbody.reference.systems._soft_fingers import BLOCK_MASS, BT, KS, PAD_MA
 if TYPE_CHECKING:
     from crossbody.cases import Law
 
-PARAMETERS = (*_fingers.NAMES, "flange_mass", "probe", "probe_rate")
+PARAMETERS = (*_fingers.NAMES, "flange_mass", "rate_share", "probe", "probe_rate")
 COORDINATES = ("x", "pL", "pR", "b", "I", "SL", "SR", "Z")
-_FLANGE, _PROBE, _RATE = range(_fingers.SIZE, len(PARAMETERS))
+_FLANGE, _SHARE, _PROBE, _RATE = range(_fingers.SIZE, len(PARAMETERS))
 
 
 @kernels.helper
@@ -42,8 +42,9 @@ def _forces(t: float, q: Array, v: Array, u: Array, p: Array) -> Any:
     """Forces of the fingers on their pads, and of the position loop on the flange, N; rate of the error, m/s."""
     left, right = pads(t, p, 0, q[0] + v[7], v[0] + _shift(t, u, p), q[1], v[1], q[2], v[2])
     yL, yR = readings(p, 0, v[5], v[6], v[1], v[2])
-    rate = p[K] * (yR - yL) - v[0]
-    return left, right, p[_FLANGE] * pid(p, 0, q[4], v[4], rate), rate
+    wanted = p[K] * (yR - yL)
+    drive = p[_FLANGE] * pid(p, 0, q[4], v[4], p[_SHARE] * wanted - v[0])
+    return left, right, drive, wanted - v[0]
 
 
 @kernels.dynamics

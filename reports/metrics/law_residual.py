@@ -4,7 +4,8 @@ The KKT residual of spec 1.1, recomputed by us from q and v:
 
     (H M^-1 H^T) lam = -(H M^-1 f + H'v + a1 h' + a0 h + a2 h^3)
 
-on the rows that the run has closed. It tells an engine that follows another law from one that follows this one.
+on the rows that the run has closed, with b0 and b1 where they are in COLLISION. It tells an engine that follows another
+law from one that follows this one.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._contacts import CLOSED
 
@@ -41,14 +43,18 @@ def _equations(case: Case) -> Any:
     return prepared.system
 
 
-def multipliers(system: Any, case: Case, q: Floats, v: Floats, rows: NDArray[np.intp]) -> Floats:
-    """Lam (len(rows),) that the law asks for at one state with those rows active."""
+def multipliers(
+    system: Any, case: Case, q: Floats, v: Floats, rows: NDArray[np.intp], fast: NDArray[np.bool_]
+) -> Floats:
+    """Lam (len(rows),) that the law asks for at one state with those rows active, `fast` with those of COLLISION."""
     M, f = system.terms(q, v)
     H, h, Hdv = (part[rows] for part in system.constraint(q, v))
-    a0, a1, a2 = (a[rows] for a in (case.law.a0, case.law.a1, case.law.a2))
-    law = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
+    law = case.law
+    a0, a1 = (np.where(fast, b, a)[rows] for a, b in ((law.a0, law.b0), (law.a1, law.b1)))
+    a2 = np.where(fast, 0.0, law.a2)[rows]
+    wanted = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
     inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
-    found: Floats = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + law), rcond=None)[0]
+    found: Floats = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
     return found
 
 
@@ -69,7 +75,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     worst, scale = 0.0, 0.0
     for i in some[:: max(1, len(some) // SAMPLES)]:
         rows = np.flatnonzero(closed[i])
-        lam = multipliers(system, case, run.q[i], run.v[i], rows)
+        lam = multipliers(system, case, run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION)
         worst = max(worst, float(np.max(np.abs(run.lam[i, rows] - lam))))
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / scale if scale else None

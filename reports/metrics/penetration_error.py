@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+ROUNDING = 1e-12
+"""Penetration below this part of the largest gap is rounding: collisions that take no time do not penetrate."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -21,7 +23,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     inside, exact = aligned(truth, run)
     rows = case.law.unilateral
     deepest = float(np.max(-truth.trajectory.gap[:, rows], initial=0.0))
-    if deepest == 0.0 or not inside.any():
+    if deepest <= ROUNDING * float(np.max(np.abs(truth.trajectory.gap), initial=0.0)) or not inside.any():
         return None
     return (
         float(np.max(np.abs(np.minimum(run.gap[inside][:, rows], 0.0) - np.minimum(exact.gap[:, rows], 0.0)))) / deepest
