@@ -2,6 +2,7 @@
 
 System      a mechanism: kernels, parameters, the law of every row
 simulate    one motion of it
+ensemble    many motions of it, in threads
 kernels     decorators that declare the functions of a mechanism
 """
 
@@ -12,12 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from crossbody.reference import kernels
+    from crossbody.reference._ensemble import Ensemble, ensemble
     from crossbody.reference._options import Options
     from crossbody.reference._simulate import prepare, simulate
     from crossbody.reference._system import System
 
-__all__ = ["Options", "System", "kernels", "prepare", "simulate"]
-_LAZY = {"Options": "_options", "System": "_system", "simulate": "_simulate", "prepare": "_simulate"}
+__all__ = ["Ensemble", "Options", "System", "ensemble", "kernels", "prepare", "simulate"]
+_LAZY = {"Options": "_options", "System": "_system", "simulate": "_simulate", "prepare": "_simulate"} | dict.fromkeys(
+    ("Ensemble", "ensemble"), "_ensemble"
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,11 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 import numba.core.config as numba_config
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: every process compiles for itself
+    fcntl = None  # type: ignore[assignment]
 
 
 @cache
@@ -59,11 +65,24 @@ def compiled(function: Callable[..., Any], signatures: Any = None) -> Any:
     """
     sources = _sources(function)
     before = numba_config.CACHE_DIR
-    numba_config.CACHE_DIR = str(folder(sources)) if sources else before
+    place = folder(sources) if sources else None
+    numba_config.CACHE_DIR = str(place) if place else before
     try:
-        return numba.njit(signatures, cache=bool(sources), error_model="numpy")(function)
+        with _alone(place if signatures else None):
+            return numba.njit(signatures, cache=bool(sources), error_model="numpy")(function)
     finally:
         numba_config.CACHE_DIR = before
+
+
+@contextmanager
+def _alone(place: Path | None) -> Iterator[None]:
+    """Let one process compile while the others wait for its code: a sweep starts many workers at once."""
+    if place is None or fcntl is None:
+        yield
+        return
+    with (place / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # let go when the file is closed, also by a death
+        yield
 
 
 def inlined(function: Callable[..., Any]) -> Any:

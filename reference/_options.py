@@ -36,6 +36,7 @@ class Options:
         samples: times of the rows; None for every step and both sides of every event.
         inputs: (times, values) held from each time on; None for zero.
         ledger: keep the energy account.
+        events: keep every event; without them (and with `samples`) memory does not grow with the number of bounces.
         shortcuts: closed-form arcs where the scene is affine.
         implicit: the implicit method where the explicit one is bound by stability.
         index: 1, or 3 for bilateral rows under "ida".
@@ -53,6 +54,7 @@ class Options:
     samples: ArrayLike | None = None
     inputs: tuple[ArrayLike, ArrayLike] | None = None
     ledger: bool = False
+    events: bool = True
     shortcuts: bool = True
     implicit: bool = True
     index: int = 1

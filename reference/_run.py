@@ -21,7 +21,9 @@ from crossbody.reference.core._struct import table
 
 SLICE, SLICE_S = 200, 0.05  # first steps between two looks at the clock, and the time aimed at, s
 ROWS, EVENTS, HISTORY = 256, 256, 64
-_OUTCOMES = {
+OUTCOMES = {
+    layout.DONE: Outcome.FINISHED,
+    layout.MORE: Outcome.STEP_LIMIT,
     layout.STEP_TOO_SMALL: Outcome.STEP_TOO_SMALL,
     layout.NOT_FINITE: Outcome.NOT_FINITE,
     layout.ILL_POSED: Outcome.ILL_POSED,
@@ -29,7 +31,7 @@ _OUTCOMES = {
     layout.DIVERGED: Outcome.DIVERGED,
     layout.LOST: Outcome.LOST,
 }
-_COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions")
+_COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions", "guards")
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
 
@@ -91,8 +93,9 @@ class CompiledRun:
             "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
-            "ledger": options.ledger, "has_control": system.control is not None, "rtol": options.rtol,
-            "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step, "tick": system.tick,
+            "ledger": options.ledger, "keep_events": options.events, "has_control": system.control is not None,
+            "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
+            "tick": system.tick,
         }  # fmt: skip
         for name, value in values.items():
             state[name] = value
@@ -134,7 +137,7 @@ class CompiledRun:
                 if code == layout.DONE:
                     return Outcome.FINISHED
                 if code < 0:
-                    return _OUTCOMES[code]
+                    return OUTCOMES[code]
                 self._grow(code)
                 now = time.perf_counter()
                 if now - began > self.options.time_limit:
@@ -165,14 +168,16 @@ class CompiledRun:
             t=t[:, 0], q=q, v=v, gap=gap, lam=lam, energy=energy, mode=self.buffers["modes"][: len(rows)],
             events=self._event_list(), switches=self._switch_list(), outcome=outcome, message=self._message(outcome),
             steps=int(state["steps"]), wall_s=wall_s,
-            counts=MappingProxyType({name: int(state[name]) for name in _COUNTERS}),
+            counts=MappingProxyType(
+                {name: int(state[name]) for name in _COUNTERS} | {"events": int(state["events"] + state["dropped"])}
+            ),
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
             if self.nz
             else None,
         )  # fmt: skip
 
     def _event_list(self) -> tuple[Event, ...]:
-        count = int(self.state["events"][0])
+        count = int(self.state["events"][0]) if self.options.events else 0
         times, rows, impulses = (self.buffers[name][:count].tolist() for name in _EVENT_BUFFERS[:3])
         return tuple(
             Event(t=t, contact=i, before=Mode(before), after=Mode(after), impulse=impulse)
@@ -180,7 +185,7 @@ class CompiledRun:
         )
 
     def _switch_list(self) -> tuple[Switch, ...]:
-        count = int(self.state["switches"][0])
+        count = int(self.state["switches"][0]) if self.options.events else 0
         times, changes = (self.buffers[name][:count].tolist() for name in _EVENT_BUFFERS[3:])
         return tuple(
             Switch(t=t, variable=i, before=before, after=after)

@@ -18,7 +18,8 @@ n coordinates, nc constraint rows, nu inputs, k the size of the blocks on the ma
     watch(t, q, v, p, g)                 optional: g (ng,), each positive until it fires by falling to zero
     switch(t, q, v, p, mode, fired)      optional: writes the discrete variables at the end of p, and may move the mode
                                          of a row to another; fired is the index in g, START at t = 0, or TOUCHED after
-                                         rows have switched; returns UNCHANGED, CHANGED or LOST (ends the run)
+                                         the rows have settled, until it returns UNCHANGED; else CHANGED, or LOST,
+                                         which ends the run
 
 Each is compiled for float64 and complex128, so that derivatives can be checked by complex step: use np functions
 only, and neither abs, hypot, atan2 nor a branch on a complex value. `control` and `solve` are float64 alone.

@@ -85,3 +85,13 @@ def test_events_at_one_instant_share_their_time():
     assert (first.contact, second.contact) == (0, 1)
     assert first.t == second.t == pytest.approx(1.0, abs=1e-12)
     assert run.v[-1] == pytest.approx([-1.0, 0.0, 1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("n", "lifted"), [(3, 1), (5, 1), (5, 2)])
+def test_rows_without_memory_that_rest_on_each_other_do_not_flicker(n: int, lifted: int) -> None:
+    """Held at h = 0 by their neighbours, they round to either side of it: touching balls move on as one block."""
+    start = [0.0] * n, [1.0] * lifted + [0.0] * (n - lifted)
+    run = simulate(sliders(n, a0=1e6, a1=0.0), *start, 0.01, fsm="memoryless")
+    block = 2.0 * lifted / n
+    assert run.outcome.ok, run.message
+    np.testing.assert_allclose(run.v[-1], [block - 1.0] * lifted + [block] * (n - lifted), atol=1e-9)

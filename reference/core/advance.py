@@ -77,8 +77,7 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.unsettled = 0
     s.method = EXPLICIT
     s.stalled, s.hold, s.full_jacobian = 0, 0, 0
-    remembered = s.h_active if s.na > 0 else s.h_free
-    s.h = remembered if remembered > 0.0 else choice.first_step(K, s, m, w)
+    s.h = s.h_active if s.na > 0 else s.h_free
     return 0
 
 

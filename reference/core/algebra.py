@@ -42,6 +42,10 @@ def factor_mass(M: Floats, L: Floats, n: int, k: int) -> int:
 @compiled
 def solve_mass(L: Floats, x: Array, k: int, first: int, last: int) -> None:
     """X := M^-1 x, in place, for the blocks from coordinate `first` up to `last`."""
+    if k == 1:
+        for i in range(first, last):
+            x[i] /= L[i, 0] * L[i, 0]
+        return
     for b in range(first, last, k):
         for i in range(k):
             total = x[b + i]

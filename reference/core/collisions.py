@@ -22,6 +22,7 @@ from crossbody.reference.core.acceleration import GENERAL, accelerate, activate,
 from crossbody.reference.core.algebra import solve_schur
 from crossbody.reference.core.journal import full, move, write_event
 from crossbody.reference.core.layout import (
+    BALLISTIC,
     COLLISION,
     CONTACT,
     EVENTS_FULL,
@@ -33,7 +34,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.core.machine import DEEP, released_mode, slow
+from crossbody.reference.core.machine import DEEP, slow
 
 TIE = 1e-12  # rates closer than this are the same: the first row is struck first
 PULL = 1e-12  # part of the struck row's impulse below which a held row's is rounding
@@ -128,12 +129,20 @@ def _pulling(s: Any, m: Model, w: Work) -> int:
 
 
 @inlined
+def _parted(w: Work, i: int) -> int:
+    """The mode of a row that has let go."""
+    return BALLISTIC if w.gap[i] < -DEEP else FREE
+
+
+@inlined
 def _let_go(s: Any, m: Model, w: Work, b: Buffers, i: int) -> None:
     """Take row i, and what follows it, out of the map."""
     if w.struck[i] != NOT:
+        if w.struck[i] == BOUNCES:
+            write_event(s, b, i, COLLISION, b.mode[i], 0.0)
         w.struck[i] = NOT
         return
-    move(s, b, i, released_mode(b.mode[i], w.gap[i]) if w.gap[i] < -DEEP else FREE)
+    move(s, b, i, _parted(w, i))
     for c in range(s.nc):
         if m.follows[c] == i:
             b.mode[c] = b.mode[i]
@@ -141,7 +150,7 @@ def _let_go(s: Any, m: Model, w: Work, b: Buffers, i: int) -> None:
 
 @inlined
 def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
-    """The jump of v, its work in the ledger, and the struck rows' transitions."""
+    """The jump of v, its work in the ledger, and the end of the struck rows' collisions."""
     v = w.y[s.n :]
     push_rows(m, w, s.na, w.la, 1.0, v)
     for j in range(s.na):
@@ -152,8 +161,7 @@ def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
                 after += w.H[j, c] * v[c]
             w.z[i] += 0.5 * w.la[j] * (w.hda[j] + after)
         if w.struck[i] == BOUNCES:
-            move(s, b, i, COLLISION)
-            after_mode = CONTACT if w.ha[j] == 0.0 else FREE
+            after_mode = CONTACT if w.ha[j] == 0.0 else _parted(w, i)
             write_event(s, b, i, COLLISION, after_mode, w.la[j])
             b.mode[i] = after_mode
 
@@ -162,6 +170,9 @@ def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
 def _one(K: Any, s: Any, m: Model, w: Work, b: Buffers, known: bool) -> int:
     """One collision of the rows marked; with known = True the free acceleration stands in vd from the one before."""
     n = s.n
+    for i in range(s.nc):
+        if w.struck[i] == BOUNCES:
+            write_event(s, b, i, b.mode[i], COLLISION, 0.0)
     while True:
         if not known:
             activate(s, m, w, b.mode)

@@ -110,6 +110,7 @@ def watch_multipliers(s: Any, w: Work) -> None:
 @inlined
 def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float) -> None:
     """Take the gaps at a stage into the extremes."""
+    s.guards += 1
     K.gaps(t, w.ys[: s.n], w.ys[s.n :], m.p, w.gap, w.rate)
     for i in range(s.nc):
         w.gap_lo[i] = min(w.gap_lo[i], w.gap[i])

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core import dense
@@ -26,7 +28,9 @@ from crossbody.reference.core.guards import (
     SWITCH,
     TOUCH,
     TOUCH_INSIDE,
+    dead_band,
     guard,
+    rise,
     root,
 )
 from crossbody.reference.core.layout import (
@@ -96,7 +100,7 @@ def _leave(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """First rise above the surface."""
     for node in range(NODES - 1):
         a, b = _place(node), _place(node + 1)
-        ha, hb = w.gaps[node, i], w.gaps[node + 1, i]
+        ha, hb = w.gaps[node, i] - rise(s), w.gaps[node + 1, i] - rise(s)
         start = max(-ha, 1e-300)
         if hb > 0.0:
             return root(K, s, m, w, mode, LEAVE, i, a, start, b, -hb)
@@ -126,13 +130,14 @@ def _by_nodes(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int)
 @inlined
 def _release(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """First loss of pressure of an active row; a dip between nodes is looked for at its parabola's vertex."""
+    dead = dead_band(s, w, i)
     for node in range(NODES - 1):
         a, b = _place(node), _place(node + 1)
-        la, lb = max(w.lams[node, i], 1e-300), w.lams[node + 1, i]
+        la, lb = max(w.lams[node, i] + dead, 1e-300), w.lams[node + 1, i] + dead
         if not lb >= 0.0:
             return root(K, s, m, w, mode, RELEASE, i, a, la, b, lb)
-        if node + 2 < NODES and lb < la and lb < w.lams[node + 2, i]:
-            dip = _vertex(b, b - a, la, lb, w.lams[node + 2, i])
+        if node + 2 < NODES and lb < la and lb < w.lams[node + 2, i] + dead:
+            dip = _vertex(b, b - a, la, lb, w.lams[node + 2, i] + dead)
             value = guard(K, s, m, w, mode, RELEASE, i, dip)
             if value < 0.0:
                 left, g_left = (a, la) if dip <= b else (b, max(lb, 1e-300))
@@ -241,6 +246,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
         t = s.t_old + _place(node) * s.hs
         q, v = w.ys[: s.n], w.ys[s.n :]
         K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])
+        s.guards += 1
         if multipliers:
             if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
                 return 1
@@ -287,6 +293,44 @@ def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     return 0
 
 
+@inlined
+def _all_free(s: Any, m: Model, mode: Bytes) -> bool:
+    """Whether nothing but free flight in closed form is under way."""
+    if s.method != EXACT or s.na > 0 or s.fsm == EDGE:
+        return False
+    others = 0
+    for i in range(s.nc):
+        others += m.unilateral[i] and m.follows[i] < 0 and mode[i] != FREE
+    return others == 0
+
+
+@inlined
+def _fall(h: float, rate: float, a: float) -> float:
+    """Last time at which h + rate t + a t^2/2 falls to zero; 0 if it is below all along, infinite if it never falls."""
+    square = rate * rate - 2.0 * a * h
+    if square < 0.0:
+        return np.inf if h > 0.0 else 0.0
+    if rate < 0.0:
+        return float(max(2.0 * h / (np.sqrt(square) - rate), 0.0))
+    return float((rate + np.sqrt(square)) / -a) if a < 0.0 else np.inf
+
+
+@inlined
+def _free_flight(s: Any, w: Work, i: int) -> float:
+    """First touch of a FREE row in free flight, where its gap is a parabola: in closed form."""
+    h, rate = w.gaps[0, i], w.rates[0, i]
+    a = (w.rates[NODES - 1, i] - rate) / s.hs
+    if h > s.touch:
+        w.kind[i] = TOUCH
+        t = _fall(h, rate, a)
+    else:
+        w.kind[i] = TOUCH_INSIDE
+        # clearly behind the threshold, so that rounding does not leave it where it was
+        closing = -(1.5 * slow(s) + rate) / a if a < 0.0 else np.inf
+        t = max(_fall(h - s.touch, rate, a), closing)
+    return float(t / s.hs) if t <= s.hs else NEVER
+
+
 @compiled
 def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 1 if ill posed."""
@@ -302,6 +346,14 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             any_gap = True
             any_multiplier = any_multiplier or is_active(mode[i])
     if not any_gap:
+        return 0
+    if _all_free(s, m, mode):
+        for i in range(s.nc):
+            if w.hit[i] == 1.0:
+                w.hit[i] = _free_flight(s, w, i)
+                s.theta = min(s.theta, w.hit[i])
+        if s.theta <= 1.0:
+            _tie(s, w)
         return 0
     if dense.prepare(K, s, m, w) != 0 or _fill_nodes(K, s, m, w, any_multiplier) != 0:
         return 1

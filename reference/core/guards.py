@@ -11,7 +11,7 @@ from crossbody.reference._kinds import Bytes
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.core.layout import MEMORYLESS, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, slow
 
 # Guards: each is positive until it fires.
@@ -42,27 +42,41 @@ def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
     return np.nan
 
 
+@inlined
+def dead_band(s: Any, w: Work, i: int) -> float:
+    """What a multiplier may fall below zero before a row without memory, which may press again at once, lets go."""
+    return float(w.noise[i]) if s.fsm == MEMORYLESS else 0.0
+
+
+@inlined
+def rise(s: Any) -> float:
+    """How far a gap must open before a row is FREE: one without memory, held at the surface, rounds to either side."""
+    return float(s.touch) if s.fsm == MEMORYLESS else 0.0
+
+
 @compiled
 def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> float:
     """Value of one guard at the part theta of the step."""
+    s.guards += 1
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
     q, v = w.ys[: s.n], w.ys[s.n :]
     if kind == RELEASE:
-        return _multiplier(K, s, m, w, i, t)
+        return _multiplier(K, s, m, w, i, t) + dead_band(s, w, i)
     if kind == HANDOVER:
         return _handover(K, s, m, w, i, t)
     if kind == SWITCH:
         K.watch(t, q, v, m.p, w.guard)
         return float(w.guard[i])
     if kind == PRESS:
-        return -multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+        lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+        return float(w.noise[i] - lam)
     K.gaps(t, q, v, m.p, w.gap, w.rate)
     h, rate = w.gap[i], w.rate[i]
     if kind == TOUCH:
         return float(h)
     if kind == LEAVE:
-        return float(-h)
+        return float(rise(s) - h)
     if kind == RATE:
         return float(-rate)
     if kind == RATE_DOWN:

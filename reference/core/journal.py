@@ -71,6 +71,11 @@ def write_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
 
 @inlined
 def full(s: Any, b: Buffers) -> bool:
-    """Whether the next instant may not find room for its events."""
+    """Whether the next instant may not find room for its events; those not to be kept are counted and dropped."""
     room = 16 * s.nc + 16
-    return bool(s.events + room > len(b.events_t) or s.switches + 16 * s.nd > len(b.switches_t))
+    lacking = bool(s.events + room > len(b.events_t) or s.switches + 16 * s.nd > len(b.switches_t))
+    if lacking and not s.keep_events:
+        s.dropped += s.events
+        s.events, s.switches = 0, 0
+        return False
+    return lacking

@@ -45,6 +45,7 @@ STATE = np.dtype(
         ("implicit", "i8"),
         ("natural", "i8"),
         ("ledger", "i8"),
+        ("keep_events", "i8"),
         ("has_control", "i8"),
         ("has_switch", "i8"),
         ("rtol", "f8"),
@@ -100,6 +101,8 @@ STATE = np.dtype(
         ("exact_steps", "i8"),
         ("factorisations", "i8"),
         ("collisions", "i8"),
+        ("guards", "i8"),
+        ("dropped", "i8"),
     ]
 )
 

@@ -88,7 +88,9 @@ def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     n = s.n
     activate(s, m, w, mode)
     s.have_jacobian = 0
-    K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+    if s.nc > 0:
+        s.guards += 1
+        K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
     if derivative(K, s, m, w, s.t, w.y, START) != 0:
         return ILL_POSED
     scatter(s, w, w.lam)
@@ -132,13 +134,14 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int) -> bool:
     w.idx[j] = i
     clear(m, w, j)
     K.rows(s.t, w.y[:n], w.y[n:], m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
-    push, rate = 0.0, 0.0
+    push, size, rate = 0.0, abs(w.Hdv[j]), 0.0
     for c in range(m.span[i, 0], m.span[i, 1]):
         push += w.H[j, c] * w.k[START, n + c]
+        size += abs(w.H[j, c] * w.k[START, n + c])  # bodies in free fall cancel
         rate += w.H[j, c] * w.y[n + c]
     h, a0, a1, a2 = w.ha[j], w.law[i, 0], w.law[i, 1], w.law[i, 2]
     spring = (a0 + a2 * h * h) * h
-    size = abs(push) + abs(w.Hdv[j]) + a1 * abs(rate) + abs(spring)
+    size += a1 * abs(rate) + abs(spring)
     return bool(-(push + w.Hdv[j] + a1 * rate + spring) > ROUNDING * size + _from_state(s, w, i))
 
 
@@ -157,8 +160,11 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     h, rate = w.gap[i], w.rate[i]
     if is_active(mode[i]):
         return released_mode(mode[i], h) if w.lam[i] < -w.noise[i] else int(mode[i])
-    if h > 0.0:
+    collides = s.frozen != 0 and m.beta[i, 0] > 0.0
+    if h > (s.touch if collides and mode[i] == FREE else 0.0):
         return FREE
+    if collides and rate < -slow(s):
+        return int(mode[i])
     if mode[i] != FREE:
         closing = rate < -slow(s)
         return active_mode(s, m, i) if closing and _would_press(K, s, m, w, mode, i) else int(mode[i])
@@ -174,11 +180,11 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
 @inlined
 def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the complementarity problem's next pivot puts row i; below the surface it is CONTACT or BALLISTIC."""
-    if mode[i] == FREE and not (w.gap[i] <= 0.0 and (w.rate[i] <= slow(s) or w.gap[i] < -DEEP)):
+    if mode[i] == FREE and not (w.gap[i] <= s.touch and (w.rate[i] <= slow(s) or w.gap[i] < -DEEP)):
         return FREE
     if is_active(mode[i]):
         return BALLISTIC if w.lam[i] < -w.noise[i] else CONTACT
-    if w.gap[i] > 0.0:
+    if w.gap[i] > s.touch:
         return FREE
     return CONTACT if _would_press(K, s, m, w, mode, i) else BALLISTIC
 

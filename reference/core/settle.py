@@ -9,12 +9,12 @@ from crossbody.reference.core.acceleration import GENERAL, accelerate
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.collisions import collide
 from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
-from crossbody.reference.core.layout import EDGE, LEVEL, LOST, MODE_CYCLE, Buffers, Model, Work
+from crossbody.reference.core.layout import EDGE, LEVEL, LOST, MEMORYLESS, MODE_CYCLE, Buffers, Model, Work
 from crossbody.reference.core.machine import evaluate, next_mode, noise
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
-TOUCHING = 64.0 * ULP  # of the largest coordinate: a gap below it is closed as far as rounding tells
+TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
 SWITCH_ROUNDS = 32  # switches that follow one another at one instant
 
 
@@ -47,7 +47,7 @@ def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
 @inlined
 def _touching(s: Any, w: Work) -> None:
     """How large a gap rounding alone can make of a touch."""
-    largest = 0.0
+    largest = 1.0
     for a in range(s.n):
         largest = max(largest, abs(w.y[a]))
     s.touch = TOUCHING * largest
@@ -63,17 +63,16 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         code = evaluate(K, s, m, w, b.mode)
         if code != 0:
             return int(code)
-        if s.frozen:
-            struck = s.collisions
-            code = collide(K, s, m, w, b)
-            if code != 0:
-                return int(code)
-            if s.collisions > struck:
-                s.history, s.one_by_one = 0, 0  # another velocity: mode sets may stand again
-                continue
         _consistent(K, s, m, w)
         if _pass(K, s, m, w, b) == 0:
-            return 0
+            if not s.frozen:
+                return 0
+            struck = s.collisions
+            code = collide(K, s, m, w, b)
+            if code != 0 or s.collisions == struck:
+                return int(code)
+            s.history, s.one_by_one = 0, 0  # another velocity: mode sets may stand again
+            continue
         if remember(s, b):
             if s.one_by_one:
                 return MODE_CYCLE
@@ -98,7 +97,7 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         0, EVENTS_FULL if the caller must make room and come again, or a negative code. After MODE_CYCLE the last line
         of the history marks the rows that switch for ever.
     """
-    if s.frozen:
+    if s.frozen or s.fsm == MEMORYLESS:
         _touching(s, w)
     code = _iterate(K, s, m, w, b)
     rounds = 0

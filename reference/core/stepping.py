@@ -59,7 +59,9 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
     if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     scatter(s, w, w.lams[last])
-    K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
+    if s.nc > 0:
+        s.guards += 1
+        K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
     for i in range(s.nc):
         w.lams[0, i] = w.lam0[i]
         if not (np.isfinite(w.gaps[last, i]) and np.isfinite(w.rates[last, i]) and np.isfinite(w.lams[last, i])):
@@ -77,6 +79,8 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
 def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Take one step of the present method within the tolerance; y1 and the end's derivative are there afterwards."""
     s.have_dense = 0
+    if s.h == 0.0:
+        s.h = choice.first_step(K, s, m, w)
     if s.has_control and s.method == EXPLICIT and _short_step(K, s, m, w):
         return _finish(K, s, m, w)
     s.end = esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES

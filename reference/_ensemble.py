@@ -1,0 +1,198 @@
+"""Many runs of one mechanism, each with its own start, parameters and law, in threads without the interpreter."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from queue import SimpleQueue
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crossbody.cases import InvalidValue, SceneError, UnknownName
+from crossbody.cases._arrays import frozen
+from crossbody.reference._kinds import Floats, Index
+from crossbody.reference._options import Options
+from crossbody.reference._program import program
+from crossbody.reference._run import OUTCOMES, CompiledRun
+from crossbody.reference._system import System, initial_modes
+from crossbody.reference.core.layout import MORE, open_buffers, open_model, open_work
+
+CONSTANTS = ("a0", "a1", "a2", "b0", "b1", "b2")
+CHUNKS = 16  # parts a thread takes, so that none waits long for another
+SLICE = 1000  # steps between two looks at the bound on steps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ensemble:
+    """Where many runs ended.
+
+    Attributes:
+        t (N,): time reached, s: the horizon, unless a run failed.
+        q, v (N, n): state there.
+        outcome (N,): how each ended, as `Outcome`.
+        steps, events (N,): counts.
+        wall_s: time of all runs together, s.
+    """
+
+    t: Floats
+    q: Floats
+    v: Floats
+    outcome: NDArray[Any]
+    steps: Index
+    events: Index
+    wall_s: float
+
+
+def ensemble(
+    system: System,
+    q0: ArrayLike,
+    v0: ArrayLike,
+    t_end: float,
+    *,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    law: Mapping[str, ArrayLike] | None = None,
+    threads: int | None = None,
+    **options: Any,
+) -> Ensemble:
+    """Run one mechanism N times to t_end.
+
+    Args:
+        system: the mechanism; what is not given below is its own.
+        q0: positions at the start (N, n); N is the number of runs.
+        v0: velocities at the start (N, n).
+        t_end: horizon, s.
+        parameters: name -> (N,) values of the system's named parameters.
+        law: a0, a1, a2, b0, b1, b2 -> (N,) or (N, nc).
+        threads: at most the processors at hand, which is the default.
+        options: as in `Options`, without samples and events: nothing is recorded on the way.
+
+    Raises:
+        SceneError: for an array of another shape.
+        UnknownName: for a parameter or constant that the system does not have.
+        InvalidValue: for an option or a number of threads outside its range.
+    """
+    job = _Job(system, q0, v0, parameters or {}, law or {})
+    settings = Options(t_end=t_end, samples=(), events=False, **options)
+    count = threads or len(os.sched_getaffinity(0))
+    if not 1 <= count <= 1024:
+        raise InvalidValue(f"threads is {threads}; valid: 1 to 1024.")
+    spaces: SimpleQueue[CompiledRun] = SimpleQueue()
+    for _ in range(count):
+        spaces.put(_space(system, job, settings))
+    loop = _loop(tuple(system.kernels.values()))
+    job.call(loop, spaces, 0, 0)  # compiles
+    edges = np.unique(np.linspace(0, job.size, count * CHUNKS + 1).astype(int))
+    began = time.perf_counter()
+    with ThreadPoolExecutor(count) as pool:
+        list(pool.map(lambda ends: job.call(loop, spaces, *ends), pairwise(edges)))
+    return job.result(time.perf_counter() - began)
+
+
+def _space(system: System, job: _Job, settings: Options) -> CompiledRun:
+    run = CompiledRun(system, job.starts[0, : system.n], job.starts[0, system.n :], settings)
+    run.start()
+    return run
+
+
+class _Job:
+    """Inputs and outputs of all runs, one line a run."""
+
+    def __init__(
+        self, system: System, q0: ArrayLike, v0: ArrayLike, given: Mapping[str, ArrayLike], law: Mapping[str, ArrayLike]
+    ) -> None:
+        self.system, n = system, system.n
+        q = frozen("ensemble", "q0", q0, (None, n))
+        self.size = len(q)
+        if not self.size:
+            raise SceneError("ensemble.q0 has no line; give one start a run.")
+        v = frozen("ensemble", "v0", v0, (self.size, n))
+        self.starts = np.ascontiguousarray(np.hstack([q, v]))
+        if not np.all(np.isfinite(self.starts)):
+            raise SceneError("ensemble.q0 and v0 must be finite.")
+        self.p = np.tile(np.asarray(system.p), (self.size, 1))
+        names = list(system.parameters) if isinstance(system.parameters, Mapping) else []
+        for name, values in given.items():
+            if name not in names:
+                raise UnknownName("parameter", name, names)
+            self.p[:, names.index(name)] = self._column(name, values)
+        self.laws = np.tile(np.stack([system.alpha, system.beta]), (self.size, 1, 1, 1))
+        for name, values in law.items():
+            self._put_constant(name, values)
+        self.out = np.zeros((self.size, 1 + 2 * n))
+        self.counts = np.zeros((self.size, 3), np.int64)
+
+    def _column(self, name: str, values: ArrayLike) -> Floats:
+        column: Floats = frozen("ensemble", name, values, (self.size,))
+        if not np.all(np.isfinite(column)):
+            raise SceneError(f"ensemble.{name} must be finite.")
+        return column
+
+    def _put_constant(self, name: str, values: ArrayLike) -> None:
+        if name not in CONSTANTS:
+            raise UnknownName("constant", name, CONSTANTS)
+        array = np.asarray(values, dtype=float)
+        full = np.repeat(array[:, None], self.system.nc, axis=1) if array.ndim == 1 else array
+        full = frozen("ensemble", name, full, (self.size, self.system.nc))
+        if not np.all(np.isfinite(full)) or np.any(full < 0.0):
+            raise SceneError(f"ensemble.{name} must be finite and at least 0.")
+        self.laws[:, "ab".index(name[0]), :, int(name[1])] = full
+
+    def call(self, loop: Any, spaces: SimpleQueue[CompiledRun], first: int, last: int) -> None:
+        """Do the runs from first to last in one workspace."""
+        run = spaces.get()
+        try:
+            loop(
+                first, last, run.template, run.state, *run.tables, self.p, self.laws, self.starts,
+                initial_modes(self.system), self.out, self.counts, min(run.options.max_steps, 2**62),
+            )  # fmt: skip
+        finally:
+            spaces.put(run)
+
+    def result(self, wall_s: float) -> Ensemble:
+        """What was written."""
+        n = self.system.n
+        return Ensemble(
+            t=self.out[:, 0], q=self.out[:, 1 : 1 + n], v=self.out[:, 1 + n :],
+            outcome=np.array([OUTCOMES[int(code)] for code in self.counts[:, 0]], dtype=object),
+            steps=self.counts[:, 1], events=self.counts[:, 2], wall_s=wall_s,
+        )  # fmt: skip
+
+
+@cache
+def _loop(functions: tuple[Any, ...]) -> Any:
+    """The program over a range of runs, without the interpreter's lock."""
+    advance = program()
+    dynamics, gaps, rows, energy, power, solve, control, watch, switch = functions
+
+    def runs(first, last, template, state, model, work, buffers, p, laws, starts, modes, out, counts, limit):  # type: ignore[no-untyped-def]  # fmt: skip
+        m, w, b = open_model(model), open_work(work), open_buffers(buffers)
+        s = state[0]
+        for r in range(first, last):
+            state[0] = template[0]
+            m.p[:] = p[r]
+            m.alpha[:] = laws[r, 0]
+            m.beta[:] = laws[r, 1]
+            b.mode[:] = modes
+            w.y[:] = starts[r]
+            w.u[:] = 0.0
+            w.s[:] = 0.0
+            w.z[:] = 0.0
+            code = MORE
+            while code == MORE and s.steps < limit:
+                code = advance(
+                    dynamics, gaps, rows, energy, power, solve, control, watch, switch,
+                    state, model, work, buffers, min(SLICE, limit - s.steps),
+                )  # fmt: skip
+            out[r, 0] = s.t
+            out[r, 1:] = w.y
+            counts[r, 0], counts[r, 1], counts[r, 2] = code, s.steps, s.events + s.dropped
+
+    return numba.njit(nogil=True)(runs)
