@@ -94,7 +94,7 @@ _OTHER_PHYSICS = (
 def limits(variant: str, claims: Iterable[Claim]) -> tuple[Limit, ...]:
     """The limits of one variant: errors always, and what it claims."""
     claimed = {claim.metric for claim in claims}
-    bounds = _ERRORS | {metric: bound for metric, bound in _CLAIMS.items() if metric in claimed}
+    bounds = {**_ERRORS, **{metric: bound for metric, bound in _CLAIMS.items() if metric in claimed}}
     return tuple(_all(variant, bounds))
 
 
