@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 from crossbody.cases._case import Parameter, Value
 from crossbody.cases._errors import InvalidValue
@@ -216,9 +215,3 @@ def start(maze: Maze, p: Mapping[str, Value]) -> tuple[float, float]:
 def tilted_gravity(p: Mapping[str, Value]) -> float:
     """Gravity in the plane of the maze, m/s^2."""
     return float(p["gravity"]) * math.sin(math.radians(float(p["tip"])))
-
-
-def clearances(maze: Maze) -> tuple[float, ...]:
-    """Radial clearance of the ball in every channel between rings, m."""
-    radii = [(ring.inner, ring.outer) for ring in maze.rings] + [(maze.wall, maze.wall)]
-    return tuple(b[0] - a[1] - 2.0 * maze.ball for a, b in pairwise(radii))
