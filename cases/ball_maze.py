@@ -64,6 +64,8 @@ PARAMETERS = {
     "t_end": _positive(75.0, "s", "horizon"),
 }  # fmt: skip
 
+TIGHT = 1e-11
+"""Tolerance of the truth: what a0 makes of the rounding of a position counts in a settled contact before 1e-13."""
 LOCKED = 1e6
 """Inertia of a locked maze, kg m^2: it turns by less than 1e-9 rad/s^2."""
 
@@ -120,5 +122,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         claims=claims(variant, p, maze),
         limits=limits(variant),
         discrete=DISCRETE,
+        tight=TIGHT,
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

@@ -42,6 +42,8 @@ NG = 16
 """Watched functions: gap and push of each normal row, then these."""
 ROUNDING = 1e-15
 """Gap that is none, m: rounding of a radius."""
+SLOW = 1e-8
+"""Rate of a gap that stands still, m/s: what an integrator makes of it where a ball leaves a face."""
 OVERRUN = 1e-9
 """Depth at which a free row counts as closed though its touch was not found, m."""
 GIVEN_UP = math.radians(60.0)
@@ -214,7 +216,7 @@ class MazeMachine:
             h, H, Hdv = formula(q, v)
             near = 0.0 if 2 * i in fired or abs(h) < ROUNDING else h
             hd, mode = _dot(H, v), modes[i]
-            if mode == FREE and _touches(near, hd, lambda H=H, Hdv=Hdv: _dot(H, vd) + Hdv):  # type: ignore[misc]
+            if mode == FREE and i not in switched and _touches(near, hd, lambda H=H, Hdv=Hdv: _dot(H, vd) + Hdv):  # type: ignore[misc]
                 modes[i] = CONTACT
             elif mode == CONTACT and _released(float(lam[i]), hd, i in switched, 2 * i + 1 in fired):
                 modes[i] = FREE if h > 0.0 else BALLISTIC
@@ -247,7 +249,7 @@ def _dot(H: State, v: State | Floats) -> float:
 
 
 def _touches(h: float, hd: float, gap_acceleration: Callable[[], float]) -> bool:
-    if h == 0.0 and hd == 0.0:
+    if h == 0.0 and abs(hd) < SLOW:
         return gap_acceleration() < 0.0
     return h < -OVERRUN or (h <= 0.0 and hd < 0.0)
 

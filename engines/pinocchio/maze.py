@@ -18,7 +18,7 @@ from crossbody.engines.pinocchio._maze_law import MazeLaw, audit
 from crossbody.engines.pinocchio._rows import ALGEBRA
 
 SETTINGS = {
-    "rtol": Parameter(default=1e-10, doc="relative tolerance", low=1e-14, high=1e-1),
+    "rtol": Parameter(default=1e-12, doc="relative tolerance", low=1e-14, high=1e-1),
     "method": Parameter(default="BDF", doc="linear multistep method of CVODE", choices=("BDF", "Adams")),
     "algebra": Parameter(default="forwardDynamics", doc="how v' and lam are solved for", choices=tuple(ALGEBRA)),
     "max_steps": Parameter(default=1_000_000, doc="bound on the number of steps", low=1, high=1e9),
