@@ -20,7 +20,7 @@ from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases._arrays import frozen
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import Options
-from crossbody.reference._program import program
+from crossbody.reference._program import address
 from crossbody.reference._run import OUTCOMES, CompiledRun
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core.layout import MORE, open_buffers, open_model, open_work
@@ -169,7 +169,7 @@ class _Job:
 @cache
 def _loop(functions: tuple[Any, ...]) -> Any:
     """The program over a range of runs, without the interpreter's lock."""
-    advance = program()
+    advance = address()
     dynamics, gaps, rows, energy, power, solve, control, watch, switch = functions
 
     def runs(first, last, template, state, model, work, buffers, p, laws, starts, modes, out, counts, limit):  # type: ignore[no-untyped-def]  # fmt: skip

@@ -21,21 +21,50 @@ def _state() -> Any:
     return numba.typeof(np.zeros(1, STATE))
 
 
+def _signature() -> Any:
+    functions = [kernels.function_type(name) for name in kernels.NAMES]
+    return types.int64(*functions, _state(), TABLE, TABLE, TABLE, types.int64)
+
+
 @cache
 def program() -> Any:
     """The function `advance`, from the cache or compiled (once per installation)."""
-    functions = [kernels.function_type(name) for name in kernels.NAMES]
-    return compiled(core.advance, [types.int64(*functions, _state(), TABLE, TABLE, TABLE, types.int64)])
+    return compiled(core.advance, [_signature()])
+
+
+class Address(types.WrapperAddressProtocol):  # type: ignore[misc]
+    """A compiled function by its address.
+
+    Named as such in other compiled code it is called, not compiled with it once more: that took seconds.
+    """
+
+    def __init__(self, function: Any, signature: Any) -> None:
+        self._signature = signature
+        self._compiled = function.overloads[signature.args]  # the code lives as long as its address is known
+
+    def __wrapper_address__(self) -> int:
+        """Where it stands, callable from C."""
+        name = self._compiled.fndesc.llvm_cfunc_wrapper_name
+        return int(self._compiled.library.get_pointer_to_function(name))
+
+    def signature(self) -> Any:
+        """What it takes and returns."""
+        return self._signature
+
+
+@cache
+def address() -> Address:
+    """The program, to be named in other compiled code."""
+    return Address(program(), _signature())
 
 
 @cache
 def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """The program with one system's kernels built in.
 
-    Handing nine functions over from Python costs more than a short run; an entry names them as constants. It is worth
-    its compilation for runs that are repeated.
+    Handing nine functions over from Python costs more than a short run; an entry names them as constants.
     """
-    advance = program()
+    advance = address()
     dynamics, gaps, rows, energy, power, solve, control, watch, switch = functions
 
     def call(state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
