@@ -220,12 +220,13 @@ def _begin_run(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     for i in range(s.nc):
         s.switching |= m.unilateral[i]
     s.history_t, s.collision_t = np.inf, np.inf
-    if s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST:
-        return LOST
+    lost = s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST
     _take_inputs(K, s, m, w, b)
     code = _restart(K, s, m, w, b)
     if code == 0:
         _first_rows(K, s, m, w, b)
+        if lost:
+            return LOST
     return code
 
 
