@@ -93,7 +93,7 @@ def _law(at: Point, H: Array, v: Array, h: Array, drift: Array) -> Array:
     return law
 
 
-def _residual(at: Point, q: Array, v: Array, u: Array, vd: Floats, lam: Floats) -> Array:
+def residual(at: Point, q: Array, v: Array, u: Array, vd: Floats, lam: Floats) -> Array:
     blocks, f, H, h, drift = _terms(at, q, v, u)
     inertia = (blocks @ vd.reshape(len(blocks), -1, 1)).ravel()
     return np.concatenate([inertia - f - lam @ H, H @ vd + _law(at, H, v, h, drift)])
@@ -145,7 +145,7 @@ def derivatives(at: Point) -> Derivatives:
         moved = x.copy()
         moved[k] += 1j * STEP
         q, v, u = np.split(moved, [n, 2 * n])
-        columns[:, k] = _residual(at, q, v, u, vd, lam).imag / STEP
+        columns[:, k] = residual(at, q, v, u, vd, lam).imag / STEP
         if k < 2 * n:
             gaps[:, k] = _gaps(at, q, v).imag / STEP
     solved = -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
