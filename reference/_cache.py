@@ -10,8 +10,9 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -74,15 +75,30 @@ def compiled(function: Callable[..., Any], signatures: Any = None) -> Any:
         numba_config.CACHE_DIR = before
 
 
+_INSIDE = threading.RLock()
+_depth = 0
+
+
 @contextmanager
 def _alone(place: Path | None) -> Iterator[None]:
-    """Let one process compile while the others wait for its code: a sweep starts many workers at once."""
+    """Let one process compile while the others wait for its code: a sweep starts many workers at once.
+
+    One lock serves all folders, and a process takes it once: reading compiled code back may import what compiles too.
+    """
+    global _depth
     if place is None or fcntl is None:
         yield
         return
-    with (place / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # let go when the file is closed, also by a death
-        yield
+    with _INSIDE, ExitStack() as held:
+        if _depth == 0:
+            with suppress(OSError):  # a place that only this process can write needs no lock
+                lock = held.enter_context((place.parent / "compiling").open("a"))
+                fcntl.flock(lock, fcntl.LOCK_EX)  # let go when the file is closed, also by a death
+        _depth += 1
+        try:
+            yield
+        finally:
+            _depth -= 1
 
 
 def inlined(function: Callable[..., Any]) -> Any:
