@@ -1,8 +1,8 @@
 """What the engines for bodies on a line share: a prepared run, and trajectories from what an engine recorded.
 
 An adaptive integrator records its steps alone. Where a gap changes its sign between two of them, the state there is
-put in from the one on the open side, whose acceleration is constant while nothing touches: a straight line would
-misplace the touch by more than the run is wrong.
+put in from the one on the open side, whose acceleration is constant while nothing touches; likewise where a force
+falls to zero below the surface. A straight line would misplace both by more than the run is wrong.
 """
 
 from __future__ import annotations
@@ -13,10 +13,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
 
 from crossbody.cases import Case, Event, Mode, Outcome, Trajectory
 from crossbody.cases._arrays import Bytes, Floats
 from crossbody.engines._line import FREE, MECHANISMS, Line
+
+ROUNDING = 1e-9
+"""A multiplier below this part of the largest is zero where a crossing was put in."""
+Crossing = tuple[int, float, Floats, Floats]
+"""Before which sample, when (s), and q and v there."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -62,7 +69,8 @@ def sampled(
     at, new = _crossings(line, t, q, v)
     if len(at):
         t, q, v = (np.insert(a, at, b, axis=0) for a, b in zip((t, q, v), new, strict=True))
-        lam = np.insert(lam, at, line.memoryless(*new[1:]), axis=0)
+        push = line.memoryless(*new[1:])
+        lam = np.insert(lam, at, np.where(push > ROUNDING * np.max(np.abs(lam), initial=0.0), push, 0.0), axis=0)
     gap, energy = line.observe(q, v)
     mode = line.modes(q, v, lam)
     return Trajectory(
@@ -71,20 +79,34 @@ def sampled(
 
 
 def _crossings(line: Line, t: Floats, q: Floats, v: Floats) -> tuple[list[int], tuple[Floats, Floats, Floats]]:
-    """Before which samples a gap passes zero, and t, q, v there, in order."""
-    h, hd = line.gaps(q), line.rates(v)
-    found = []
-    for i, row in np.argwhere(h[1:] * h[:-1] < 0.0):
-        side = i if h[i, row] > 0.0 else i + 1
-        a = line.acceleration(q[side], v[side])
-        tau = _root(0.5 * float(line.rates(a)[row]), float(hd[side, row]), float(h[side, row]))
-        if t[i] < t[side] + tau < t[i + 1]:
-            found.append((i + 1, t[side] + tau, q[side] + tau * (v[side] + 0.5 * tau * a), v[side] + tau * a))
-    found.sort(key=lambda entry: entry[1])
+    """Before which samples a gap passes zero, or below it what would push, and t, q, v there, in order."""
+    h, lam = line.gaps(q), line.spring(q, v)
+    found = [_touch(line, t, q, v, i, row) for i, row in np.argwhere(h[1:] * h[:-1] < 0.0)]
+    below = (h[1:] < 0.0) & (h[:-1] < 0.0) & (lam[1:] * lam[:-1] < 0.0) & line.unilateral
+    found += [_turn(line, t, q, v, i, row) for i, row in np.argwhere(below)]
+    kept = sorted((e for e in found if e is not None), key=lambda entry: entry[1])
     n = len(line.masses)
-    where = [int(e[0]) for e in found]
-    there = [np.reshape([e[k] for e in found], (-1, n)) for k in (2, 3)]
-    return where, (np.array([e[1] for e in found]), there[0], there[1])
+    there = [np.reshape([e[k] for e in kept], (-1, n)) for k in (2, 3)]
+    return [e[0] for e in kept], (np.array([e[1] for e in kept]), there[0], there[1])
+
+
+def _touch(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Crossing | None:
+    """From the state on the open side of a step, whose acceleration is constant."""
+    side = i if line.gaps(q[i])[row] > 0.0 else i + 1
+    a = line.acceleration(q[side], v[side])
+    h, hd, hdd = (float(x[row]) for x in (line.gaps(q[side]), line.rates(v[side]), line.rates(a)))
+    tau = _root(0.5 * hdd, hd, h)
+    if not t[i] < t[side] + tau < t[i + 1]:
+        return None
+    return i + 1, float(t[side] + tau), q[side] + tau * (v[side] + 0.5 * tau * a), v[side] + tau * a
+
+
+def _turn(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Crossing | None:
+    """From the cubic through both ends of a step: only the rate of the acceleration jumps inside."""
+    cubic = CubicHermiteSpline(t[i : i + 2], q[i : i + 2], v[i : i + 2])
+    rate = cubic.derivative()
+    at = float(brentq(lambda s: float(line.spring(cubic(s), rate(s))[row]), t[i], t[i + 1], xtol=1e-300, rtol=1e-15))
+    return (i + 1, at, cubic(at), rate(at)) if t[i] < at < t[i + 1] else None
 
 
 def _root(a: float, b: float, c: float) -> float:

@@ -85,6 +85,7 @@ class Dart:
         "matched": "the restitution of the law's linear part, DART's own step (1 ms) and solver (Dantzig): first order"
     }
     versions: Mapping[str, str] = {"dartpy": dartpy.__version__}
+    orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms that are not on a line, and rows that are always on."""

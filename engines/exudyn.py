@@ -199,6 +199,7 @@ class Exudyn:
         "default": "the obvious model: springs and dampers that act below the surface, generalised-alpha, fixed steps",
     }
     versions: Mapping[str, str] = {"exudyn": version("exudyn")}
+    orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms that are not on a line."""

@@ -74,6 +74,7 @@ class Pymunk:
         "default": "as it comes: overlap of 0.1 allowed, 10 iterations, steps of 1/60 s",
     }
     versions: Mapping[str, str] = {"pymunk": pymunk.version, "Chipmunk": pymunk.chipmunk_version}
+    orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms that are not on a line, and rows that are always on."""

@@ -76,6 +76,7 @@ class Reference:
         "cvode": "the reduced equations in (q, v) by SUNDIALS CVODE with its own root finding",
     }
     versions: Mapping[str, str] = {name: version(name) for name in ("numba", "numpy", "scikit-sundae")}
+    orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without equations here, and collision rules that the reference does not know."""

@@ -70,15 +70,24 @@ def run(
 
 @cli.command()
 @_shared
-@click.option("--repeats", type=click.IntRange(1, 1000), default=5, show_default=True, help="Timed runs of each.")
+@click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
+@click.option("--full", is_flag=True, help="Every case, every rung of every ladder; without it some minutes.")
+@click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier benchmark.")
+@click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
+@click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
 def bench(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    repeats: int,
+    repeats: int | None, full: bool, against: Path | None, what: str | None,
 ) -> int:  # fmt: skip
-    """Time engines against their error over ladders of tolerances and steps."""
-    from crossbody.reports.commands import bench as work
+    """Time engines against their error over ladders of tolerances and steps.
 
-    return work(names, wanted, variant, pairs, out, repeats, _command())
+    With --against the exit code is 1 if accuracy or a ratio of run times was lost.
+    """
+    from crossbody.reports import bench_command as work
+
+    if what is not None:
+        return work.alone(what, (names, wanted, variant, pairs, full, against), repeats, out, _command())
+    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command())
 
 
 @cli.command()

@@ -55,29 +55,6 @@ def run(
     return exit_code(rows["verdict"])
 
 
-def bench(
-    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    repeats: int, command: str,
-) -> int:  # fmt: skip
-    """Time engines against their error; writes the tables and the page."""
-    from crossbody.reports import bench as timing
-
-    cases = jobs.load_cases(names, variant or "listing", jobs.parse_settings(pairs))
-    picks = jobs.picks(wanted)
-    output.check(out)
-    with progress(len(cases) * len(picks)) as tell:
-        tables = [timing.bench(case, picks, repeats, tell) for case in cases]
-    rows, orders = timing.joined(tables)
-    told = provenance(command, repeats=repeats)
-    with output.folder(out) as made:
-        study.write(made, [], study.judge([], {}), told)
-        study.write_table(made / "bench", rows, told)
-        study.write_table(made / "orders", orders, told)
-        page.write(made)
-    show_bench(rows, orders, out)
-    return 0
-
-
 def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
     """Run the sliders over all gaps; writes the table and the page."""
     from crossbody.reports import gapmap
@@ -199,10 +176,3 @@ def show_stability(rows: pd.DataFrame, surprises: pd.DataFrame, out: Path) -> in
         print(f"outside: {row['engine']}:{row['profile']} {row['scene']}: {row['expected']} expected. {row['why']}")
     print(f"Report: {(out / page.PAGE).absolute()}")
     return int(len(surprises) > 0)
-
-
-def show_bench(rows: pd.DataFrame, orders: pd.DataFrame, out: Path) -> None:
-    """Timings and observed orders in the terminal."""
-    for table in (rows, orders):
-        print(table.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
-    print(f"Report: {(out / page.PAGE).absolute()}")

@@ -149,6 +149,7 @@ class Drake:
         "default": "a discrete MultibodyPlant with steps of 1 ms and point contact with the law's stiffness",
     }
     versions: Mapping[str, str] = {"drake": version("drake")}
+    orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms that are not on a line; contacts of a plant that never open."""
