@@ -27,7 +27,7 @@ _PADS = (
 UNSUITED = {
     ("delta", "ida"): "IDA loses its step on the robot's 24 unknowns at rest; CVODE is the independent check here, and "
     "simulate(..., solver='ida', index=3) runs it from a moving start.",
-    ("maze", "ida"): "IDA's steps shrink without end on a ball that rolls on a ring; CVODE is the independent check here.",
+    ("maze", "ida"): "IDA's steps shrink without end on a ball that rolls; CVODE is the independent check here.",
     ("soft_contact", "ida"): _PADS,
     ("soft_delta", "ida"): _PADS,
 }
