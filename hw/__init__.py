@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from crossbody.hw._comparison import Comparison, Prediction
     from crossbody.hw._draft import draft_text
     from crossbody.hw._finding import Finding
+    from crossbody.hw._fit import Estimate, Fit
+    from crossbody.hw._identify import identify
     from crossbody.hw._log import Channel, Log, Provenance, Repair
     from crossbody.hw._read import Scan, check, parts, read, scan
     from crossbody.hw._replay import replay
@@ -32,6 +34,8 @@ _HOMES = {
     "_comparison": ("Comparison", "Prediction"),
     "_draft": ("draft_text",),
     "_finding": ("Finding",),
+    "_fit": ("Estimate", "Fit"),
+    "_identify": ("identify",),
     "_log": ("Channel", "Log", "Provenance", "Repair"),
     "_read": ("Scan", "check", "parts", "read", "scan"),
     "_replay": ("replay",),
@@ -47,7 +51,9 @@ __all__ = [
     "Channel",
     "Columns",
     "Comparison",
+    "Estimate",
     "Finding",
+    "Fit",
     "GroupSurvey",
     "Log",
     "Plant",

@@ -67,8 +67,11 @@ def windows(
     delays = delays if len(delays) == y.shape[1] else np.full(y.shape[1], delays[0])
     recorded = [name for name in model.inputs if name in log.names("inputs")]
     u = log.matrix("inputs", recorded) if len(recorded) == len(model.inputs) else np.zeros((len(log), 0))
-    yd = rates_by_fit(log.time, y) if yd is None else yd
     cuts = _cuts(log.time, length, reach)
+    if yd is None:
+        starts = np.array([a for a, _ in cuts])
+        yd = np.zeros_like(y)
+        yd[starts] = rates_by_fit(log.time, y, starts)
     return tuple(_window(log, y, yd, u, delays, a, b) for a, b in cuts)
 
 
@@ -90,20 +93,13 @@ def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, a: int, 
     rows = slice(a, b + 1)
     t = log.time[rows]
     age = (t - t[0])[:, None] - delays
-    # The state at the window's beginning was measured a delay later.
-    late = np.array([np.interp(t[0] + d, log.time, yd[:, i]) for i, d in enumerate(delays)])
-    start = np.array([_at(log.time, y[:, i], yd[:, i], t[0] + d) for i, d in enumerate(delays)])
+    # The state at the window's beginning was measured a delay later: the rate carries it there.
+    start, rate = y[a] + yd[a] * delays, yd[a]
     driven = bool(u.shape[1])
     segment = Segment(
-        y=start, yd=late, t_end=float(t[-1] - t[0]), times=t[:-1] - t[0] if driven else np.zeros(0),
+        y=start, yd=rate, t_end=float(t[-1] - t[0]), times=t[:-1] - t[0] if driven else np.zeros(0),
         inputs=u[a:b] if driven else np.zeros((0, 0)),
     )  # fmt: skip
     last = float(log.time[b]) if b + 1 == len(log) else float(log.time[b + 1])
     kept = log.window(float(t[0]), np.nextafter(last, math.inf) if b + 1 == len(log) else last)
     return Window(t=t, age=age, y=y[rows], u=u[rows], segment=segment, log=kept)
-
-
-def _at(t: Floats, y: Floats, yd: Floats, when: float) -> float:
-    """A sample, or between two of them by its rate."""
-    i = int(np.clip(np.searchsorted(t, when), 0, len(t) - 1))
-    return float(y[i] + yd[i] * (when - t[i])) if t[i] != when else float(y[i])

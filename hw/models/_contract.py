@@ -62,6 +62,11 @@ def see_by_hermite(model: Model, run: Trajectory, times: Floats) -> tuple[Floats
     return y, yd
 
 
+def plain_difference(y: Floats, yhat: Floats) -> Floats:
+    """Measured less predicted."""
+    return y - yhat
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
     """A mechanism with what a rig measures of it.
@@ -72,6 +77,7 @@ class Model:
         measured: names and units of the coordinates that a log must have.
         seen: which coordinates of the case they are.
         inputs: names of the recorded inputs that drive it; a log without them is a free motion.
+        forces: names of the case's further inputs: what acts besides, and may be estimated.
         build: (parameters, segment) -> the scene of one stretch.
         places: parameter -> its place in the parameter array of the reference, for exact derivatives; a model whose
             contacts open has none, and is differentiated by finite differences.
@@ -80,7 +86,10 @@ class Model:
         references: names of the references that the controller follows.
         read: the measured coordinates of a log, and their rates if it has them.
         see: the measured coordinates of a run at given times.
+        differ: (measured, predicted), both (n, k) -> what an identification makes small (n, k).
+        engine: what runs it where derivatives are finite differences.
         restart: usual time between restarts, s; 0 for a free run.
+        start_span: length of what a window's start is fitted to, s; 0 where the measured state itself is the start.
         settings: engine -> settings of the usual profile.
         profiles: engine -> profile, where the usual one does not serve.
     """
@@ -91,13 +100,17 @@ class Model:
     measured: tuple[Coordinate, ...]
     seen: tuple[int, ...]
     inputs: tuple[str, ...] = ()
+    forces: tuple[str, ...] = ()
     build: Callable[[Numbers, Segment], Case]
     places: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     loop: Callable[[Numbers, Segment, Log], Trajectory] | None = None
     references: tuple[str, ...] = ()
     read: Callable[[Model, Log], tuple[Floats, Floats | None]] = read_as_they_are
     see: Callable[[Model, Trajectory, Floats], tuple[Floats, Floats]] = see_by_hermite
+    differ: Callable[[Floats, Floats], Floats] = plain_difference
+    engine: str = "reference"
     restart: float = 0.0
+    start_span: float = 0.0
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=lambda: MappingProxyType({}))
     profiles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
