@@ -95,7 +95,11 @@ def load_cases(names: Sequence[str], variant: str | None, overrides: Mapping[str
 
 
 def run_case(
-    case: Case, wanted: Sequence[Pick], rtol: float | None = None, tell: Callable[[str], None] = lambda _: None
+    case: Case,
+    wanted: Sequence[Pick],
+    rtol: float | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+    truth: Truth | None = None,
 ) -> CaseResult:
     """Run a case on every engine asked for.
 
@@ -104,9 +108,10 @@ def run_case(
         wanted: on which engines.
         rtol: tolerance for the engines that have one.
         tell: is told what is being done.
+        truth: of the case, where it is known already.
     """
     tell(f"{case.label}: truth")
-    truth = truth_of(case)
+    truth = truth_of(case) if truth is None else truth
     reference = _reference_audit(case)
     entries = []
     for pick in wanted:
