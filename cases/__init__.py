@@ -25,6 +25,7 @@ from crossbody.cases._errors import (
     LogFormatError,
     OutputError,
     SceneError,
+    SchedulerUnavailable,
     UnknownName,
 )
 from crossbody.cases._outcome import Outcome
@@ -59,6 +60,7 @@ __all__ = [
     "OutputError",
     "Parameter",
     "SceneError",
+    "SchedulerUnavailable",
     "Switch",
     "Tier",
     "Trajectory",

@@ -29,7 +29,7 @@ COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yello
 
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    rtol: float | None, as_json: bool, command: str,
+    rtol: float | None, settings: Sequence[str], as_json: bool, command: str,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
@@ -39,11 +39,11 @@ def run(
     if rtol is not None and not 1e-14 <= rtol <= 1e-1:
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
-    picks = jobs.picks(wanted)
+    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
     output.check(out)
     with progress(len(cases) * (len(picks) + 1), quiet=as_json) as tell:
-        results = [jobs.run_case(case, picks, rtol, tell) for case in cases]
-    rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol) for case in cases})
+        results = [jobs.run_case(case, picks, rtol, tell, asked) for case in cases]
+    rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol, settings) for case in cases})
     told = provenance(command, rtol=rtol, seed=SEED)
     with output.folder(out) as made:
         study.write(made, results, rows, told)
@@ -88,11 +88,14 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     return show_stability(rows, stability.surprises(rows), out)
 
 
-def repeat(case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None) -> str:
+def repeat(
+    case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
+) -> str:
     """The command that reproduces the rows of one case, but for its engine."""
     source = next((name for name in names if name.endswith(".py") and Path(name).stem == case.name), case.name)
     words = ["crossbody", "run", source, "--variant", case.variant]
     words += [word for pair in pairs for word in ("--set", pair)]
+    words += [word for pair in settings for word in ("--setting", pair)]
     return shlex.join(words + (["--rtol", f"{rtol:g}"] if rtol is not None else []))
 
 
