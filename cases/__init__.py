@@ -14,7 +14,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from crossbody.cases import _registry
+from crossbody.cases import _installed, _registry
 from crossbody.cases._errors import (
     CaseUnsupported,
     ColumnMapError,
@@ -25,6 +25,7 @@ from crossbody.cases._errors import (
     LogFormatError,
     OutputError,
     SceneError,
+    SchedulerUnavailable,
     UnknownName,
 )
 from crossbody.cases._outcome import Outcome
@@ -59,6 +60,7 @@ __all__ = [
     "OutputError",
     "Parameter",
     "SceneError",
+    "SchedulerUnavailable",
     "Switch",
     "Tier",
     "Trajectory",
@@ -79,12 +81,14 @@ def __getattr__(name: str) -> Any:
 
 
 def names() -> tuple[str, ...]:
-    """Names of all cases; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    """Names of all cases, those of other distributions too; imports none of them."""
+    return tuple(sorted({*_registry.plugin_names(__name__, list(__path__)), *_installed.installed()}))
 
 
 def summary(name: str) -> str:
     """What a case is, in one line; imports nothing."""
+    if name not in _registry.plugin_names(__name__, list(__path__)):
+        return f"from {_installed.installed().get(name, 'nowhere')}"
     return _registry.summary(__name__, list(__path__), name)
 
 

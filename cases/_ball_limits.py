@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from crossbody.cases import _peer_limits
 from crossbody.cases._case import Claim, Limit
 
 _TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from impact to impact"
@@ -113,6 +114,7 @@ def _all(wanted: dict[str, tuple[float, str]], bilateral: bool) -> Iterator[Limi
                 yield Limit(
                     metric=metric, value=value, engine=engine, profile=profile, why=why, known=known, known_size=size
                 )
+    yield from _peer_limits.ball(wanted, bilateral)
     if bilateral:
         yield Limit(metric="energy_drift", value=2e-5, why=_SMALL)
         yield Limit(metric="energy_integrator", value=2e-5, why=_SMALL)

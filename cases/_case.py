@@ -205,7 +205,7 @@ class Case:
 
     Attributes:
         name, variant: which case; `title` says it in words.
-        mechanism: name of the equations in crossbody.reference.systems.
+        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of one's own with them.
         parameters: every parameter of the case, resolved, SI.
         coordinates: names and units of q.
         contacts: names of the constraint rows.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
+from crossbody.cases import _peer_limits
 from crossbody.cases._case import Claim, Limit
 
 TOGETHER = (
@@ -120,6 +121,7 @@ def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
             )
     yield Limit(metric="momentum", value=1e-10, why=_KEPT)
     if variant == "sliders":
+        yield from _peer_limits.sliders(bounds)
         for (engine, profile), (value, why) in _DISCRETISATION.items():
             yield Limit(metric="position (discretisation)", value=value, engine=engine, profile=profile, why=why)
         yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")

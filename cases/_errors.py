@@ -10,6 +10,7 @@
     +-- LogFormatError      a log that cannot be read or trusted, with file, row and column
     +-- ColumnMapError      a column map that says what no map can say, with the path of the key
     +-- OutputError         a folder that cannot be written, or that holds something of somebody else's
+    +-- SchedulerUnavailable  a cluster that does not answer
 
 Numerical failure is never an exception: it is an `Outcome`.
 """
@@ -94,3 +95,7 @@ class ColumnMapError(CrossbodyError, ValueError):
 
 class OutputError(CrossbodyError, OSError):
     """A place that cannot be written, or that holds what crossbody did not write."""
+
+
+class SchedulerUnavailable(CrossbodyError):  # noqa: N818
+    """A cluster that does not answer, or whose package is not installed."""

@@ -1,37 +1,58 @@
-"""Finding a case's module and building the case from it."""
+"""Finding a case's module, or a file of a user's own, and building the case from it."""
 
 from __future__ import annotations
 
 import importlib.util
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 
 from crossbody import cases
-from crossbody.cases import _registry
+from crossbody.cases import _installed, _registry
 from crossbody.cases._case import Case, Parameter, Value
 from crossbody.cases._errors import SceneError, UnknownName
 
 
 def module(name: str) -> ModuleType:
-    """The module of a case: a plug-in's by its name, or a user's own by the path of its file."""
-    found = _from_file(Path(name)) if name.endswith(".py") else _plugin(name)
+    """The module of a case: a plug-in's or an installed one by its name, a user's own by the path of its file."""
+    found = from_file("case", Path(name)) if name.endswith(".py") else _named(name)
     for wanted in ("PARAMETERS", "VARIANTS", "build"):
         if not hasattr(found, wanted):
             raise SceneError(f"Case file {found.__file__} does not define {wanted}.")
     return found
 
 
-def _plugin(name: str) -> ModuleType:
-    return _registry.load_plugin("case", cases.__name__, list(cases.__path__), name)
+def _named(name: str) -> ModuleType:
+    try:
+        return _registry.load_plugin("case", cases.__name__, list(cases.__path__), name)
+    except UnknownName:
+        found = _installed.load(name)
+        if found is None:
+            raise UnknownName("case", name, cases.names()) from None
+        return found
 
 
-def _from_file(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"crossbody_case_{path.stem}", path)
+def from_file(kind: str, path: Path) -> ModuleType:
+    """Import a file of a user's own.
+
+    Args:
+        kind: what it holds, "case" or "mechanism".
+        path: of the file.
+
+    Raises:
+        UnknownName: if it is not there.
+    """
+    spec = importlib.util.spec_from_file_location(f"crossbody_{kind}_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise UnknownName("case file", str(path), cases.names())
+        raise UnknownName(f"{kind} file", str(path), cases.names() if kind == "case" else ())
     loaded = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(loaded)
+    sys.modules[spec.name] = loaded  # dataclasses look their module up there
+    try:
+        spec.loader.exec_module(loaded)
+    except BaseException:
+        del sys.modules[spec.name]
+        raise
     return loaded
 
 

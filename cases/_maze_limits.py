@@ -16,6 +16,7 @@ TENDON = (
 )
 _TOLERANCE = "a thousand times the default tolerance of 1e-9"
 _LOG = "read between the samples of a run"
+_MULTISTEP, _STIFF = 20.0, "errors of backward differentiation add up over thousands of steps in stiff contact"
 _SMALL = "over a kinetic energy that is a thousandth of a microjoule"
 _GROWN = "errors of the first landing grow until the last ring"
 
@@ -56,6 +57,8 @@ def _limits(bounds: Bounds) -> Iterator[Limit]:
     for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
         yield Limit(metric=metric, value=value, why=why, engine="mujoco", profile="default", known=OBVIOUS)
+        if metric in _MOTION:
+            yield Limit(metric=metric, value=_MULTISTEP * value, why=_STIFF, engine="reference", profile="cvode")
     yield Limit(metric="audit", value=0.0, engine="mujoco", profile="default", known=OBVIOUS)
 
 

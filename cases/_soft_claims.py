@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from crossbody.cases import _soft_closed_forms as closed
 from crossbody.cases._case import Claim, Limit, Parameter, Tier, Value
@@ -57,8 +57,15 @@ _BOUNDS = {
 }
 
 
-def limits(kstar: float) -> tuple[Limit, ...]:
-    """The same for all engines; the last digit printed bounds what was printed."""
+_ALWAYS = ("event_times", "energy_drift")
+
+
+def limits(claimed: Iterable[Claim], kstar: float) -> tuple[Limit, ...]:
+    """Of what is claimed, and of what every run has: a limit without a claim would ask for zero.
+
+    The same for all engines; the last digit printed bounds what was printed.
+    """
     digits = {**_DIGITS, "end_imbalance": 1e-5 if kstar else 1e-3}
-    told = {m: (x, "the last digit printed") for m, x in digits.items()}
-    return tuple(Limit(metric=m, value=x, why=why) for m, (x, why) in {**told, **_BOUNDS}.items())
+    told = {**{m: (x, "the last digit printed") for m, x in digits.items()}, **_BOUNDS}
+    wanted = (*_ALWAYS, *(claim.metric for claim in claimed))
+    return tuple(Limit(metric=m, value=told[m][0], why=told[m][1]) for m in wanted)

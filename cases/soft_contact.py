@@ -43,6 +43,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     if whole:
         robot.check(p)
     q0 = robot.start(p) if whole else soft.start(p)
+    claimed = claims(variant, parameters, PARAMETERS, VARIANTS[variant])
     return Case(
         name="soft_contact",
         variant=variant,
@@ -57,8 +58,8 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         law=soft.contact_law(p, *((6, 3) if whole else ())),
         collisions="resolved",
         tight=1e-11 if whole else 1e-12,
-        claims=claims(variant, parameters, PARAMETERS, VARIANTS[variant]),
-        limits=limits(p["kstar"]),
+        claims=claimed,
+        limits=limits(claimed, p["kstar"]),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )
 

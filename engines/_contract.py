@@ -44,6 +44,9 @@ class Engine(Protocol):
         name: as in engines.names().
         profiles: profile -> one sentence; the first is the default one.
         versions: package -> version, for provenance.
+
+    An engine may have `orders`, profile -> promised order of the error in its step `dt` or its tolerance `rtol`; the
+    benchmark holds the observed one against it.
     """
 
     name: str

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory
+from crossbody.cases._load import from_file
 from crossbody.engines import _settings
 from crossbody.engines._reference_audit import audit
 from crossbody.reference import Options, System, prepare
@@ -27,6 +30,7 @@ _PADS = (
 UNSUITED = {
     ("delta", "ida"): "IDA loses its step on the robot's 24 unknowns at rest; CVODE is the independent check here, and "
     "simulate(..., solver='ida', index=3) runs it from a moving start.",
+    ("maze", "ida"): "IDA's steps shrink without end on a ball that rolls; CVODE is the independent check here.",
     ("soft_contact", "ida"): _PADS,
     ("soft_delta", "ida"): _PADS,
 }
@@ -64,8 +68,9 @@ class ReferenceRun:
 class Reference:
     """The project's own integrators; see `crossbody.engines.Engine`.
 
-    A mechanism is a module in reference/systems with `build(parameters, law) -> System`; it may have `listed(p)`, what
-    the parity audit lists, and `check_start(parameters, q0, v0)`, which raises SceneError.
+    A mechanism is a module in reference/systems with `build(parameters, law) -> System`, or a file of the user's own by
+    its path (ends in .py) with `system(parameters, law) -> System`, which may be the case's own file. It may have
+    `listed(p)`, what the parity audit lists, and `check_start(parameters, q0, v0)`, which raises SceneError.
     """
 
     name = "reference"
@@ -75,13 +80,14 @@ class Reference:
         "cvode": "the reduced equations in (q, v) by SUNDIALS CVODE with its own root finding",
     }
     versions: Mapping[str, str] = {name: version(name) for name in ("numba", "numpy", "scikit-sundae")}
+    orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without equations here, and collision rules that the reference does not know."""
         solver = _settings.profile_of(self.name, self.profiles, profile)
         if (case.mechanism, solver) in UNSUITED:
             return UNSUITED[case.mechanism, solver]
-        if find_spec(f"{SYSTEMS}.{case.mechanism}") is None or not hasattr(_module(case.mechanism), "build"):
+        if _builder(case.mechanism) is None:
             return f"The reference has no equations of the mechanism {case.mechanism!r}."
         if case.collisions not in COLLISIONS:
             return (
@@ -103,15 +109,15 @@ class Reference:
             CaseUnsupported: for a mechanism or a collision rule that is not there.
             InvalidValue: for a setting outside its range.
         """
-        reason = self.why_not(case, profile)
-        if reason is not None:
-            raise CaseUnsupported(reason)
+        reason, builder = self.why_not(case, profile), _builder(case.mechanism)
+        if reason is not None or builder is None:
+            raise CaseUnsupported(reason or "")
         solver = _settings.profile_of(self.name, self.profiles, profile)
         times = {k: v for k, v in settings.items() if k == "samples" and np.ndim(v)}
         numbers = {k: v for k, v in settings.items() if k not in times}
         used = _settings.chosen(self.name, solver, _known(solver), numbers)
         options = _options(case, solver, {**used, **times})
-        system = _module(case.mechanism).build(case.parameters, case.law)
+        system = builder(case.parameters, case.law)
         check = getattr(_module(case.mechanism), "check_start", None)
         if check is not None:
             check(case.parameters, case.q0, case.v0)
@@ -120,8 +126,18 @@ class Reference:
         return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
 
 
+def _builder(mechanism: str) -> Callable[..., System] | None:
+    """What builds the equations of a mechanism; None where there are none."""
+    if mechanism.endswith(".py"):
+        return getattr(_module(mechanism), "system", None)
+    known = find_spec(f"{SYSTEMS}.{mechanism}") is not None
+    return getattr(_module(mechanism), "build", None) if known else None
+
+
+@cache
 def _module(mechanism: str) -> ModuleType:
-    return import_module(f"{SYSTEMS}.{mechanism}")
+    own = mechanism.endswith(".py")
+    return from_file("mechanism", Path(mechanism)) if own else import_module(f"{SYSTEMS}.{mechanism}")
 
 
 def _known(solver: str) -> dict[str, Parameter]:

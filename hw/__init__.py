@@ -13,11 +13,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from crossbody.hw import models
     from crossbody.hw._columns import Columns, Role, Signal, Time, dump_columns, load_columns, maps, parse_columns
+    from crossbody.hw._comparison import Comparison, Prediction
     from crossbody.hw._draft import draft_text
     from crossbody.hw._finding import Finding
+    from crossbody.hw._fit import Estimate, Fit
+    from crossbody.hw._identify import identify
     from crossbody.hw._log import Channel, Log, Provenance, Repair
     from crossbody.hw._read import Scan, check, parts, read, scan
+    from crossbody.hw._replay import replay
     from crossbody.hw._rows import Rows
     from crossbody.hw._store import store
     from crossbody.hw._survey import GroupSurvey, Survey, survey
@@ -26,10 +31,14 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "_columns": ("Columns", "Role", "Signal", "Time", "dump_columns", "load_columns", "maps", "parse_columns"),
+    "_comparison": ("Comparison", "Prediction"),
     "_draft": ("draft_text",),
     "_finding": ("Finding",),
+    "_fit": ("Estimate", "Fit"),
+    "_identify": ("identify",),
     "_log": ("Channel", "Log", "Provenance", "Repair"),
     "_read": ("Scan", "check", "parts", "read", "scan"),
+    "_replay": ("replay",),
     "_rows": ("Rows",),
     "_store": ("store",),
     "_synthetic_log": ("Sensors", "delta_log"),
@@ -41,10 +50,14 @@ _LAZY = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "Channel",
     "Columns",
+    "Comparison",
+    "Estimate",
     "Finding",
+    "Fit",
     "GroupSurvey",
     "Log",
     "Plant",
+    "Prediction",
     "Provenance",
     "Push",
     "Repair",
@@ -62,9 +75,11 @@ __all__ = [
     "dump_columns",
     "load_columns",
     "maps",
+    "models",
     "parse_columns",
     "parts",
     "read",
+    "replay",
     "scan",
     "store",
     "survey",
@@ -77,6 +92,8 @@ def __getattr__(name: str) -> Any:
     Raises:
         FormatUnavailable: if msgspec or another package of the extra `logs` is not installed.
     """
+    if name == "models":
+        return import_module("crossbody.hw.models")
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

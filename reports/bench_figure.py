@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from crossbody.reports.figures import COLOURS, DASHES
+from crossbody.reports.styles import COLOURS, DASHES
 
 
 def work_precision(rows: pd.DataFrame) -> go.Figure:

@@ -29,11 +29,12 @@ def cli() -> None:
 
 @cli.command("list")
 def list_() -> None:
-    """List cases, engines and metrics."""
+    """List cases, engines, metrics and stress suites."""
     from crossbody import cases, engines
-    from crossbody.reports import metrics
+    from crossbody.reports import metrics, suites
 
-    for title, source in (("Cases", cases), ("Engines", engines), ("Metrics", metrics)):
+    listed = (("Cases", cases), ("Engines", engines), ("Metrics", metrics), ("Stress suites", suites))
+    for title, source in listed:
         click.echo(f"{title}:")
         width = max(map(len, source.names()), default=0)
         for name in source.names():
@@ -57,28 +58,38 @@ def _shared(command: _Work) -> _Work:
 @cli.command()
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
+@click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON and nothing else.")
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, as_json: bool,
+    rtol: float | None, settings: tuple[str, ...], as_json: bool,
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
     from crossbody.reports.commands import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, as_json, _command())
+    return work(names, wanted, variant, pairs, out, rtol, settings, as_json, _command())
 
 
 @cli.command()
 @_shared
-@click.option("--repeats", type=click.IntRange(1, 1000), default=5, show_default=True, help="Timed runs of each.")
+@click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
+@click.option("--full", is_flag=True, help="Every case, every rung of every ladder; without it some minutes.")
+@click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier benchmark.")
+@click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
+@click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
 def bench(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    repeats: int,
+    repeats: int | None, full: bool, against: Path | None, what: str | None,
 ) -> int:  # fmt: skip
-    """Time engines against their error over ladders of tolerances and steps."""
-    from crossbody.reports.commands import bench as work
+    """Time engines against their error over ladders of tolerances and steps.
 
-    return work(names, wanted, variant, pairs, out, repeats, _command())
+    With --against the exit code is 1 if accuracy or a ratio of run times was lost.
+    """
+    from crossbody.reports import bench_command as work
+
+    if what is not None:
+        return work.alone(what, (names, wanted, variant, pairs, full, against), repeats, out, _command())
+    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command())
 
 
 @cli.command()
@@ -109,6 +120,31 @@ def stability(wanted: tuple[str, ...], out: Path) -> int:
     from crossbody.reports.commands import stability_map as work
 
     return work(wanted, out, _command())
+
+
+@cli.command()
+@click.argument("names", metavar="[SUITE]...", nargs=-1)
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--runs", type=int, metavar="N", help="Runs of the first engine in each suite.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of every draw.")
+@click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one a processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
+@click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("stress"), show_default=True, metavar="DIR")
+@click.option("--json", "as_json", is_flag=True, help="Print the failures as JSON and nothing else.")
+def stress(
+    names: tuple[str, ...], wanted: tuple[str, ...], runs: int | None, seed: int, jobs: int, scheduler: str | None,
+    resume: bool, out: Path, as_json: bool,
+) -> int:  # fmt: skip
+    """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
+
+    A sweep that was interrupted goes on where it stood when the same command is given again.
+    """
+    from crossbody.reports.sweep.command import Ask
+    from crossbody.reports.sweep.command import stress as work
+
+    asked = Ask(names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, resume=resume)
+    return work(asked, out, as_json, _command())
 
 
 @cli.command()

@@ -29,7 +29,7 @@ COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yello
 
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    rtol: float | None, as_json: bool, command: str,
+    rtol: float | None, settings: Sequence[str], as_json: bool, command: str,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
@@ -39,11 +39,11 @@ def run(
     if rtol is not None and not 1e-14 <= rtol <= 1e-1:
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
-    picks = jobs.picks(wanted)
+    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
     output.check(out)
     with progress(len(cases) * (len(picks) + 1), quiet=as_json) as tell:
-        results = [jobs.run_case(case, picks, rtol, tell) for case in cases]
-    rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol) for case in cases})
+        results = [jobs.run_case(case, picks, rtol, tell, asked) for case in cases]
+    rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol, settings) for case in cases})
     told = provenance(command, rtol=rtol, seed=SEED)
     with output.folder(out) as made:
         study.write(made, results, rows, told)
@@ -53,29 +53,6 @@ def run(
     else:
         show(rows, out)
     return exit_code(rows["verdict"])
-
-
-def bench(
-    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    repeats: int, command: str,
-) -> int:  # fmt: skip
-    """Time engines against their error; writes the tables and the page."""
-    from crossbody.reports import bench as timing
-
-    cases = jobs.load_cases(names, variant or "listing", jobs.parse_settings(pairs))
-    picks = jobs.picks(wanted)
-    output.check(out)
-    with progress(len(cases) * len(picks)) as tell:
-        tables = [timing.bench(case, picks, repeats, tell) for case in cases]
-    rows, orders = timing.joined(tables)
-    told = provenance(command, repeats=repeats)
-    with output.folder(out) as made:
-        study.write(made, [], study.judge([], {}), told)
-        study.write_table(made / "bench", rows, told)
-        study.write_table(made / "orders", orders, told)
-        page.write(made)
-    show_bench(rows, orders, out)
-    return 0
 
 
 def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
@@ -111,11 +88,14 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     return show_stability(rows, stability.surprises(rows), out)
 
 
-def repeat(case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None) -> str:
+def repeat(
+    case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
+) -> str:
     """The command that reproduces the rows of one case, but for its engine."""
     source = next((name for name in names if name.endswith(".py") and Path(name).stem == case.name), case.name)
     words = ["crossbody", "run", source, "--variant", case.variant]
     words += [word for pair in pairs for word in ("--set", pair)]
+    words += [word for pair in settings for word in ("--setting", pair)]
     return shlex.join(words + (["--rtol", f"{rtol:g}"] if rtol is not None else []))
 
 
@@ -199,10 +179,3 @@ def show_stability(rows: pd.DataFrame, surprises: pd.DataFrame, out: Path) -> in
         print(f"outside: {row['engine']}:{row['profile']} {row['scene']}: {row['expected']} expected. {row['why']}")
     print(f"Report: {(out / page.PAGE).absolute()}")
     return int(len(surprises) > 0)
-
-
-def show_bench(rows: pd.DataFrame, orders: pd.DataFrame, out: Path) -> None:
-    """Timings and observed orders in the terminal."""
-    for table in (rows, orders):
-        print(table.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
-    print(f"Report: {(out / page.PAGE).absolute()}")

@@ -1,197 +1,214 @@
-"""The figures of a case's page, as plain plotly dictionaries; every axis has its unit."""
+"""The figures of a case's page; every axis has its unit, every line belongs to an engine that can be hidden."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from crossbody.cases import Mode, Trajectory
+from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._impulse import cumulative
 from crossbody.reports.store import Trace
-from crossbody.reports.thin import keep
+from crossbody.reports.strips import modes
+from crossbody.reports.styles import COLOURS, DASHES, TRUTH, label, style
+from crossbody.reports.thin import POINTS, keep
 
-TRUTH = "truth"
-# Okabe and Ito's colours: told apart by colour-blind readers, on light and on dark.
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00", "#7F7FFF", "#999999")
-DASHES = ("solid", "dash", "dot", "dashdot")
-MODE_COLOURS = {
-    Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
-    Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
-}  # fmt: skip
+SAMPLE = 15
+"""Room of one sample of one line on a page, bytes (time and value as base64)."""
+FEWEST = 60
+MOST_SIGNALS = 8
+"""Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
+FINE = 2e-5
+"""Distance of samples over the horizon below which times are written in double precision."""
 
-Signal = Callable[[Trajectory], Floats]
-
-
-def label(trace: Trace) -> str:
-    """Engine and profile; "truth" for the truth."""
-    return f"{trace.about['engine']}:{trace.about['profile']}" if trace.about["engine"] != TRUTH else TRUTH
+__all__ = ["COLOURS", "DASHES", "FIGURES", "TRUTH", "label", "note", "points_for", "style", "suits"]
 
 
-def _style(i: int) -> dict[str, Any]:
-    return {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.8}
+def drawn(count: int) -> list[int]:
+    """Which of so many signals are drawn."""
+    return list(dict.fromkeys(np.linspace(0, count - 1, min(count, MOST_SIGNALS)).round().astype(int).tolist()))
 
 
-def _line(trace: Trace, y: Floats, i: int, *, legend: bool = True) -> go.Scatter:
-    run = trace.run
-    at = keep(run.t, y, np.array([e.t for e in run.events]))
-    style = {"color": "#888888", "width": 4} if label(trace) == TRUTH else _style(i)
-    return go.Scatter(
-        x=run.t[at], y=y[at], name=label(trace), legendgroup=label(trace), showlegend=legend,
-        mode="lines", line=style, opacity=0.6 if label(trace) == TRUTH else 1.0,
-    )  # fmt: skip
+def points_for(traces: Sequence[Trace], room: int) -> int:
+    """Samples a line so that all lines of a case take `room` bytes."""
+    coordinates, contacts = (len(drawn(len(traces[0].about[name]))) for name in ("coordinates", "contacts"))
+    lines = len(traces) * (2 * coordinates + 4 * contacts + 4)
+    return int(np.clip(room / (SAMPLE * lines), FEWEST, POINTS))
 
 
-def _frame(rows: Sequence[str], title: str) -> go.Figure:
-    """Stacked plots over one time axis."""
-    figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=min(0.06, 0.3 / len(rows)))
-    for i, name in enumerate(rows, start=1):
-        figure.update_yaxes(title_text=name, row=i, col=1)
-    figure.update_xaxes(title_text="time [s]", row=len(rows), col=1)
-    figure.update_layout(title_text=title, height=150 + 210 * len(rows))
-    return figure
+class _Sheet:
+    """Stacked plots over one time axis, with the lines of every engine."""
+
+    def __init__(self, rows: Sequence[str], title: str, points: int) -> None:
+        self.points = points
+        gap = min(0.06, 0.3 / len(rows))
+        self.figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=gap)
+        self.data: list[dict[str, Any]] = []
+        for i, name in enumerate(rows, start=1):
+            self.figure.update_yaxes(title_text=name, title_standoff=4, row=i, col=1)
+        self.figure.update_xaxes(title_text="time [s]", row=len(rows), col=1)
+        self.figure.update_layout(title_text=title, height=130 + 170 * len(rows), showlegend=False)
+
+    def logarithmic(self, *rows: int) -> None:
+        for row in rows:
+            self.figure.update_yaxes(type="log", exponentformat="power", nticks=5, row=row, col=1)
+
+    def line(self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, **more: Any) -> None:
+        """One line of one engine into plot `row`, thinned; what is not finite is a gap."""
+        t = trace.run.t if t is None else t
+        if not len(t) or not np.isfinite(y).any():
+            return
+        at = keep(t, y, _instants(trace), self.points)
+        look = style(trace, i)
+        name = "" if row == 1 else str(row)
+        self.data.append(
+            {
+                "type": "scatter", "x": _times(t[at]), "y": y[at].astype(np.float32), "name": label(trace),
+                "meta": label(trace), "mode": "lines", "xaxis": f"x{name}", "yaxis": f"y{name}",
+                "line": {key: look[key] for key in ("color", "dash", "width")} | more,
+                "opacity": 0.65 if label(trace) == TRUTH else 1.0,
+            }
+        )  # fmt: skip
+
+    def done(self) -> go.Figure:
+        return go.Figure({"data": self.data, "layout": self.figure.layout}, skip_invalid=True)
 
 
-def _error(mine: Floats, theirs: Floats) -> Floats:
-    """|difference| for a logarithmic axis: a gap where both agree to the last bit."""
-    difference = np.abs(mine - theirs)
-    return np.where(difference > 0.0, difference, np.nan)
+def _instants(trace: Trace, most: int = 40) -> Floats:
+    """Events around which all samples stay: the first of them where there are very many."""
+    return np.unique([e.t for e in trace.run.events])[:most]
 
 
-def motion(traces: Sequence[Trace]) -> go.Figure:
+def _times(t: Floats) -> Floats:
+    """Times in single precision where nobody can see it."""
+    apart = np.diff(t)
+    smallest = np.min(apart[apart > 0.0], initial=np.inf)
+    return t.astype(np.float32) if smallest > FINE * abs(t[-1]) else t
+
+
+def floor_of(truth: Floats) -> float:
+    """Below this a difference is rounding: the largest value times 2.2e-16, rounded down to a power of ten."""
+    largest = float(np.max(np.abs(truth[np.isfinite(truth)]), initial=0.0))
+    return float(10.0 ** np.floor(np.log10(largest * np.finfo(float).eps))) if largest > 0.0 else 1e-17
+
+
+def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
+    """|difference| for a logarithmic axis, not below the floor that all engines share."""
+    difference: Floats = np.maximum(np.abs(mine - theirs), floor)
+    return difference
+
+
+def motion(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     """Every coordinate of every engine, and under it log |difference to the truth| at the same instants."""
-    about = traces[0].about
-    names = [(c["name"], c["unit"]) for c in about["coordinates"]]
-    rows = [row for name, unit in names for row in (f"{name} [{unit}]", f"|{name} - truth| [{unit}]")]
-    figure = _frame(rows, "Motion, and its difference to the truth at the same instant")
-    for i, trace in enumerate(traces):
-        for k in range(len(names)):
-            figure.add_trace(_line(trace, trace.run.q[:, k], i, legend=k == 0), row=2 * k + 1, col=1)
+    names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
+    shown = drawn(len(names))
+    rows = [
+        row for k in shown for row in (f"{names[k][0]} [{names[k][1]}]", f"|{names[k][0]} - truth| [{names[k][1]}]")
+    ]
+    sheet = _Sheet(rows, "Coordinates, and |difference to the truth| at the same instant", points)
+    for place, k in enumerate(shown):
+        floor = floor_of(traces[0].run.q[:, k])
+        for i, trace in enumerate(traces):
+            sheet.line(trace, i, 2 * place + 1, trace.run.q[:, k])
             if trace.truth is not None:
-                apart = _error(trace.run.q[:, k], trace.truth.q[:, k])
-                figure.add_trace(_line(trace, apart, i, legend=False), row=2 * k + 2, col=1)
-    for k in range(len(names)):
-        figure.update_yaxes(type="log", exponentformat="power", row=2 * k + 2, col=1)
-    return figure
+                sheet.line(trace, i, 2 * place + 2, apart(trace.run.q[:, k], trace.truth.q[:, k], floor))
+        sheet.logarithmic(2 * place + 2)
+    return sheet.done()
 
 
-def force(traces: Sequence[Trace]) -> go.Figure:
+def force(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
+    shown = drawn(len(contacts))
     each = ("lam {} [N]", "impulse {} [N s]", "|impulse {} - truth| [N s]")
-    figure = _frame([text.format(name) for name in contacts for text in each], "Contact force and cumulative impulse")
-    for i, trace in enumerate(traces):
-        if np.isnan(trace.run.lam).all():
-            continue
-        impulse = cumulative(trace.run)
-        for k in range(len(contacts)):
-            figure.add_trace(_line(trace, trace.run.lam[:, k], i, legend=k == 0), row=3 * k + 1, col=1)
-            figure.add_trace(_line(trace, impulse[:, k], i, legend=False), row=3 * k + 2, col=1)
-            if trace.truth is not None:
-                apart = _error(impulse[:, k], cumulative(trace.truth)[:, k])
-                figure.add_trace(_line(trace, apart, i, legend=False), row=3 * k + 3, col=1)
-    for k in range(len(contacts)):
-        figure.update_yaxes(type="log", exponentformat="power", row=3 * k + 3, col=1)
-    return figure
+    rows = [text.format(contacts[k]) for k in shown for text in each]
+    sheet = _Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points)
+    summed = [cumulative(trace.run) for trace in traces]
+    true = [None if trace.truth is None else cumulative(trace.truth) for trace in traces]
+    for place, k in enumerate(shown):
+        floor = floor_of(summed[0][:, k])
+        for i, trace in enumerate(traces):
+            if np.isnan(trace.run.lam[:, k]).all():
+                continue
+            sheet.line(trace, i, 3 * place + 1, trace.run.lam[:, k])
+            sheet.line(trace, i, 3 * place + 2, summed[i][:, k])
+            exact = true[i]
+            if exact is not None:
+                sheet.line(trace, i, 3 * place + 3, apart(summed[i][:, k], exact[:, k], floor))
+        sheet.logarithmic(3 * place + 3)
+    return sheet.done()
 
 
-def energy(traces: Sequence[Trace]) -> go.Figure:
+def energy(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     """Total energy, work of the contacts, and what neither they nor inputs nor damping explain."""
     rows = ["total energy [J]", "work of contacts [J]", "|unexplained energy| [J]"]
-    figure = _frame(rows, "Energy ledger: what the law made, and what the integrator made")
+    sheet = _Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points)
+    floor = floor_of(traces[0].run.energy)
     for i, trace in enumerate(traces):
         run = trace.run
-        figure.add_trace(_line(trace, run.total_energy, i), row=1, col=1)
+        sheet.line(trace, i, 1, run.total_energy)
         if run.ledger is None:
             continue
         work = run.ledger.contact.sum(axis=1)
-        figure.add_trace(_line(trace, work, i, legend=False), row=2, col=1)
+        sheet.line(trace, i, 2, work)
         book = work + run.ledger.input - run.ledger.dissipated
-        rest = _error(run.total_energy - run.total_energy[0], book - book[0])
-        if np.isfinite(rest).any():
-            figure.add_trace(_line(trace, rest, i, legend=False), row=3, col=1)
-    figure.update_yaxes(type="log", exponentformat="power", row=3, col=1)
-    return figure
+        sheet.line(trace, i, 3, apart(run.total_energy - run.total_energy[0], book - book[0], floor))
+    sheet.logarithmic(3)
+    return sheet.done()
 
 
-def penetration(traces: Sequence[Trace]) -> go.Figure:
-    """Depth of every contact below its surface, logarithmic."""
+def penetration(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
+    """Depth of every contact below its surface; |gap| of a row that is always on."""
     contacts = traces[0].about["contacts"]
-    figure = _frame([f"penetration {name} [m]" for name in contacts], "Penetration")
-    for i, trace in enumerate(traces):
-        for k in range(len(contacts)):
-            depth = np.where(trace.run.gap[:, k] < 0.0, -trace.run.gap[:, k], np.nan)
-            figure.add_trace(_line(trace, depth, i, legend=k == 0), row=k + 1, col=1)
-    figure.update_yaxes(type="log", exponentformat="power")
-    return figure
+    shown = drawn(len(contacts))
+    always = [bool((traces[0].run.mode[:, k] == Mode.BILATERAL).all()) for k in shown]
+    rows = [f"{'|gap|' if on else 'depth'} {contacts[k]} [m]" for k, on in zip(shown, always, strict=True)]
+    sheet = _Sheet(rows, "Penetration, and drift of rows that are always on", points)
+    for row, (k, on) in enumerate(zip(shown, always, strict=True), start=1):
+        for i, trace in enumerate(traces):
+            gap = trace.run.gap[:, k]
+            depth = np.abs(gap) if on else -gap
+            sheet.line(trace, i, row, np.where(depth > 0.0, depth, np.nan))
+        sheet.logarithmic(row)
+    return sheet.done()
 
 
-def _spans(run: Trajectory, row: int) -> Iterator[tuple[float, float, int]]:
-    """(from, to, mode) for every interval of constant mode of one row."""
-    modes = run.mode[:, row]
-    cuts = np.flatnonzero(modes[1:] != modes[:-1]) + 1
-    for a, b in zip([0, *cuts], [*cuts, len(modes) - 1], strict=True):
-        yield float(run.t[a]), float(run.t[b]), int(modes[a])
-
-
-def modes(traces: Sequence[Trace]) -> go.Figure:
-    """One strip a contact and engine, coloured by mode."""
-    figure = go.Figure()
-    shown: set[int] = set()
-    for trace in reversed(traces):
-        for k, contact in enumerate(trace.about["contacts"]):
-            for mode, spans in _by_mode(trace.run, k).items():
-                starts, widths = np.array(spans).T
-                figure.add_trace(
-                    go.Bar(
-                        y=[f"{label(trace)} {contact}"] * len(starts), base=starts, x=widths, orientation="h",
-                        marker={"color": MODE_COLOURS[mode], "line": {"width": 0}}, name=mode.name,
-                        legendgroup=mode.name, showlegend=mode not in shown,
-                        hovertemplate=f"{mode.name} from %{{base:.9g}} s for %{{x:.6g}} s<extra></extra>",
-                    )
-                )  # fmt: skip
-                shown.add(mode)
-    figure.update_layout(
-        title_text="Modes of the state machine", barmode="overlay", height=170 + 32 * len(traces), bargap=0.25
-    )
-    figure.update_xaxes(title_text="time [s]")
-    figure.update_yaxes(title_text="engine and contact [-]", automargin=True)
-    return figure
-
-
-def _by_mode(run: Trajectory, row: int) -> dict[Mode, list[tuple[float, float]]]:
-    found: dict[Mode, list[tuple[float, float]]] = {}
-    for a, b, mode in _spans(run, row):
-        if mode >= 0:
-            found.setdefault(Mode(mode), []).append((a, b - a))
-    return found
-
-
-def steps(traces: Sequence[Trace]) -> go.Figure:
+def steps(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     """Length of every step at its start: small while a collision lasts, large again when it is over."""
-    figure = _frame(["step size [s]"], "Step size of each engine")
+    sheet = _Sheet(["step size [s]"], "Step size of each engine", points)
     for i, trace in enumerate(traces):
-        starts, lengths = trace.about.get("steps", ((), ()))
-        if len(starts):
-            name = label(trace)
-            figure.add_trace(
-                go.Scatter(
-                    x=starts, y=lengths, name=name, legendgroup=name, mode="lines", line=_style(i) | {"shape": "hv"}
-                )
-            )
-    figure.update_yaxes(type="log", exponentformat="power")
-    return figure
+        starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
+        sheet.line(trace, i, 1, lengths, starts, shape="hv")
+    sheet.logarithmic(1)
+    return sheet.done()
 
 
-FIGURES: dict[str, Callable[[Sequence[Trace]], go.Figure]] = {
-    "motion": motion,
-    "force": force,
-    "energy": energy,
-    "modes": modes,
-    "penetration": penetration,
-    "steps": steps,
+def suits(name: str, traces: Sequence[Trace]) -> bool:
+    """Whether a figure has anything to show."""
+    return bool(traces[0].about["contacts"]) or name not in ("force", "modes", "penetration")
+
+
+def note(name: str, traces: Sequence[Trace]) -> str:
+    """What the reader of a figure must know."""
+    listed = {"motion": "coordinates", "force": "contacts", "penetration": "contacts", "modes": "contacts"}.get(name)
+    count = len(traces[0].about[listed]) if listed else 0
+    some = f"{MOST_SIGNALS} of {count} {listed} are drawn; all are stored." if count > MOST_SIGNALS else ""
+    return f"{NOTES.get(name, '')} {some}".strip()
+
+
+NOTES = {
+    "motion": "Differences end at a common floor, the rounding of the largest value: there nothing is left to compare.",
+    "force": "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that.",
+}
+FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int], go.Figure]]] = {
+    "motion": ("Motion", motion),
+    "force": ("Contact force", force),
+    "energy": ("Energy", energy),
+    "modes": ("Modes", modes),
+    "penetration": ("Penetration", penetration),
+    "steps": ("Step size", steps),
 }

@@ -6,7 +6,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from crossbody.reports.figures import COLOURS, DASHES
+from crossbody.reports.styles import COLOURS, DASHES
 from crossbody.reports.gapmap import PATTERN
 
 ROWS = {"energy_created": "energy created / energy in [1]", PATTERN: "pattern distance / speed in [1]"}

@@ -17,6 +17,7 @@ DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
 FINER_STEP = 4.0
 FINEST_TOLERANCE = 1e-12
+_EXAMPLES = {"--set": "a1=0", "--setting": "dt=1e-4"}
 REFINED_S = 20.0
 """Time that a refinement may take, s: an integrator that grinds to a halt at 1e-12 has none."""
 
@@ -45,8 +46,8 @@ def parse_engine(text: str) -> tuple[str, str | None]:
     return engine, profile or None
 
 
-def parse_settings(pairs: Sequence[str]) -> dict[str, Value]:
-    """Parameters from k=v; a number where it reads as one.
+def parse_settings(pairs: Sequence[str], option: str = "--set") -> dict[str, Value]:
+    """Parameters or settings from k=v; a number where it reads as one.
 
     Raises:
         InvalidValue: for a text without "=".
@@ -55,7 +56,7 @@ def parse_settings(pairs: Sequence[str]) -> dict[str, Value]:
     for pair in pairs:
         name, equals, text = pair.partition("=")
         if not equals or not name.strip() or not text.strip():
-            raise InvalidValue(f"--set {pair!r} is not name=value, for example --set a1=0.")
+            raise InvalidValue(f"{option} {pair!r} is not name=value, for example {option} {_EXAMPLES[option]}.")
         try:
             found[name.strip()] = float(text)
         except ValueError:
@@ -95,7 +96,12 @@ def load_cases(names: Sequence[str], variant: str | None, overrides: Mapping[str
 
 
 def run_case(
-    case: Case, wanted: Sequence[Pick], rtol: float | None = None, tell: Callable[[str], None] = lambda _: None
+    case: Case,
+    wanted: Sequence[Pick],
+    rtol: float | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+    settings: Mapping[str, Value] | None = None,
+    truth: Truth | None = None,
 ) -> CaseResult:
     """Run a case on every engine asked for.
 
@@ -104,15 +110,29 @@ def run_case(
         wanted: on which engines.
         rtol: tolerance for the engines that have one.
         tell: is told what is being done.
+        settings: of the engines, by name; each takes those that it knows.
+        truth: of the case, where it is known already.
+
+    Raises:
+        UnknownName: for a setting that none of them knows.
     """
+    asked = dict(settings or {}) | ({} if rtol is None else {"rtol": rtol})
     tell(f"{case.label}: truth")
-    truth = truth_of(case)
+    truth = truth_of(case) if truth is None else truth
     reference = _reference_audit(case)
     entries = []
     for pick in wanted:
         tell(f"{case.label}: {pick.engine}:{pick.profile}")
-        entries.append(_entry(case, pick, rtol, reference))
+        entries.append(_entry(case, pick, asked, reference))
+    _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def _check_known(settings: Mapping[str, Value], entries: Sequence[Entry]) -> None:
+    ran = [entry.settings for entry in entries if entry.run is not None]
+    for name in settings:
+        if ran and not any(name in known for known in ran):
+            raise UnknownName("setting of these engines", name, {key for known in ran for key in known})
 
 
 def _reference_audit(case: Case) -> Mapping[str, Any]:
@@ -121,11 +141,11 @@ def _reference_audit(case: Case) -> Mapping[str, Any]:
     return engines.load("reference").prepare(case, "compiled").audit()
 
 
-def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, Any]) -> Entry:
+def _entry(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
-        prepared = prepare(case, pick, rtol)
+        prepared = prepare(case, pick, asked)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     rows: tuple[AuditRow, ...] = audit(prepared.audit(), reference, case) if reference else ()
@@ -134,7 +154,7 @@ def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, A
         engine=pick.engine,
         profile=pick.profile,
         settings=prepared.settings,
-        run=_dense(case, pick, prepared, natural),
+        run=_dense(case, pick, prepared, natural, asked),
         stepped=natural.t,
         audit=rows,
         refined=_refined(case, pick, prepared.settings),
@@ -142,20 +162,19 @@ def _entry(case: Case, pick: Pick, rtol: float | None, reference: Mapping[str, A
     )
 
 
-def prepare(case: Case, pick: Pick, rtol: float | None) -> Any:
-    """A prepared run, with the tolerance where the engine has one."""
+def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> Any:
+    """A prepared run, with those of the asked settings that the engine has."""
     engine = engines.load(pick.engine)
     prepared = engine.prepare(case, pick.profile)
-    if rtol is not None and "rtol" in prepared.settings:
-        return engine.prepare(case, pick.profile, rtol=rtol)
-    return prepared
+    own = {key: value for key, value in asked.items() if key in prepared.settings}
+    return engine.prepare(case, pick.profile, **own) if own else prepared
 
 
-def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory) -> Trajectory:
+def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Mapping[str, Value]) -> Trajectory:
     """The run; where the engine can be asked for samples, again with enough of them to be drawn."""
     if "samples" not in prepared.settings or not natural.outcome.ok:
         return natural
-    asked = {key: prepared.settings[key] for key in ("rtol",) if key in prepared.settings}
+    asked = {key: prepared.settings[key] for key in ("rtol", *given) if key in prepared.settings}
     times = sample_times(natural, case.t_end)
     dense = engines.load(pick.engine).prepare(case, pick.profile, samples=times, **asked).run()
     if not dense.outcome.ok or dense.events != natural.events:

@@ -55,7 +55,7 @@ def save(path: Path, trace: Trace) -> None:
         data |= _columns("work", run.ledger.contact) | {"input": run.ledger.input, "loss": run.ledger.dissipated}
     about = {
         "about": dict(trace.about),
-        "events": [[e.t, e.contact, int(e.before), int(e.after)] for e in run.events],
+        "events": [[e.t, e.contact, int(e.before), int(e.after), e.impulse] for e in run.events],
         "outcome": run.outcome.value, "message": run.message, "steps": run.steps, "wall_s": run.wall_s,
         "counts": dict(run.counts),
     }  # fmt: skip
@@ -88,6 +88,20 @@ def _ledger(data: pa.Table) -> Ledger | None:
     return Ledger(contact=_block(data, "work"), input=given, dissipated=lost)
 
 
+def _event(t: float, contact: int, before: int, after: int, impulse: float = 0.0) -> Event:
+    return Event(t=t, contact=contact, before=Mode(before), after=Mode(after), impulse=impulse)
+
+
+def peek(path: Path) -> dict[str, Any]:
+    """What is told about a motion, without the motion: `about`, outcome, steps, run time, events.
+
+    Raises:
+        OSError, ValueError, KeyError: if it is not one of ours.
+    """
+    told: dict[str, Any] = json.loads(pq.read_schema(path).metadata[_KEY])
+    return told
+
+
 def load(path: Path) -> Trace:
     """Read one motion back."""
     data = pq.read_table(path)
@@ -95,7 +109,7 @@ def load(path: Path) -> Trace:
     run = replace(
         _motion(data, ""),
         ledger=_ledger(data),
-        events=tuple(Event(t=s, contact=i, before=Mode(b), after=Mode(a)) for s, i, b, a in about["events"]),
+        events=tuple(_event(*given) for given in about["events"]),
         outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"], wall_s=about["wall_s"],
         counts=about["counts"],
     )  # fmt: skip

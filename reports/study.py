@@ -15,9 +15,9 @@ import pyarrow.parquet as pq
 from crossbody.cases import Case, OutputError
 from crossbody.cases._arrays import Floats
 from crossbody.reports.comparison import Entry, table, verdicts
-from crossbody.reports.figures import TRUTH
 from crossbody.reports.jobs import CaseResult
 from crossbody.reports.store import Trace, save
+from crossbody.reports.styles import TRUTH
 from crossbody.reports.thin import keep
 from crossbody.reports.truth import Truth
 
@@ -69,7 +69,8 @@ def _audit(results: Sequence[CaseResult]) -> pd.DataFrame:
 
 def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
     return {
-        "case": case.name, "variant": case.variant, "title": case.title, "engine": engine, "profile": profile,
+        "case": case.name, "variant": case.variant, "title": case.title, "mechanism": case.mechanism,
+        "engine": engine, "profile": profile,
         "coordinates": [{"name": c.name, "unit": c.unit} for c in case.coordinates],
         "contacts": list(case.contacts), "parameters": dict(case.parameters), "units": dict(case.units),
     }  # fmt: skip

@@ -135,7 +135,17 @@ def test_claims_come_out(pushed, felt):
 
 
 def test_claims_are_void_once_a_parameter_is_changed():
-    assert not cases.load("soft_contact", block_mass=0.2).claims
+    changed = cases.load("soft_contact", block_mass=0.2)
+    assert not changed.claims
+    assert {limit.metric for limit in changed.limits} == {"event_times", "energy_drift"}
+
+
+@pytest.mark.parametrize("variant", ["axis", "delta"])
+@pytest.mark.parametrize("kstar", [0.0, 20.0])
+def test_no_limit_asks_for_zero_of_what_is_not_claimed(variant, kstar):
+    case = cases.load("soft_contact", variant, kstar=kstar)
+    claimed = {claim.metric for claim in case.claims}
+    assert {limit.metric for limit in case.limits} == claimed | {"event_times", "energy_drift"}
 
 
 def test_a_mirrored_block_mirrors_the_run(felt):

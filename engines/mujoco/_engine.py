@@ -69,6 +69,7 @@ class Mujoco:
         "default": "the obvious model: contact constants, integrator (Euler) and step (2 ms) as MuJoCo sets them",
     }
     versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
+    orders: Mapping[str, float] = {"matched": 4.0, "default": 1.0}
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without a model here cannot be run."""

@@ -113,6 +113,7 @@ class Pinocchio:
         "admm": "time stepping with ADMM, the LCP baseline: first order, restitution of the law's linear part",
     }
     versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": sksundae.__version__}
+    orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""

@@ -33,6 +33,8 @@ class Point:
         t: time, s.
         q, v (n,), u (nu,): state and inputs.
         active (na,): the rows that are on.
+        p: parameters in place of the system's own; complex for a step in one of them.
+        alpha (nc, 3): a0, a1, a2 in force in place of the system's slow constants.
     """
 
     system: System
@@ -41,6 +43,8 @@ class Point:
     v: Floats
     u: Floats
     active: Index
+    p: Array | None = None
+    alpha: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,10 +68,11 @@ class Derivatives:
     rate_x: Floats
 
 
-def _terms(at: Point, q: Array, v: Array, u: Array) -> tuple[Array, Array, Array, Array, Array]:
+def terms(at: Point, q: Array, v: Array, u: Array) -> tuple[Array, Array, Array, Array, Array]:
     """M in blocks (n/k, k, k), f, and of the active rows H, h, H' v; in the type of the state."""
-    system, kind, na = at.system, np.result_type(q, v, u), len(at.active)
-    p, w = system.p.astype(kind), np.zeros(system.scratch, kind)
+    system, na, given = at.system, len(at.active), at.system.p if at.p is None else at.p
+    kind = np.result_type(q, v, u, given)
+    p, w = given.astype(kind), np.zeros(system.scratch, kind)
     blocks, f = np.zeros((system.n, system.mass_block), kind), np.zeros(system.n, kind)
     H, h, drift = np.zeros((na, system.n), kind), np.zeros(na, kind), np.zeros(na, kind)
     q, v, u = q.astype(kind), v.astype(kind), u.astype(kind)
@@ -76,7 +81,7 @@ def _terms(at: Point, q: Array, v: Array, u: Array) -> tuple[Array, Array, Array
     return blocks.reshape(-1, system.mass_block, system.mass_block), f, H, h, drift
 
 
-def _dense(blocks: Array) -> Array:
+def dense(blocks: Array) -> Array:
     """The block-diagonal matrix (n, n)."""
     count, k, _ = blocks.shape
     M = np.zeros((count, k, count, k), blocks.dtype)
@@ -88,34 +93,35 @@ def _dense(blocks: Array) -> Array:
 
 def _law(at: Point, H: Array, v: Array, h: Array, drift: Array) -> Array:
     """H' v + a1 h' + a0 h + a2 h^3 of the active rows."""
-    a0, a1, a2 = at.system.alpha[at.active].T
+    a0, a1, a2 = (at.system.alpha if at.alpha is None else at.alpha)[at.active].T
     law: Array = drift + a1 * (H @ v) + (a0 + a2 * h * h) * h
     return law
 
 
-def _residual(at: Point, q: Array, v: Array, u: Array, vd: Floats, lam: Floats) -> Array:
-    blocks, f, H, h, drift = _terms(at, q, v, u)
+def residual(at: Point, q: Array, v: Array, u: Array, vd: Floats, lam: Floats) -> Array:
+    blocks, f, H, h, drift = terms(at, q, v, u)
     inertia = (blocks @ vd.reshape(len(blocks), -1, 1)).ravel()
     return np.concatenate([inertia - f - lam @ H, H @ vd + _law(at, H, v, h, drift)])
 
 
-def _gaps(at: Point, q: Array, v: Array) -> Array:
+def gaps(at: Point, q: Array, v: Array) -> Array:
     """Gaps and rates of all rows (2 nc,)."""
-    kind, nc = np.result_type(q, v), at.system.nc
+    given = at.system.p if at.p is None else at.p
+    kind, nc = np.result_type(q, v, given), at.system.nc
     h, hd = np.zeros(nc, kind), np.zeros(nc, kind)
-    at.system.gaps(at.t, q.astype(kind), v.astype(kind), at.system.p.astype(kind), h, hd)
+    at.system.gaps(at.t, q.astype(kind), v.astype(kind), given.astype(kind), h, hd)
     return np.concatenate([h, hd])
 
 
-def _saddle(at: Point) -> tuple[Floats, Floats, Floats]:
+def saddle(at: Point) -> tuple[Floats, Floats, Floats]:
     """K, and the v' and lam that solve K (v', lam) = (f, -law).
 
     Raises:
         SceneError: if the active rows are redundant here, a coordinate has no inertia, or a value is not finite.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        blocks, f, H, h, drift = _terms(at, at.q, at.v, at.u)
-        M, na = _dense(blocks), len(at.active)
+        blocks, f, H, h, drift = terms(at, at.q, at.v, at.u)
+        M, na = dense(blocks), len(at.active)
         right = np.concatenate([f, -_law(at, H, at.v, h, drift)])
     if not (np.all(np.isfinite(M)) and np.all(np.isfinite(H)) and np.all(np.isfinite(right))):
         raise SceneError(f"linearise: the equations have no finite value at q = {at.q.tolist()}, v = {at.v.tolist()}.")
@@ -138,18 +144,18 @@ def derivatives(at: Point) -> Derivatives:
         SceneError: if the active rows are redundant there, a coordinate has no inertia, or a value is not finite.
     """
     n, nu, nc = at.system.n, at.system.inputs, at.system.nc
-    K, vd, lam = _saddle(at)
-    columns, gaps = np.zeros((n + len(lam), 2 * n + nu)), np.zeros((2 * nc, 2 * n))
+    K, vd, lam = saddle(at)
+    columns, slopes = np.zeros((n + len(lam), 2 * n + nu)), np.zeros((2 * nc, 2 * n))
     x = np.concatenate([at.q, at.v, at.u]).astype(complex)
     for k in range(2 * n + nu):
         moved = x.copy()
         moved[k] += 1j * STEP
         q, v, u = np.split(moved, [n, 2 * n])
-        columns[:, k] = _residual(at, q, v, u, vd, lam).imag / STEP
+        columns[:, k] = residual(at, q, v, u, vd, lam).imag / STEP
         if k < 2 * n:
-            gaps[:, k] = _gaps(at, q, v).imag / STEP
+            slopes[:, k] = gaps(at, q, v).imag / STEP
     solved = -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
     return Derivatives(
         vd=vd, lam=lam, vd_x=solved[:n, : 2 * n], vd_u=solved[:n, 2 * n :], lam_x=solved[n:, : 2 * n],
-        lam_u=solved[n:, 2 * n :], gap_x=gaps[:nc], rate_x=gaps[nc:],
+        lam_u=solved[n:, 2 * n :], gap_x=slopes[:nc], rate_x=slopes[nc:],
     )  # fmt: skip

@@ -48,7 +48,7 @@ def linearise(
             that move.
         UnknownName: for another output.
     """
-    at = _point(system, q, v, u, active, t)
+    at = point(system, q, v, u, active, t)
     found = derivatives(at)
     n, nu = system.n, system.inputs
     chosen = tuple(f"q[{i}]" for i in range(n)) if names is None else tuple(names)
@@ -63,9 +63,14 @@ def linearise(
     return model.restricted(np.vstack([found.gap_x[at.active], found.rate_x[at.active]])) if reduce else model
 
 
-def _point(
+def point(
     system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None, active: Sequence[int] | None, t: float
 ) -> Point:
+    """Where to linearise, checked.
+
+    Raises:
+        SceneError: for a state of another shape, or rows that do not exist.
+    """
     rows = np.flatnonzero(np.asarray(system.unilateral) == 0) if active is None else np.asarray(active, dtype=np.int64)
     if np.any(rows < 0) or np.any(rows >= system.nc) or len(np.unique(rows)) != len(rows):
         raise SceneError(f"linearise.active is {rows.tolist()}; valid: different rows below {system.nc}.")

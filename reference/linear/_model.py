@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crossbody.cases import InvalidValue, SceneError, UnknownName
+from crossbody.cases import EngineUnavailable, InvalidValue, SceneError, UnknownName
 from crossbody.cases._arrays import frozen
 from crossbody.reference._kinds import Floats, Index
 
@@ -56,6 +56,19 @@ class LinearModel:
         from scipy.signal import StateSpace
 
         return StateSpace(*self.matrices)
+
+    def control(self) -> Any:
+        """The model as `control.StateSpace` of python-control, with its names.
+
+        Raises:
+            EngineUnavailable: if the package `control` is not installed.
+        """
+        try:
+            import control
+        except ImportError:
+            raise EngineUnavailable("python-control is not installed: pip install control.") from None
+        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        return control.ss(*self.matrices, **names)
 
     def poles(self) -> Complex:
         """Eigenvalues of A (nx,), 1/s, the rightmost first.

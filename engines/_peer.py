@@ -1,0 +1,133 @@
+"""What the engines for bodies on a line share: a prepared run, and trajectories from what an engine recorded.
+
+An adaptive integrator records its steps alone. Where a gap changes its sign between two of them, the state there is
+put in from the one on the open side, whose acceleration is constant while nothing touches; likewise where a force
+falls to zero below the surface. A straight line would misplace both by more than the run is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from crossbody.cases import Case, Event, Mode, Outcome, Trajectory
+from crossbody.cases._arrays import Bytes, Floats
+from crossbody.engines._line import FREE, MECHANISMS, Line
+
+ROUNDING = 1e-9
+"""A multiplier below this part of the largest is zero where a crossing was put in."""
+Crossing = tuple[int, float, Floats, Floats]
+"""Before which sample, when (s), and q and v there."""
+
+
+@dataclass(slots=True, kw_only=True)
+class PeerRun:
+    """One prepared run; see `crossbody.engines.Run`."""
+
+    engine: str
+    profile: str
+    settings: Mapping[str, Any]
+    integrate: Callable[[], Trajectory]
+    physics: Mapping[str, Any] = field(default_factory=dict)
+    follows: Case | None = None
+
+    def run(self) -> Trajectory:
+        """Integrate from the start."""
+        return self.integrate()
+
+    def audit(self) -> Mapping[str, Any]:
+        """The physics read back from the model."""
+        return self.physics
+
+
+def why_not(engine: str, case: Case) -> str | None:
+    """The sentence for a mechanism that is not on a line."""
+    if case.mechanism in MECHANISMS:
+        return None
+    return f"{engine} has no model of the mechanism {case.mechanism!r}; it has: {', '.join(MECHANISMS)}."
+
+
+def sampled(
+    line: Line, t: Floats, q: Floats, v: Floats, lam: Floats, **more: Any
+) -> Trajectory:  # fmt: skip
+    """The motion from the steps of an adaptive integrator, with touches and releases put in.
+
+    Args:
+        line: the scene.
+        t: ends of the steps (n,), s.
+        q: positions there (n, nb).
+        v: velocities there.
+        lam: multipliers there (n, nc), N.
+        more: wall_s, steps, outcome and message, as in `Trajectory`.
+    """
+    at, new = _crossings(line, t, q, v)
+    if len(at):
+        t, q, v = (np.insert(a, at, b, axis=0) for a, b in zip((t, q, v), new, strict=True))
+        push = line.memoryless(*new[1:])
+        lam = np.insert(lam, at, np.where(push > ROUNDING * np.max(np.abs(lam), initial=0.0), push, 0.0), axis=0)
+    gap, energy = line.observe(q, v)
+    mode = line.modes(q, v, lam)
+    return Trajectory(
+        t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=events(t, mode), **more
+    )  # fmt: skip
+
+
+def _crossings(line: Line, t: Floats, q: Floats, v: Floats) -> tuple[list[int], tuple[Floats, Floats, Floats]]:
+    """Before which samples a gap passes zero, or below it what would push, and t, q, v there, in order."""
+    h, lam = line.gaps(q), line.spring(q, v)
+    found = [_touch(line, t, q, v, i, row) for i, row in np.argwhere(h[1:] * h[:-1] < 0.0)]
+    below = (h[1:] < 0.0) & (h[:-1] < 0.0) & (lam[1:] * lam[:-1] < 0.0) & line.unilateral
+    found += [_turn(line, t, q, v, i, row) for i, row in np.argwhere(below)]
+    kept = sorted((e for e in found if e is not None), key=lambda entry: entry[1])
+    n = len(line.masses)
+    there = [np.reshape([e[k] for e in kept], (-1, n)) for k in (2, 3)]
+    return [e[0] for e in kept], (np.array([e[1] for e in kept]), there[0], there[1])
+
+
+def _touch(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Crossing | None:
+    """From the state on the open side of a step, whose acceleration is constant."""
+    side = i if line.gaps(q[i])[row] > 0.0 else i + 1
+    a = line.acceleration(q[side], v[side])
+    h, hd, hdd = (float(x[row]) for x in (line.gaps(q[side]), line.rates(v[side]), line.rates(a)))
+    tau = _root(0.5 * hdd, hd, h)
+    if not t[i] < t[side] + tau < t[i + 1]:
+        return None
+    return i + 1, float(t[side] + tau), q[side] + tau * (v[side] + 0.5 * tau * a), v[side] + tau * a
+
+
+def _turn(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Crossing | None:
+    """From the cubic through both ends of a step: only the rate of the acceleration jumps inside."""
+    cubic = CubicHermiteSpline(t[i : i + 2], q[i : i + 2], v[i : i + 2])
+    rate = cubic.derivative()
+    at = float(brentq(lambda s: float(line.spring(cubic(s), rate(s))[row]), t[i], t[i + 1], xtol=1e-300, rtol=1e-15))
+    return (i + 1, at, cubic(at), rate(at)) if t[i] < at < t[i + 1] else None
+
+
+def _root(a: float, b: float, c: float) -> float:
+    """The root of a x^2 + b x + c closest to zero; NaN if there is none."""
+    square = b * b - 4.0 * a * c
+    return -2.0 * c / (b + math.copysign(math.sqrt(square), b)) if square >= 0.0 and b != 0.0 else math.nan
+
+
+def events(t: Floats, mode: Bytes) -> tuple[Event, ...]:
+    """One event a change of mode; a start that is not free is its own first event."""
+    before = np.vstack([np.where(mode[:1] == Mode.BILATERAL, mode[:1], FREE), mode[:-1]])
+    changed = np.argwhere(mode != before)
+    return tuple(
+        Event(t=float(t[i]), contact=int(c), before=Mode(int(before[i, c])), after=Mode(int(mode[i, c])))
+        for i, c in changed
+    )
+
+
+def ended(line: Line, q: Floats, v: Floats) -> Outcome:
+    """Whether a state is finite and within a million times the sizes of the scene."""
+    if not (np.isfinite(q).all() and np.isfinite(v).all()):
+        return Outcome.NOT_FINITE
+    fast = math.hypot(line.sizes[1], float(np.max(np.abs(line.v0), initial=0.0)))
+    return Outcome.DIVERGED if np.max(np.abs(v)) > 1e3 * fast else Outcome.FINISHED

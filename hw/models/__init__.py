@@ -1,0 +1,31 @@
+"""What a log can be replayed on: one module a model, found by its name, imported only when asked for.
+
+A model is a module here with one public name, `MODEL`, a `Model`.
+"""
+
+from __future__ import annotations
+
+from crossbody.cases import _registry
+from crossbody.hw.models._contract import Model
+
+__all__ = ["Model", "load", "names", "summary"]
+
+
+def names() -> tuple[str, ...]:
+    """Names of all models; imports none of them."""
+    return _registry.plugin_names(__name__, list(__path__))
+
+
+def summary(name: str) -> str:
+    """What a model is, in one line; imports nothing."""
+    return _registry.summary(__name__, list(__path__), name)
+
+
+def load(name: str) -> Model:
+    """Import a model.
+
+    Raises:
+        UnknownName: if there is no such model; the message lists the names.
+    """
+    model: Model = _registry.load_plugin("model", __name__, list(__path__), name).MODEL
+    return model

@@ -1,0 +1,245 @@
+"""Derivatives of a motion by its start and by parameters, through its contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import solve_ivp
+
+from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
+from crossbody.reference._kinds import Array, Floats
+from crossbody.reference._simulate import simulate
+from crossbody.reference._system import System, initial_modes
+from crossbody.reference.linear._derivatives import Point
+from crossbody.reference.linear._linearise import point
+from crossbody.reference.linear._variation import (
+    Theta,
+    bounced,
+    gap_gradient,
+    gradient,
+    handover_gradient,
+    lam_gradient,
+    slopes,
+    theta,
+)
+
+ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
+GRAZING = 1e-12  # part of the terms of g_x f below which an event is only grazed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Jump:
+    """What an event does to small deviations.
+
+    Attributes:
+        t: instant, s.
+        contact: row.
+        before, after: its mode.
+        matrix (2 n, 2 n): the saltation matrix.
+    """
+
+    t: float
+    contact: int
+    before: Mode
+    after: Mode
+    matrix: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sensitivity:
+    """A motion to its horizon and its first derivatives there; NaN where the motion or an event has none.
+
+    Attributes:
+        run: the motion.
+        state (2 n,): q and v at the end.
+        by_start (2 n, 2 n): derivative by q0 and v0. Of a periodic motion over its period, the monodromy matrix.
+        by_parameters (2 n, k): derivative by the parameters.
+        names: of the parameters.
+        jumps: the events that were passed.
+        outcome: that of the run; ILL_POSED if an event is only grazed, where the derivative does not exist.
+    """
+
+    run: Trajectory
+    state: Floats
+    by_start: Floats
+    by_parameters: Floats
+    names: tuple[str, ...]
+    jumps: tuple[Jump, ...]
+    outcome: Outcome
+
+    @property
+    def multipliers(self) -> Array:
+        """Eigenvalues of `by_start` (2 n,), the largest first: Floquet's multipliers of a periodic motion."""
+        found = np.linalg.eigvals(self.by_start)
+        return found[np.argsort(-np.abs(found))]
+
+
+def sensitivity(
+    system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, *, parameters: Sequence[str] = (),
+    u: ArrayLike | None = None, rtol: float = 1e-11, collisions: str = "sequential", max_steps: int = 1_000_000,
+) -> Sensitivity:  # fmt: skip
+    """Integrate a motion with its variational equations; every event multiplies them by its saltation matrix.
+
+    Args:
+        system: the mechanism, without a sampled controller.
+        q0: positions at the start (n,).
+        v0: velocities at the start (n,).
+        t_end: horizon, s.
+        parameters: by name, "p[k]", or "a0[i]", "a1[i]", "a2[i]" of row i's slow law.
+        u: constant inputs (nu,), zero if not given.
+        rtol: tolerance of the motion and of its derivatives.
+        collisions: rule for several contacts; "simultaneous" with one collision at a time only.
+        max_steps: bound on the steps of the motion.
+
+    Raises:
+        SceneError: for a sampled controller, or a motion that switches discrete variables or strikes several rows
+            together: their instants have no derivative here.
+        UnknownName: for a parameter that is not there.
+    """
+    over, at = theta(system, parameters), point(system, q0, v0, u, [], 0.0)
+    if system.control is not None:
+        raise SceneError("sensitivity: the system has a sampled controller; differentiate it with its inputs held.")
+    run = simulate(
+        system, at.q, at.v, t_end, rtol=rtol, collisions=collisions, inputs=([0.0], [at.u]), max_steps=max_steps
+    )
+    if any(switch.t > 0.0 for switch in run.switches):
+        raise SceneError("sensitivity: the motion switches discrete variables; end it before the first switch.")
+    walk = _Walk(at, over, rtol)
+    outcome = walk.along(run, t_end) if run.outcome.ok else run.outcome
+    if not outcome.ok:
+        walk.S[:] = np.nan
+    n = system.n
+    return Sensitivity(
+        run=run, state=walk.x, by_start=walk.S[:, : 2 * n], by_parameters=walk.S[:, 2 * n :], names=over.names,
+        jumps=tuple(walk.jumps), outcome=outcome,
+    )  # fmt: skip
+
+
+class _Walk:
+    """State x (2 n,) and its derivative S (2 n, 2 n + k) on the way through a motion."""
+
+    def __init__(self, at: Point, over: Theta, rtol: float) -> None:
+        n = at.system.n
+        self.at, self.over, self.rtol = at, over, rtol
+        self.x = np.concatenate([at.q, at.v])
+        self.S = np.hstack([np.eye(2 * n), np.zeros((2 * n, len(over.names)))])
+        self.modes = initial_modes(at.system).astype(int).tolist()
+        self.jumps: list[Jump] = []
+
+    def along(self, run: Trajectory, t_end: float) -> Outcome:
+        """Go to the end; FINISHED, or how the derivative was lost."""
+        now = 0.0
+        for t, group in groupby(run.events, key=lambda event: event.t):
+            self._smooth(now, t)
+            now = t
+            for piece in _pieces(list(group)):
+                if not self._event(piece):
+                    return Outcome.ILL_POSED
+        self._smooth(now, t_end)
+        return Outcome.FINISHED if np.isfinite(self.S).all() else Outcome.NOT_FINITE
+
+    def _here(self) -> Point:
+        """The present state, with the rows and constants of the present modes."""
+        system, n = self.at.system, self.at.system.n
+        modes = [self.modes[f] if f >= 0 else m for m, f in zip(self.modes, np.asarray(system.follows), strict=True)]
+        fast = (np.array(modes) == Mode.COLLISION) & (np.asarray(system.b0) > 0.0)
+        return replace(
+            self.at, q=self.x[:n].copy(), v=self.x[n:].copy(), alpha=np.where(fast[:, None], system.beta, system.alpha),
+            active=np.array([i for i, mode in enumerate(modes) if mode in ACTIVE], dtype=np.int64),
+        )  # fmt: skip
+
+    def _smooth(self, start: float, end: float) -> None:
+        """Integrate x and S between two events."""
+        if not end > start:
+            return
+        here, n = self._here(), self.at.system.n
+        shape = self.S.shape
+
+        def rate(t: float, y: Floats) -> Floats:
+            moved = replace(here, t=t, q=y[:n].copy(), v=y[n : 2 * n].copy())
+            f, _, slope = slopes(moved, self.over)
+            S = y[2 * n :].reshape(shape)
+            changed = slope[:n, : 2 * n] @ S
+            changed[:, 2 * n :] += slope[:n, 2 * n :]
+            return np.concatenate([f, S[n:].ravel(), changed.ravel()])
+
+        y = np.concatenate([self.x, self.S.ravel()])
+        scale = np.concatenate([np.full(2 * n, 1e-3), np.full(self.S.size, 1e-3)])
+        done: Any = solve_ivp(rate, (start, end), y, method="DOP853", rtol=self.rtol, atol=self.rtol * scale)
+        self.x, self.S = done.y[: 2 * n, -1].copy(), done.y[2 * n :, -1].reshape(shape).copy()
+
+    def _event(self, piece: list[Event]) -> bool:
+        """Pass one event, or one frozen collision with all that it does; False if it is only grazed."""
+        event, before = piece[0], self._here()
+        frozen = len(piece) > 1 and piece[1].before is Mode.COLLISION
+        start, n = event.t == 0.0 and not frozen, self.at.system.n
+        R, jumped = np.eye(2 * n, self.S.shape[1]), self.x
+        if frozen:
+            let_go = {e.contact for e in piece[2:]}
+            held = [i for i in before.active.tolist() if i not in let_go]
+            struck = replace(before, active=np.array([*held, event.contact], dtype=np.int64))
+            after = bounced(struck, event.contact, piece[1].after is Mode.CONTACT)
+            R = gradient(after, struck, self.over)
+            jumped = after(struck, self.x[:n], self.x[n:])
+        guard = None if start else self._guard(event, before)
+        old, _, _ = slopes(before, self.over)
+        for e in piece:
+            self.modes[e.contact] = int(e.after)
+        self.x = jumped
+        if guard is None:
+            return True
+        new, _, _ = slopes(self._here(), self.over)
+        return self._jump(piece, guard, R, old, new)
+
+    def _jump(self, piece: list[Event], g: Floats, R: Floats, old: Floats, new: Floats) -> bool:
+        width = len(old)
+        speed = float(g[:width] @ old)
+        if not abs(speed) > GRAZING * float(np.abs(g[:width]) @ np.abs(old)):
+            return False
+        kick = R[:, :width] @ old - new
+        change = g[:width] @ self.S
+        change[width:] += g[width:]
+        S = R[:, :width] @ self.S - np.outer(kick, change) / speed
+        S[:, width:] += R[:, width:]
+        self.S = S
+        matrix = R[:, :width] - np.outer(kick, g[:width]) / speed
+        self.jumps.append(
+            Jump(t=piece[0].t, contact=piece[0].contact, before=piece[0].before, after=piece[-1].after, matrix=matrix)
+        )
+        return True
+
+    def _guard(self, event: Event, here: Point) -> Floats | None:
+        """Gradient of what fell to zero; None where nothing changes but a label."""
+        i, before, after = event.contact, event.before, event.after
+        if before is Mode.FREE:
+            return gap_gradient(here, self.over, i)
+        if before is Mode.COLLISION and after is Mode.CONTACT:
+            return handover_gradient(here, self.over, i)
+        if before in ACTIVE:
+            return lam_gradient(here, self.over, i)
+        return None if after is Mode.FREE else gap_gradient(here, self.over, i, rate=True)
+
+
+def _pieces(events: list[Event]) -> Iterator[list[Event]]:
+    """Events of one instant: each frozen collision with its end and the rows it releases, every other one alone.
+
+    Raises:
+        SceneError: if several rows strike together.
+    """
+    k = 0
+    while k < len(events):
+        size = 1
+        ends = [e for e in events[k + 1 :] if e.contact == events[k].contact and e.before is Mode.COLLISION]
+        if events[k].after is Mode.COLLISION and ends:
+            if events[k + 1] is not ends[0]:
+                raise SceneError("sensitivity: several rows strike together; their instants have no common derivative.")
+            size = 2
+            while k + size < len(events) and events[k + size].before is Mode.CONTACT:
+                size += 1
+        yield events[k : k + size]
+        k += size

@@ -1,0 +1,143 @@
+"""Equilibria with unknown positions, rates, inputs and multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from crossbody.cases import Outcome
+from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference._system import System
+from crossbody.reference.linear._derivatives import STEP, Point, terms
+from crossbody.reference.linear._linearise import point
+
+STEPS = 50
+SETTLED = 1e-13  # part of the terms of an equation that may be left
+HALVINGS = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trim:
+    """A steady motion v' = 0.
+
+    Attributes:
+        q, v (n,), u (nu,): state and inputs.
+        lam (na,): multipliers of the active rows, N.
+        active (na,): these rows.
+        residual: largest part of an equation's terms that is left.
+        outcome: FINISHED; STEP_LIMIT without an equilibrium nearby; ILL_POSED or NOT_FINITE on the way.
+        pulling: active rows that would pull though they may not: the equilibrium exists for the equations alone.
+    """
+
+    q: Floats
+    v: Floats
+    u: Floats
+    lam: Floats
+    active: Index
+    residual: float
+    outcome: Outcome
+    pulling: tuple[int, ...]
+
+
+def trim(
+    system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
+    active: Sequence[int] | None = None, *, free: Sequence[int] | None = None, rates: Sequence[int] = (),
+    inputs: Sequence[int] = (), t: float = 0.0,
+) -> Trim:  # fmt: skip
+    """Solve f(q, v, u) + H_A^T lam = 0 with h_A = 0 and H_A v = 0 by the damped method of Gauss and Newton.
+
+    Steps are the smallest that satisfy the linearised equations, so what they leave open stays as given. A row without
+    stiffness (a0 = a2 = 0, a slip row) has no h of its own.
+
+    Args:
+        system: the mechanism.
+        q: positions (n,), a guess for those that are free.
+        v: velocities (n,), zero if not given.
+        u: inputs (nu,), zero if not given.
+        active: rows that are on; those that are always on, if not given.
+        free: coordinates that may move; all of them if not given.
+        rates: velocities that may change: of cyclic coordinates, which nothing depends on.
+        inputs: inputs that may change.
+        t: time, s.
+
+    Raises:
+        SceneError: for arrays of another shape, or rows that do not exist.
+    """
+    at = point(system, q, v, u, active, t)
+    n, nu, na = system.n, system.inputs, len(at.active)
+    moved = [*(range(n) if free is None else free), *(n + i for i in rates), *(2 * n + i for i in inputs)]
+    unknown = np.array([*moved, *range(2 * n + nu, 2 * n + nu + na)], dtype=np.int64)
+    x = np.concatenate([at.q, at.v, at.u, np.zeros(na)])
+    x[2 * n + nu :] = _multipliers(at, x)
+    outcome, left = _solved(at, x, unknown)
+    lam = x[2 * n + nu :]
+    pulls = (lam < 0.0) & np.asarray(system.unilateral, dtype=bool)[at.active] & (np.asarray(system.a0)[at.active] > 0)
+    return Trim(
+        q=x[:n], v=x[n : 2 * n], u=x[2 * n : 2 * n + nu], lam=lam, active=at.active, residual=left, outcome=outcome,
+        pulling=tuple(at.active[pulls].tolist()),
+    )  # fmt: skip
+
+
+def _balance(at: Point, x: Array) -> tuple[Array, Floats]:
+    """The equations that must vanish, and the size of their terms."""
+    n, nu = at.system.n, at.system.inputs
+    q, v, u, lam = np.split(x, [n, 2 * n, 2 * n + nu])
+    _, f, H, h, _ = terms(at, q, v, u)
+    a0, _, a2 = at.system.alpha[at.active].T
+    stiff = (a0 > 0.0) | (a2 > 0.0)
+    forces = np.abs(f) + np.abs(lam) @ np.abs(H)
+    sizes = [np.full(n, forces.max(initial=1e-300)), np.full(int(stiff.sum()), np.abs(q).max(initial=1e-6))]
+    sizes.append(np.full(len(lam), np.abs(v).max(initial=1e-6)))
+    return np.concatenate([f + lam @ H, h[stiff], H @ v]), np.concatenate(sizes).real
+
+
+def _multipliers(at: Point, x: Floats) -> Floats:
+    """The multipliers that balance the forces best."""
+    n = at.system.n
+    _, f, H, _, _ = terms(at, *np.split(x[: 2 * n + at.system.inputs], [n, 2 * n]))
+    if not (np.isfinite(f).all() and np.isfinite(H).all()):
+        return np.zeros(len(H))
+    return np.asarray(np.linalg.lstsq(H.T, -f, rcond=None)[0], dtype=np.float64)
+
+
+def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float]:
+    """Improve x in place."""
+    value, size = _balance(at, x)
+    if not np.isfinite(value).all():
+        return Outcome.NOT_FINITE, np.inf
+    left = float(np.abs(value / size).max(initial=0.0))
+    for _ in range(STEPS):
+        if left <= SETTLED:
+            return Outcome.FINISHED, left
+        J = np.empty((len(value), len(unknown)))
+        for k, i in enumerate(unknown):
+            moved = x.astype(complex)
+            moved[i] += 1j * STEP
+            J[:, k] = _balance(at, moved)[0].imag / STEP
+        if not np.isfinite(J).all():
+            return Outcome.ILL_POSED, left
+        step = np.linalg.lstsq(J / size[:, None], -value / size, rcond=1e-12)[0]
+        better = _searched(at, x, unknown, step, left)
+        if better is None:
+            break
+        value, size, left = better
+    return (Outcome.FINISHED if left <= 1e3 * SETTLED else Outcome.STEP_LIMIT), left
+
+
+def _searched(
+    at: Point, x: Floats, unknown: Index, step: Floats, left: float
+) -> tuple[Floats, Floats, float] | None:  # fmt: skip
+    """Go along a step as far as it improves, x in place; None if it does not."""
+    before = x[unknown].copy()
+    for halving in range(HALVINGS):
+        x[unknown] = before + 0.5**halving * step
+        with np.errstate(over="ignore", invalid="ignore"):
+            value, size = _balance(at, x)
+        now = float(np.abs(value / size).max(initial=0.0)) if np.isfinite(value).all() else np.inf
+        if now < left:
+            return value.real, size, now
+    x[unknown] = before
+    return None

@@ -1,0 +1,136 @@
+"""The right-hand side in one mode set with its derivatives by the state and by parameters, and what happens at events.
+
+At an event g(x, theta) = 0 with x+ = R(x-, theta) the derivative S of the motion jumps (Leine and Nijmeijer 2004,
+chapter 7; R is the identity except at a frozen collision):
+
+    S+ = R_x S- + R_theta + (R_x f- - f+) dtau        dtau = -(g_x S- + g_theta)/(g_x f-)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from crossbody.cases import UnknownName
+from crossbody.cases._closed_forms import damping_ratio, restitution
+from crossbody.reference._kinds import Array, Floats
+from crossbody.reference._system import System
+from crossbody.reference.linear._derivatives import STEP, Point, dense, gaps, residual, saddle, terms
+
+HANDOVER = 0.01
+"""Elastic part of lam at which COLLISION becomes CONTACT (spec 1.2)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Theta:
+    """Parameters that a motion is differentiated by: places in p, or (row, column) of the law."""
+
+    names: tuple[str, ...]
+    places: tuple[int | tuple[int, int], ...]
+
+    def moved(self, at: Point, k: int) -> Point:
+        """The point with an imaginary step in parameter k."""
+        place = self.places[k]
+        if isinstance(place, int):
+            p = (at.system.p if at.p is None else at.p).astype(complex)
+            p[place] += 1j * STEP
+            return replace(at, p=p)
+        alpha = (at.system.alpha if at.alpha is None else at.alpha).astype(complex)
+        alpha[place] += 1j * STEP
+        return replace(at, alpha=alpha)
+
+
+def theta(system: System, names: Sequence[str]) -> Theta:
+    """Find parameters by name: those of the system, p[3], or a0[0], a1[0], a2[0] of row 0's law.
+
+    Raises:
+        UnknownName: for one that is not there.
+    """
+    own = list(system.parameters) if isinstance(system.parameters, Mapping) else []
+    places: list[int | tuple[int, int]] = []
+    for name in names:
+        part = re.fullmatch(r"(p|a0|a1|a2)\[(\d+)\]", name)
+        size = 0 if part is None else len(system.p) if part[1] == "p" else system.nc
+        if name in own:
+            places.append(own.index(name))
+        elif part is not None and int(part[2]) < size:
+            places.append(int(part[2]) if part[1] == "p" else (int(part[2]), int(part[1][1])))
+        else:
+            raise UnknownName("parameter of the sensitivity", name, [*own, "p[k]", "a0[i]", "a1[i]", "a2[i]"])
+    return Theta(names=tuple(names), places=tuple(places))
+
+
+def gradient(function: Callable[[Point, Array, Array], Array], at: Point, over: Theta) -> Floats:
+    """Derivative of function(at, q, v) by (q, v, theta), by complex step; the last axis is that of the variables."""
+    n, columns = at.system.n, []
+    x = np.concatenate([at.q, at.v]).astype(complex)
+    for k in range(2 * n):
+        moved = x.copy()
+        moved[k] += 1j * STEP
+        columns.append(function(at, moved[:n], moved[n:]).imag / STEP)
+    for k in range(len(over.places)):
+        columns.append(np.asarray(function(over.moved(at, k), x[:n], x[n:])).imag / STEP)
+    return np.stack(columns, axis=-1)
+
+
+def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
+    """Right-hand side f (2 n,), multipliers (na,), and the derivatives of (v', lam) by (q, v, theta).
+
+    Raises:
+        SceneError: where the active rows are redundant or a value is not finite.
+    """
+    K, vd, lam = saddle(at)
+    columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
+    return np.concatenate([at.v, vd]), lam, -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
+
+
+def gap_gradient(at: Point, over: Theta, i: int, *, rate: bool = False) -> Floats:
+    """Of gap i, or of its rate."""
+    place = i + at.system.nc * rate
+    return gradient(lambda here, q, v: gaps(here, q, v)[place], at, over)
+
+
+def lam_gradient(at: Point, over: Theta, i: int) -> Floats:
+    """Of the multiplier of row i, which is active."""
+    found: Floats = slopes(at, over)[2][at.system.n + at.active.tolist().index(i)]
+    return found
+
+
+def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
+    """Of b1 |h'| + b0 |h| - HANDOVER lam_i/(G^-1)_ii, where a collision is spent (spec 1.2)."""
+    j, n = at.active.tolist().index(i), at.system.n
+    _, lam, slope = slopes(at, over)
+    b0, b1, _ = at.system.beta[i]
+    signs = np.sign(gaps(at, at.q, at.v)[[i, i + at.system.nc]])
+
+    def elastic(here: Point, q: Array, v: Array) -> Array:
+        h = gaps(here, q, v)[[i, i + at.system.nc]]
+        return b0 * signs[0] * h[:1] + b1 * signs[1] * h[1:]
+
+    def mobility(here: Point, q: Array, v: Array) -> Array:
+        blocks, _, H, _, _ = terms(here, q, v, at.u)
+        G = H @ np.linalg.solve(dense(blocks), H.T)
+        return 1.0 / np.linalg.inv(G)[j, j : j + 1]
+
+    share = mobility(at, at.q, at.v)[0].real
+    change = gradient(elastic, at, over)[0] - HANDOVER * lam[j] * gradient(mobility, at, over)[0]
+    found: Floats = change - HANDOVER * share * slope[n + j]
+    return found
+
+
+def bounced(at: Point, i: int, captured: bool) -> Callable[[Point, Array, Array], Array]:
+    """The map (q, v) -> (q, v+) of a frozen collision of row i while the other active rows stay held (spec 1.2)."""
+    j = at.active.tolist().index(i)
+    b0, b1, _ = at.system.beta[i]
+    share = 1.0 if captured else 1.0 + restitution(damping_ratio(float(b0), float(b1)))
+
+    def after(here: Point, q: Array, v: Array) -> Array:
+        blocks, _, H, _, _ = terms(here, q, v, at.u)
+        X = np.linalg.solve(dense(blocks), H.T)
+        impulse = np.linalg.solve(H @ X, np.eye(len(H))[j])
+        return np.concatenate([q, v - share * (H[j] @ v) * (X @ impulse)])
+
+    return after

@@ -1,0 +1,112 @@
+"""The index: which engine is to be trusted for which case, and at what cost; and what has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import pandas as pd
+
+from crossbody.reports.case_page import provenance
+from crossbody.reports.changes import changes
+from crossbody.reports.html import Page
+from crossbody.reports.results import CaseFiles, Results
+from crossbody.reports.section import Section
+from crossbody.reports.verdict import Word
+
+SHOWN = 100
+"""Cases on one page of the index."""
+JUDGED = (Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
+
+
+def index_pages(found: Results) -> list[Page]:
+    """The index, in as many pages as its cases need."""
+    cut = [found.cases[i : i + SHOWN] for i in range(0, len(found.cases), SHOWN)] or [()]
+    names = ["index", *(f"index-{i}" for i in range(2, len(cut) + 1))]
+    return [
+        Page(
+            name=name, title="crossbody" if i == 0 else f"crossbody, cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
+            lead="Which engine to trust for which case, and at what cost." if found.cases else "",
+            sections=_sections(found, cases, names, i),
+        ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
+    ]  # fmt: skip
+
+
+def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> list[Section]:
+    shown = [_matrix(found, cases, names, i)] if cases else []
+    if i == 0 and found.base is not None:
+        shown.append(changes(found.verdicts, found.base, found.base_name))
+    return [*shown, provenance(found)] if i == 0 else shown
+
+
+def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> Section:
+    rows = found.verdicts
+    engines = list(dict.fromkeys(rows["who"]))
+    counted = {key: group["verdict"].value_counts() for key, group in rows.groupby(["label", "who"], sort=False)}
+    why = rows[rows["verdict"] == Word.SKIPPED.value].set_index(["label", "who"])["why"].to_dict()
+    lines = [
+        {"case": case, "cells": [_cell(found, counted, why, case.label, who) for who in engines]} for case in cases
+    ]
+    return Section(
+        name="matrix", title="Verdicts", template="matrix.html",
+        context={
+            "heads": _heads(engines), "lines": lines, "tiles": _tiles(found, engines), "pages": names, "here": i,
+            "cases": len(found.cases), "warning": _warning(found),
+        },
+    )  # fmt: skip
+
+
+def _heads(engines: Sequence[str]) -> list[dict[str, Any]]:
+    """Engines over their profiles."""
+    groups: dict[str, list[str]] = {}
+    for who in engines:
+        engine, _, profile = who.partition(":")
+        groups.setdefault(engine, []).append(profile)
+    return [{"engine": engine, "profiles": profiles} for engine, profiles in groups.items()]
+
+
+def _cell(
+    found: Results, counted: Mapping[Any, pd.Series], why: Mapping[Any, str], label: str, who: str
+) -> dict[str, Any]:
+    """Worst word of one engine on one case, how many of how many, and its run time."""
+    counts = counted.get((label, who))
+    if counts is None:
+        return {"word": "", "who": who, "text": "", "title": f"{who} was not asked for {label}."}
+    judged = {word: int(counts.get(word, 0)) for word in JUDGED}
+    word = next((word for word, n in judged.items() if n), "skipped" if "skipped" in counts else "not judged")
+    wall = found.walls.get((label, who))
+    said = ", ".join(f"{n} {word}" for word, n in judged.items() if n)
+    title = f"{who} on {label}: {said or why.get((label, who), word)}"
+    total = sum(judged.values())
+    text = (str(total) if word == "within" else f"{judged[word]} of {total}") if total else ""
+    return {"word": word, "who": who, "text": text, "title": title, "wall": _time(wall)}
+
+
+def _time(wall: float | None) -> str:
+    """A run time in three digits and its unit."""
+    if not wall:
+        return ""
+    return f"{wall:.3g} s" if wall >= 1.0 else f"{1e3 * wall:.3g} ms"
+
+
+def _tiles(found: Results, engines: Sequence[str]) -> list[dict[str, Any]]:
+    counts = found.verdicts["verdict"].value_counts()
+    words = {word: int(counts.get(word, 0)) for word in ("within", "expected-outside", "outside", "skipped")}
+    different = 0 if found.audit.empty else int((~found.audit["same"].astype(bool)).sum())
+    return [
+        {"value": len(found.cases), "title": "cases", "word": ""},
+        {"value": len(engines), "title": "engines with profile", "word": ""},
+        *({"value": n, "title": word, "word": word} for word, n in words.items()),
+        {"value": different, "title": "differ in the parity audit", "word": "outside" if different else ""},
+    ]
+
+
+def _warning(found: Results) -> str:
+    """Says if another version made the results."""
+    by = str(found.told.get("versions", {}).get("crossbody", "an unknown version"))
+    try:
+        mine = version("crossbody")
+    except PackageNotFoundError:
+        return ""
+    return "" if by == mine else f"These results were made by crossbody {by}; the pages by {mine}."

@@ -1,0 +1,93 @@
+"""What a mechanism looks like: a module here, named like the mechanism, draws its motion.
+
+A module has a docstring whose first line says what is drawn, and the public names
+
+    stage(p)                        a `Stage`: shapes that stand still and shapes of bodies, from the parameters
+    poses(q, p)                     planar: x, y, angle of bodies (n, bodies, 3); spatial: points (n, points, 3)
+    arrows(q, lam, p)               point and force of every arrow (n, arrows, 2 * dimensions), m and N
+
+and it knows neither numba nor an engine: a picture is made from stored coordinates alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, cast
+
+from crossbody.cases import Value, _registry
+from crossbody.cases._arrays import Floats
+
+Parameters = Mapping[str, Value]
+Shape = Mapping[str, Any]
+"""`points` [[x, y], ...] with `closed`, or `circle` [x, y, r]; `fill` for what is solid."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """What does not move, and what moves with every body.
+
+    Attributes:
+        still: shapes at rest (planar), or lines of points in space (spatial).
+        bodies: shapes of every body in its own frame, about its origin (planar).
+        threads: (x, y, body): a line from a fixed point to a body's origin (planar).
+        lines: indices of points joined by one line (spatial); dimensions are 3 where there are any.
+        down: whether the third axis points down (spatial).
+    """
+
+    still: tuple[Shape, ...] = ()
+    bodies: tuple[tuple[Shape, ...], ...] = ()
+    threads: tuple[tuple[float, float, int], ...] = ()
+    lines: tuple[tuple[int, ...], ...] = ()
+    down: bool = False
+
+    @property
+    def dimensions(self) -> int:
+        """2 or 3."""
+        return 3 if self.lines else 2
+
+
+class Scene(Protocol):
+    """What every module offers."""
+
+    def stage(self, p: Parameters) -> Stage:
+        """What is drawn."""
+        ...
+
+    def poses(self, q: Floats, p: Parameters) -> Floats:
+        """Where it is."""
+        ...
+
+    def arrows(self, q: Floats, lam: Floats, p: Parameters) -> Floats:
+        """Contact forces."""
+        ...
+
+
+def names() -> tuple[str, ...]:
+    """Mechanisms that can be drawn; imports none."""
+    return _registry.plugin_names(__name__, list(__path__))
+
+
+def load(name: str) -> Scene:
+    """Import a mechanism's picture.
+
+    Raises:
+        UnknownName: if there is none; the message lists the names.
+    """
+    return cast("Scene", _registry.load_plugin("picture of a mechanism", __name__, list(__path__), name))
+
+
+def circle(x: float, y: float, r: float, *, fill: bool = True) -> Shape:
+    """A disc or a ring."""
+    return {"circle": [x, y, r], "fill": fill}
+
+
+def box(x: float, y: float, width: float, height: float) -> Shape:
+    """A rectangle about (x, y)."""
+    a, b = width / 2, height / 2
+    return path([(x - a, y - b), (x + a, y - b), (x + a, y + b), (x - a, y + b)], closed=True)
+
+
+def path(points: Any, *, closed: bool = False) -> Shape:
+    """A line, or a solid if closed."""
+    return {"points": [[float(c) for c in point] for point in points], "closed": closed, "fill": closed}

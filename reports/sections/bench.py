@@ -1,0 +1,46 @@
+"""Run time against error: the work-precision diagram, observed orders, timings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.study import read_json
+
+TITLE = "Run time"
+TEXT = (
+    "Models built and warmed before the clock, engines interleaved, median with interquartile range. A failed run is a "
+    "cross, never dropped. An engine that follows another state machine is judged against that machine's truth. "
+    "Compare ratios: seconds belong to one machine."
+)
+ORDERS = columns(
+    case="Case", who="Engine", knob="Setting", order=("Observed order [1]", Kind.NUMBER), says=("Says", Kind.LONG)
+)
+TIMINGS = columns(
+    case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER), against="Against the truth of",
+    error=("Error [1]", Kind.NUMBER), honesty=("Error over tolerance [1]", Kind.NUMBER),
+    median_ms=("Median [ms]", Kind.NUMBER), iqr_ms=("IQR [ms]", Kind.NUMBER), repeats=("Repeats", Kind.NUMBER),
+    outcome="Outcome",
+)  # fmt: skip
+
+
+def sections(out: Path) -> tuple[Section, ...]:
+    """One section, if anything was timed."""
+    if not (out / "bench.json").is_file():
+        return ()
+    from crossbody.reports.bench_figure import work_precision
+
+    rows, orders = (_named(pd.DataFrame(read_json(out / f"{name}.json")["rows"])) for name in ("bench", "orders"))
+    tables = (
+        Table(title="Observed order", columns=ORDERS, rows=records(orders), file="orders.csv"),
+        Table(title="Timings", columns=TIMINGS, rows=records(rows), file="bench.csv"),
+    )
+    plot = Plot(name="work-precision", figure=work_precision(rows))
+    return (Section(name="bench", title="Run time against error", text=TEXT, plots=(plot,), tables=tables),)
+
+
+def _named(rows: pd.DataFrame) -> pd.DataFrame:
+    """With engine and profile in one column."""
+    return rows.assign(who=rows["engine"] + ":" + rows["profile"]) if len(rows) else rows

@@ -1,0 +1,22 @@
+"""Rows of balls with mass ratios of up to 1e12, collisions in no time and in real time."""
+
+from __future__ import annotations
+
+from crossbody.reports.suites._axis import Levels, Linear, Log, Whole
+from crossbody.reports.suites._contract import Family, Suite
+from crossbody.reports.suites._scenes import uneven
+
+SUITE = Suite(
+    families=(
+        Family(
+            case="newtons_cradle", variant="sliders", scene=uneven,
+            axes={"n": Whole(2, 4), "ratio": Log(1.0, 1e12), "speed": Log(1e-6, 1e3)},
+            grid={"collisions": Levels(("sequential", "simultaneous")), "gap": Levels((0.0, 1e-3))},
+        ),
+        Family(
+            case="newtons_cradle", variant="sliders", scene=uneven, fixed={"n": 2, "collisions": "resolved"}, second=10,
+            axes={"ratio": Log(1.0, 1e12), "a0": Log(1e2, 1e10), "zeta": Linear(0.0, 2.0)},
+        ),
+    ),
+    runs=200,
+)  # fmt: skip

@@ -1,0 +1,183 @@
+"""The command `crossbody stress`: draw, run or go on, join, map, shrink the failures, show."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from crossbody.cases import InvalidValue, OutputError
+from crossbody.reports import jobs, page, study, suites
+from crossbody.reports.provenance import provenance
+from crossbody.reports.suites._contract import Suite
+from crossbody.reports.sweep import draw, pools
+from crossbody.reports.sweep.map import STABILITY, stability_map, summary
+from crossbody.reports.sweep.minimise import failures, reproducers
+from crossbody.reports.sweep.spec import Spec
+from crossbody.reports.sweep.store import SWEEP, Store, identity
+from crossbody.reports.verdict import exit_code
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+LEAST, MOST, CHUNKS = 4, 100, 400
+"""Runs in a chunk, and how many chunks a sweep is cut into if they allow it; not a matter of the number of workers."""
+SHOWN = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """What the user asks for; see the command's help."""
+
+    names: Sequence[str] = ()
+    wanted: Sequence[str] = ()
+    runs: int | None = None
+    seed: int = 0
+    jobs: int = 0
+    scheduler: str | None = None
+    resume: bool = False
+
+
+def stress(ask: Ask, out: Path, as_json: bool, command: str) -> int:
+    """Run suites, or what is left of them; the exit code.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is run.
+    """
+    specs = plan(ask)
+    chunk = min(max(len(specs) // CHUNKS, LEAST), MOST)
+    if ask.resume and not (out / SWEEP).is_file():
+        raise OutputError(f"{out} holds no sweep to go on with; leave --resume out to begin one.")
+    with _client(ask.scheduler) as client:
+        store = Store(out, identity(specs, chunk, {"seed": ask.seed}))
+        sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=as_json)
+    rows, times = store.table()
+    with _bar(None, quiet=as_json) as tell:
+        small = reproducers(rows, specs, tell)
+    _finish(store, rows, times, small, provenance(command, seed=ask.seed))
+    if as_json:
+        print(small.to_json(orient="records", double_precision=15))
+    else:
+        _show(rows, small, out)
+    return exit_code(rows["verdict"])
+
+
+def plan(ask: Ask) -> list[Spec]:
+    """Every run that is asked for.
+
+    Raises:
+        UnknownName, InvalidValue: for a suite, an engine or a number that does not exist; grids that contradict.
+    """
+    if ask.runs is not None and ask.runs < 1:
+        raise InvalidValue(f"--runs is {ask.runs}; a sweep needs at least 1.")
+    names = list(dict.fromkeys(ask.names or suites.names()))
+    chosen: list[tuple[str, Suite]] = [(name, suites.load(name)) for name in names]
+    for name, suite in chosen:
+        draw.check(name, suite)
+    given = jobs.picks(ask.wanted) if ask.wanted else None
+    picks = {name: given or jobs.picks(suite.engines) for name, suite in chosen}
+    return draw.specs(chosen, picks, ask.runs, ask.seed, share=given is None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pool:
+    """Who executes: a number of processes (0: one a processor, 1: this one), or a cluster's client."""
+
+    count: int = 1
+    client: Any = None
+
+
+@contextmanager
+def _client(address: str | None) -> Iterator[Any]:
+    """The cluster, asked for before anything is written."""
+    if address is None:
+        yield None
+        return
+    client = pools.connect(address)
+    try:
+        yield client
+    finally:
+        client.close(timeout=pools.ANSWER)
+
+
+def sweep(store: Store, specs: Sequence[Spec], chunk: int, pool: Pool, quiet: bool) -> None:
+    """Execute what is missing; every chunk is on disk as soon as it is there."""
+    parts = [specs[i : i + chunk] for i in range(0, len(specs), chunk)]
+    left = [(i, parts[i]) for i in store.missing(len(parts))]
+    if not left:
+        return
+    with _bar(len(parts), quiet, done=len(parts) - len(left)) as tell:
+        for number, rows in _executed(left, pool):
+            store.put(number, rows)
+            tell(f"{rows[0]['suite']}: {len(rows)} runs")
+
+
+def _executed(left: Sequence[pools.Chunk], pool: Pool) -> Iterable[tuple[int, pools.Rows]]:
+    if pool.client is not None:
+        return pools.cluster(left, pool.client)
+    count = pool.count or len(os.sched_getaffinity(0))
+    return pools.here(left) if count == 1 else pools.processes(left, count)
+
+
+def _finish(store: Store, rows: pd.DataFrame, times: pd.DataFrame, small: pd.DataFrame, told: dict[str, Any]) -> None:
+    """Tables and page into the sweep's folder; each file whole or not there."""
+    tables = {"stress": rows, "stress_times": times, "reproducers": small, "stress_map": stability_map(rows)}
+    tables["stress_summary"] = summary(rows, times)
+    try:
+        (store.path / "traces").mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".", dir=store.path) as name:
+            made = Path(name)
+            study.write(made, [], study.judge([], {}), told)
+            for stem, table in tables.items():
+                study.write_table(made / stem, table, told)
+            for file in made.iterdir():
+                if file.is_file():
+                    os.replace(file, store.path / file.name)
+    except OSError as error:
+        raise OutputError(f"Folder {store.path} cannot be written: {error.strerror or error}.") from error
+    page.write(store.path)
+
+
+@contextmanager
+def _bar(steps: int | None, quiet: bool, done: int = 0) -> Iterator[Callable[[str], None]]:
+    """A bar on stderr with the time left; where it is no terminal, nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda _text: None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+    text = TextColumn("{task.description}")
+    with Progress(*columns, text, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=steps, completed=done)
+        yield lambda said: bar.update(task, description=said, advance=1)
+
+
+def _show(rows: pd.DataFrame, small: pd.DataFrame, out: Path) -> None:
+    """One line a suite and engine, the reproducers, and where the page is."""
+    print(summary(rows).to_string(index=False, float_format=lambda x: f"{x:.2g}"))
+    print(f"{len(rows)} runs, {len(failures(rows))} ended before their horizon or are outside")
+    for line in small.head(SHOWN).to_dict(orient="records"):
+        print(f"{line['verdict']}: {line['outcome']} ({line['count']}x): {line['command']}")
+        print(f"    {line['why'][:300]}")
+    if len(small) > SHOWN:
+        print(f"and {len(small) - SHOWN} more kinds in {out / 'reproducers.csv'}")
+    print(f"Report: {(out / page.PAGE).absolute()}")
+
+
+__all__ = ["STABILITY", "Ask", "plan", "stress", "sweep"]

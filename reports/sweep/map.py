@@ -1,0 +1,74 @@
+"""What a sweep says as a whole: one line a suite and engine, and the stability map."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pandas as pd
+
+from crossbody.cases import Outcome
+from crossbody.reports.sweep.execute import REFUSED, SKIPPED
+from crossbody.reports.verdict import Word
+
+STABILITY = "stiffness"
+"""The suite whose grid is the map."""
+KNOBS = ("rtol", "dt")
+MAP = ("engine", "profile", "knob", "setting", "a0", "runs", "finished", "worst_error", "worst_residual", "outcomes")
+
+
+def summary(rows: pd.DataFrame, times: pd.DataFrame | None = None) -> pd.DataFrame:
+    """One row a suite, engine and profile: how its runs ended, the worst of them, and how long they took."""
+    found = []
+    wall = None if times is None else times.set_index("index")["wall_ms"]
+    for (suite, engine, profile), group in rows.groupby(["suite", "engine", "profile"], sort=False):
+        about = {"suite": suite, "engine": engine, "profile": profile, "runs": len(group)}
+        judged = group[group["tier"] != ""]
+        about |= {
+            "finished": int((group["outcome"] == Outcome.FINISHED).sum()),
+            "not_run": int(group["outcome"].isin([SKIPPED, REFUSED]).sum()),
+            "outside": int((group["verdict"] == Word.OUTSIDE).sum()), "with_truth": len(judged),
+            "worst_error": _worst(judged["error"]), "worst_residual": _worst(group["residual"]),
+            "outcomes": outcomes(group),
+        }  # fmt: skip
+        if wall is not None:
+            about["seconds"] = float(wall.loc[group["index"]].sum()) / 1e3
+        found.append(about)
+    return pd.DataFrame(found)
+
+
+def outcomes(group: pd.DataFrame) -> str:
+    """How often each other end than finished came, in words."""
+    counts = group["outcome"].value_counts()
+    return ", ".join(f"{name} {count}" for name, count in counts.items() if name != Outcome.FINISHED)
+
+
+def _worst(values: pd.Series[float]) -> float:
+    known = values.dropna()
+    return float(known.max()) if len(known) else math.nan
+
+
+def stability_map(rows: pd.DataFrame) -> pd.DataFrame:
+    """Which engine at which tolerance or step on which stiffness.
+
+    Returns:
+        One row a cell, columns `MAP`; errors are the worst over all other axes, infinite where a contact misses.
+    """
+    mapped = rows[rows["suite"] == STABILITY]
+    cells: dict[tuple[Any, ...], list[int]] = {}
+    for i, (engine, profile, settings, parameters) in enumerate(
+        zip(mapped["engine"], mapped["profile"], mapped["settings"], mapped["parameters"], strict=True)
+    ):
+        used = json.loads(settings)
+        knob = next((name for name in KNOBS if name in used), "")
+        key = (engine, profile, knob, used.get(knob, math.nan), float(json.loads(parameters)["a0"]))
+        cells.setdefault(key, []).append(i)
+    found = []
+    for key, places in sorted(cells.items()):
+        group = mapped.iloc[places]
+        found.append(
+            (*key, len(group), int((group["outcome"] == Outcome.FINISHED).sum()), _worst(group["error"]),
+             _worst(group["residual"]), outcomes(group))
+        )  # fmt: skip
+    return pd.DataFrame(found, columns=list(MAP))

@@ -1,0 +1,119 @@
+"""A failure made small: its parameters moved to the case's own as long as the run still fails in the same way."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pandas as pd
+
+from crossbody.cases import Outcome, Value
+from crossbody.cases._load import module
+from crossbody.reports.sweep.execute import CRASHED, REFUSED, SKIPPED, execute
+from crossbody.reports.sweep.spec import Spec
+from crossbody.reports.verdict import Word
+
+TRIES = 60
+"""Runs that one failure may cost."""
+HALVES = 6
+"""How often a parameter that matters is moved half of what is left towards its default."""
+KINDS = ("suite", "case", "variant", "engine", "profile", "outcome", "verdict")
+COLUMNS = (*KINDS, "count", "why", "parameters", "tries", "command")
+Fails = Callable[[Mapping[str, Value]], bool]
+
+
+def failures(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows that are outside, and runs that ended before their horizon."""
+    ended = ~rows["outcome"].isin([Outcome.FINISHED.value, SKIPPED, REFUSED])
+    return rows[(rows["verdict"] == Word.OUTSIDE) | ended]
+
+
+def reproducers(rows: pd.DataFrame, specs: Sequence[Spec], tell: Callable[[str], None]) -> pd.DataFrame:
+    """The smallest scene found for the first failure of every kind: one suite, scene, engine, outcome and verdict."""
+    found = []
+    for kind, group in failures(rows).groupby(list(KINDS), sort=False):
+        first = group.iloc[0]
+        tell(f"{first['engine']}:{first['profile']} {first['case']}: {first['outcome']}")
+        about = dict(zip(KINDS, kind, strict=True)) | {"count": len(group), "why": first["why"]}
+        found.append(about | _smallest(specs[int(first["index"])], first))
+    return pd.DataFrame(found, columns=list(COLUMNS))
+
+
+def _smallest(spec: Spec, first: pd.Series[Any]) -> dict[str, Any]:
+    if first["outcome"] in (CRASHED, Outcome.TIME_LIMIT.value):  # a process or many seconds a try
+        left, tries = dict(spec.parameters), 0
+    else:
+        left, tries = shrink(spec.parameters, defaults(spec), _same(spec, first))
+    settings = dict(json.loads(first["settings"]))
+    if first["outcome"] == Outcome.STEP_LIMIT.value:
+        settings["max_steps"] = spec.max_steps
+    return {"parameters": json.dumps(left), "tries": tries, "command": spec.command(settings, left)}
+
+
+def defaults(spec: Spec) -> dict[str, Value]:
+    """What the case itself has for each parameter of a run."""
+    source = module(spec.case)
+    preset = source.VARIANTS[spec.variant]
+    return {name: preset.get(name, source.PARAMETERS[name].default) for name in spec.parameters}
+
+
+def _same(spec: Spec, first: pd.Series[Any]) -> Fails:
+    def fails(parameters: Mapping[str, Value]) -> bool:
+        row = execute(replace(spec, parameters=dict(parameters), ends=False))
+        return bool(row["outcome"] == first["outcome"] and row["verdict"] == first["verdict"])
+
+    return fails
+
+
+def shrink(
+    parameters: Mapping[str, Value], own: Mapping[str, Value], fails: Fails, tries: int = TRIES
+) -> tuple[dict[str, Value], int]:
+    """Move parameters to their defaults: all the way if it still fails, else part of it, then to a few digits.
+
+    Args:
+        parameters: at which it fails.
+        own: the defaults.
+        fails: whether it still does.
+        tries: how often that may be asked.
+
+    Returns:
+        What has to be said, and how often was asked. A failure that does not repeat is returned as it came.
+    """
+    left, asked = dict(parameters), 0
+
+    def still(changed: Mapping[str, Value]) -> bool:
+        nonlocal asked
+        asked += 1
+        return asked <= tries and fails(changed)
+
+    if not still(left):
+        return left, asked
+    for name in list(left):
+        fewer = {key: value for key, value in left.items() if key != name}
+        if still(fewer):
+            left = fewer
+    for name in list(left):
+        for value in _nearer(left[name], own.get(name)):
+            if value != left[name] and still({**left, name: value}):
+                left[name] = value
+                break
+    return left, min(asked, tries)
+
+
+def _nearer(value: Value, default: Value | None) -> Iterator[Value]:
+    """Values between this and the default, the nearest to the default first; then this in few digits."""
+    if isinstance(value, (bool, str)) or isinstance(default, (bool, str)) or default is None:
+        return
+    a, b = float(value), float(default)
+    steps = [1.0 - 0.5**k for k in range(HALVES, 0, -1)]
+    between: Iterable[float] = [b + (a - b) * (1.0 - s) for s in steps]
+    if a > 0.0 and b > 0.0:
+        between = [math.exp(math.log(b) + math.log(a / b) * (1.0 - s)) for s in steps]
+    if isinstance(value, int):
+        yield from dict.fromkeys(round(x) for x in between)
+        return
+    for number in (*between, a):
+        yield float(f"{number:.2g}")

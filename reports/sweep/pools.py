@@ -1,0 +1,123 @@
+"""Who executes the chunks of a sweep: this process, processes beside it, or a dask cluster."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from crossbody.cases import SchedulerUnavailable
+from crossbody.reports.sweep.execute import crashed, execute
+from crossbody.reports.sweep.spec import Spec
+
+Rows = list[dict[str, Any]]
+Chunk = tuple[int, Sequence[Spec]]
+ANSWER = 10.0
+"""Time that a scheduler has to answer, s."""
+ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
+
+
+def work(chunk: Chunk, alone: bool = False) -> tuple[int, Rows]:
+    """Execute the specs of a chunk; those that can share the interpreter's absence go together."""
+    from crossbody.reports.sweep.together import together
+
+    number, specs = chunk
+    rows = together(specs)
+    rows += [execute(spec, alone) for spec in specs if not spec.ends]
+    return number, sorted(rows, key=lambda row: row["index"])
+
+
+def here(chunks: Iterable[Chunk]) -> Iterator[tuple[int, Rows]]:
+    """One after another in this process."""
+    for chunk in chunks:
+        yield work(chunk)
+
+
+def processes(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
+    """In processes of joblib's, each with its engines loaded once; as they finish.
+
+    A chunk whose process ends is cut into its runs, and these are tried one by one: the one that ends a process alone
+    is a row that says so.
+    """
+    warm(chunks)
+    left = dict(chunks)
+    for _ in range(2):
+        for number, rows in _surviving(list(left.items()), jobs):
+            del left[number]
+            yield number, rows
+        if not left:
+            return
+    for number, specs in left.items():
+        yield number, [row for spec in specs for row in _single(spec)]
+
+
+def _surviving(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
+    """What comes back until a process ends that should not have."""
+    from joblib import Parallel, delayed
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    parallel = Parallel(n_jobs=jobs, backend="loky", return_as="generator_unordered", pre_dispatch="2*n_jobs")
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=".*worker stopped while some jobs.*")
+            yield from parallel(delayed(work)(chunk, True) for chunk in chunks)
+    except BrokenProcessPool:
+        return
+
+
+def _single(spec: Spec) -> Rows:
+    for _, rows in _surviving([(spec.index, [spec])], 1):
+        return rows
+    return [crashed(spec, ENDED)]
+
+
+def warm(chunks: Sequence[Chunk]) -> None:
+    """Have the reference's kernels compiled to disk once, before several processes want them at the same time."""
+    seen = set[tuple[str, str]]()
+    for _, specs in chunks:
+        for spec in specs:
+            if spec.engine == "reference" and (spec.case, spec.variant) not in seen:
+                seen.add((spec.case, spec.variant))
+                execute(replace(spec, max_steps=1, second=False, ends=False))
+
+
+def connect(address: str) -> Any:
+    """A client of a dask.distributed cluster.
+
+    Raises:
+        SchedulerUnavailable: if the package is not installed, or nothing answers at the address within 10 s.
+    """
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise SchedulerUnavailable(
+            "--scheduler needs the package 'distributed', which is not installed: pip install 'crossbody[cluster]'."
+        ) from None
+    try:
+        return Client(address, timeout=ANSWER, set_as_default=False)
+    except (TimeoutError, OSError, ValueError) as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise SchedulerUnavailable(
+            f"No dask scheduler answers at {address!r} within {ANSWER:g} s ({said}); "
+            "start one with `dask scheduler`, and name it as tcp://HOST:PORT."
+        ) from None
+
+
+def cluster(chunks: Sequence[Chunk], client: Any) -> Iterator[tuple[int, Rows]]:
+    """On a dask.distributed cluster, which gives the work of a lost worker to another."""
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    specs = dict(chunks)
+    futures = [client.submit(work, chunk, pure=False) for chunk in chunks]
+    numbers = {future.key: number for future, (number, _) in zip(futures, chunks, strict=True)}
+    for future in as_completed(futures):
+        error = future.exception()
+        if isinstance(error, KilledWorker):
+            number = numbers[future.key]
+            why = f"one run of this chunk ended its worker: {error}"
+            yield number, [crashed(spec, why) for spec in specs[number]]
+        else:
+            yield future.result()
+        future.release()

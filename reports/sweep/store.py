@@ -1,0 +1,119 @@
+"""Rows on disk as they arrive: one part file a chunk, whole or not there; a killed sweep goes on where it stood."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import pickle
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+import crossbody.cases
+import crossbody.engines
+import crossbody.reference
+from crossbody.cases import OutputError
+from crossbody.reports import output
+from crossbody.reports.sweep.execute import COLUMNS, TIMES
+from crossbody.reports.sweep.spec import Spec
+
+SWEEP, PARTS = "sweep.json", "parts"
+
+
+@cache
+def code() -> str:
+    """Digest of the sources that decide what comes out."""
+    found = hashlib.sha256()
+    for package in (crossbody.cases, crossbody.engines, crossbody.reference):
+        root = Path(next(iter(package.__path__)))
+        for path in sorted(root.rglob("*.py")):
+            found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def identity(specs: Sequence[Spec], chunk: int, about: Mapping[str, Any]) -> dict[str, Any]:
+    """What a sweep is: two with the same identity end with the same table."""
+    digest = hashlib.sha256(pickle.dumps([repr(spec) for spec in specs], protocol=5)).hexdigest()[:16]
+    return {"version": version("crossbody"), "code": code(), "runs": len(specs), "chunk": chunk, "draws": digest} | {
+        k: v for k, v in about.items()
+    }
+
+
+class Store:
+    """The folder of one sweep.
+
+    Args:
+        path: the folder.
+        about: its identity.
+
+    Raises:
+        OutputError: if the folder cannot be written, or holds another sweep or somebody else's files.
+    """
+
+    def __init__(self, path: Path, about: Mapping[str, Any]) -> None:
+        self.path, self.about = path, dict(about)
+        self._open()
+
+    def _open(self) -> None:
+        output.check(self.path)
+        known = self.path / SWEEP
+        if known.is_file():
+            self._compare(known)
+        elif self.path.is_dir() and any(self.path.iterdir()):
+            raise OutputError(f"{self.path} holds another command's report; name a new folder for the sweep.")
+        (self.path / PARTS).mkdir(parents=True, exist_ok=True)
+        output.replace_text(self.path / output.MARKER, "Written by crossbody; it may be replaced by the next run.\n")
+        if not known.is_file():
+            output.replace_text(known, json.dumps(self.about, indent=1))
+        for stale in (self.path / PARTS).glob(".*"):
+            stale.unlink(missing_ok=True)
+
+    def _compare(self, known: Path) -> None:
+        try:
+            before = json.loads(known.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            raise OutputError(f"{known} cannot be read; name a new folder for the sweep.") from None
+        other = [key for key in {**before, **self.about} if before.get(key) != self.about.get(key)]
+        if other:
+            said = ", ".join(
+                f"{key} {_short(before.get(key))} there, {_short(self.about.get(key))} now" for key in other
+            )
+            raise OutputError(
+                f"{self.path} holds a sweep of another version or of other parameters ({said}); "
+                "repeat that command, or name a new folder."
+            )
+
+    def _part(self, chunk: int) -> Path:
+        return self.path / PARTS / f"{chunk:06d}.parquet"
+
+    def missing(self, chunks: int) -> list[int]:
+        """Chunks that have no part yet."""
+        return [i for i in range(chunks) if not self._part(i).is_file()]
+
+    def put(self, chunk: int, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Write the rows of a chunk: under another name first, so that a part is whole if it is there."""
+        path = self._part(chunk)
+        frame = pd.DataFrame(rows, columns=[*COLUMNS, TIMES[1]]).astype({**COLUMNS, TIMES[1]: "float64"})
+        temporary = path.with_name(f".{path.name}.{os.getpid()}")
+        try:
+            frame.to_parquet(temporary, index=False)
+            os.replace(temporary, path)
+        except OSError as error:
+            raise OutputError(f"Part {path} cannot be written: {error.strerror or error}.") from error
+
+    def table(self) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """All rows in the order of the sweep, and apart from them how long each took: that is never the same twice."""
+        parts = [pd.read_parquet(path) for path in sorted((self.path / PARTS).glob("*.parquet"))]
+        joined = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=[*COLUMNS, TIMES[1]])
+        joined = joined.sort_values("index", ignore_index=True)
+        return joined[list(COLUMNS)], joined[list(TIMES)]
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,265 @@
+// Playback: every engine's motion on a canvas, over the clock that the plots share.
+(() => {
+  const floats = (text) => {
+    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    return new Float32Array(bytes.buffer);
+  };
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const nice = (x) => {
+    const ten = 10 ** Math.floor(Math.log10(x));
+    return ten * [1, 2, 5, 10].find((k) => k * ten >= x * 0.999);
+  };
+  const shortNumber = (x) => String(Number(x.toPrecision(3)));
+
+  const start = (root) => {
+    const scene = JSON.parse(root.querySelector("[data-scene]").textContent);
+    const { stage, end } = scene;
+    const space = stage.dimensions === 3;
+    const tracks = scene.tracks.map((track) => {
+      const [t, poses, arrows] = [floats(track.t), floats(track.poses), floats(track.arrows)];
+      return { ...track, t, poses, arrows, width: poses.length / t.length, pushes: arrows.length / t.length };
+    });
+    const find = (name) => root.querySelector(`[data-${name}]`);
+    const [play, clock, readout, speed, view, forces] = ["play", "clock", "readout", "speed", "view", "forces"].map(find);
+    const canvas = root.querySelector("canvas");
+    const g = canvas.getContext("2d");
+    let [now, running, last, turn, tilt] = [0, false, 0, 0.6, 0.35];
+
+    // What one scene spans: all points of all tracks and what stands still; outliers of a run that diverged are left out.
+    const spans = () => {
+      const values = [[], [], []];
+      const add = (p) => p.forEach((x, k) => { if (Number.isFinite(x)) values[k].push(x); });
+      const reach = stage.bodies.map((shapes) => Math.max(0, ...shapes.flatMap((s) =>
+        s.circle ? [Math.hypot(s.circle[0], s.circle[1]) + s.circle[2]] : s.points.map((p) => Math.hypot(...p)))));
+      const lead = tracks.filter((track) => track.truth);
+      for (const track of lead.length ? lead : tracks) {
+        const step = Math.max(1, Math.floor(track.t.length / 150));
+        for (let i = 0; i < track.t.length; i += step) {
+          for (let k = 0; k < track.width; k += 3) {
+            const p = track.poses.subarray(i * track.width + k, i * track.width + k + 3);
+            if (space) add([...p]);
+            else for (const side of [-1, 1]) add([p[0] + side * reach[k / 3], p[1] + side * reach[k / 3]]);
+          }
+        }
+      }
+      for (const shape of stage.still) (shape.points || []).forEach((p) => add(p));
+      for (const thread of stage.threads) add(thread.slice(0, 2));
+      return values.map((each) => each.reduce(([a, b], x) => [Math.min(a, x), Math.max(b, x)], [Infinity, -Infinity]));
+    };
+    const range = spans();
+    const middle = range.map(([a, b]) => (a + b) / 2);
+    const size = space ? Math.hypot(...range.map(([a, b]) => b - a)) * 0.8 : 0;
+
+    const at = (track, t) => {
+      const times = track.t;
+      let [low, high] = [0, times.length - 1];
+      while (high - low > 1) {
+        const half = (low + high) >> 1;
+        if (times[half] <= t) low = half; else high = half;
+      }
+      const gap = times[high] - times[low];
+      const share = gap > 0 ? Math.min(Math.max((t - times[low]) / gap, 0), 1) : 0;
+      const mix = (k) => track.poses[low * track.width + k] * (1 - share) + track.poses[high * track.width + k] * share;
+      const row = share > 0 ? high : low;
+      return { pose: mix, push: (k) => track.arrows[row * track.pushes + k] };
+    };
+
+    const camera = (x0, y0, w, h) => {
+      if (!space) {
+        const [wide, tall] = [range[0][1] - range[0][0] || 1, range[1][1] - range[1][0] || 1];
+        const scale = 0.86 * Math.min(w / wide, (h - 18) / tall);
+        return (p) => [x0 + w / 2 + (p[0] - middle[0]) * scale, y0 + (h + 14) / 2 - (p[1] - middle[1]) * scale, scale];
+      }
+      const scale = 0.95 * Math.min(w, h) / (size || 1);
+      const [ca, sa, cb, sb] = [Math.cos(turn), Math.sin(turn), Math.cos(tilt), Math.sin(tilt)];
+      const up = stage.down ? -1 : 1;
+      return (p) => {
+        const [x, y, z] = [p[0] - middle[0], p[1] - middle[1], up * (p[2] - middle[2])];
+        const [right, deep] = [ca * x - up * sa * y, sa * x + up * ca * y];
+        return [x0 + w / 2 + right * scale, y0 + (h + 14) / 2 - (cb * z + sb * deep) * scale, scale];
+      };
+    };
+    const trace = (points) => {
+      g.beginPath();
+      points.forEach(([x, y], i) => (i ? g.lineTo(x, y) : g.moveTo(x, y)));
+    };
+    const shape = (s, move, to, ghost) => {
+      if (s.circle) {
+        const [x, y, scale] = to(move(s.circle));
+        g.beginPath();
+        g.arc(x, y, Math.max(s.circle[2] * scale, 0.5), 0, 2 * Math.PI);
+      } else {
+        trace(s.points.map((p) => to(move(p))));
+        if (s.closed) g.closePath();
+      }
+      if (s.fill) {
+        g.globalAlpha = ghost ? 0.12 : 0.3;
+        g.fill();
+        g.globalAlpha = 1;
+      }
+      g.stroke();
+    };
+    const arrow = (from, to) => {
+      const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+      const length = Math.hypot(dx, dy);
+      if (length < 2) return;
+      const [ux, uy, head] = [dx / length, dy / length, Math.min(8, 0.6 * length)];
+      trace([from, to]);
+      g.stroke();
+      g.beginPath();
+      g.moveTo(to[0], to[1]);
+      g.lineTo(to[0] - head * ux + 0.45 * head * uy, to[1] - head * uy - 0.45 * head * ux);
+      g.lineTo(to[0] - head * ux - 0.45 * head * uy, to[1] - head * uy + 0.45 * head * ux);
+      g.fill();
+    };
+    const paint = (track, to, h, ghost) => {
+      const { pose, push } = at(track, now);
+      g.strokeStyle = g.fillStyle = track.color;
+      g.lineWidth = track.truth ? 4 : 1.8;
+      g.setLineDash(ghost && track.strokes !== "none" ? track.strokes.split(" ").map(Number) : []);
+      if (space) {
+        for (const line of stage.lines) {
+          trace(line.map((i) => to([pose(3 * i), pose(3 * i + 1), pose(3 * i + 2)])));
+          g.stroke();
+        }
+      } else {
+        for (const [x, y, body] of stage.threads) {
+          trace([to([x, y]), to([pose(3 * body), pose(3 * body + 1)])]);
+          g.stroke();
+        }
+        stage.bodies.forEach((shapes, body) => {
+          const [x, y, angle] = [pose(3 * body), pose(3 * body + 1), pose(3 * body + 2)];
+          const [c, s] = [Math.cos(angle), Math.sin(angle)];
+          const move = (p) => [x + c * p[0] - s * p[1], y + s * p[0] + c * p[1]];
+          shapes.forEach((each) => shape(each, move, to, ghost));
+        });
+      }
+      g.setLineDash([]);
+      if (!forces.checked) return;
+      g.lineWidth = 2;
+      const n = stage.dimensions;
+      for (let k = 0; k < track.pushes; k += 2 * n) {
+        const point = [0, 1, 2].slice(0, n).map((i) => push(k + i));
+        const force = [0, 1, 2].slice(0, n).map((i) => push(k + n + i));
+        const from = to(point);
+        const unit = (0.28 * h) / scene.force / (from[2] || 1);
+        const long = Math.hypot(...force) * unit * from[2];
+        const cut = long > 0.45 * h ? (0.45 * h) / long : 1;
+        arrow(from, to(point.map((x, i) => x + force[i] * unit * cut)));
+      }
+    };
+    const still = (to) => {
+      g.strokeStyle = g.fillStyle = colour("--soft");
+      g.lineWidth = 1.2;
+      stage.still.forEach((each) => shape(each, (p) => p, to, true));
+    };
+    const bar = (to, x, y, h) => {
+      // A length and a force to measure by.
+      const scale = to([middle[0], middle[1], middle[2] || 0])[2];
+      const metres = nice(60 / scale);
+      const newtons = nice((scene.force * 60) / (0.28 * h));
+      g.fillStyle = g.strokeStyle = colour("--soft");
+      g.lineWidth = 2;
+      g.font = "12px system-ui, sans-serif";
+      const draw = (length, text, down) => {
+        trace([[x, y - down], [x + length, y - down]]);
+        g.stroke();
+        g.fillText(text, x + length + 6, y - down + 4);
+      };
+      draw(metres * scale, `${shortNumber(metres)} m`, 0);
+      if (forces.checked) draw((newtons / scene.force) * 0.28 * h, `${shortNumber(newtons)} N`, 16);
+    };
+    const draw = () => {
+      const box = canvas.getBoundingClientRect();
+      const dpr = devicePixelRatio || 1;
+      if (!box.width) return;
+      if (canvas.width !== Math.round(box.width * dpr)) canvas.width = Math.round(box.width * dpr);
+      if (canvas.height !== Math.round(box.height * dpr)) canvas.height = Math.round(box.height * dpr);
+      g.setTransform(dpr, 0, 0, dpr, 0, 0);
+      g.clearRect(0, 0, box.width, box.height);
+      g.lineJoin = g.lineCap = "round";
+      const shown = tracks.filter((track) => crossbody.shown(track.name));
+      if (view.value === "ghosts") {
+        const to = camera(0, 0, box.width, box.height);
+        still(to);
+        shown.forEach((track) => paint(track, to, box.height, !track.truth));
+        bar(to, 12, box.height - 12, box.height);
+      } else if (shown.length) {
+        const columns = Math.max(1, Math.min(shown.length, Math.round(Math.sqrt((shown.length * box.width) / box.height))));
+        const [w, h] = [box.width / columns, box.height / Math.ceil(shown.length / columns)];
+        shown.forEach((track, i) => {
+          const [x, y] = [(i % columns) * w, Math.floor(i / columns) * h];
+          g.save();
+          g.beginPath();
+          g.rect(x, y, w, h);
+          g.clip();
+          const to = camera(x, y, w, h);
+          still(to);
+          paint(track, to, h, false);
+          g.fillStyle = colour("--ink");
+          g.font = "12px system-ui, sans-serif";
+          g.fillText(track.name, x + 8, y + 15);
+          g.restore();
+        });
+      }
+      readout.textContent = `t = ${now.toFixed(Math.max(0, 4 - Math.floor(Math.log10(end || 1))))} s`;
+      clock.value = end ? (1000 * now) / end : 0;
+    };
+    let wanted = false;
+    const redraw = () => {
+      if (wanted) return;
+      wanted = true;
+      requestAnimationFrame(() => { wanted = false; draw(); });
+    };
+    const seek = (t, tell) => {
+      now = Math.min(Math.max(t, 0), end);
+      redraw();
+      if (tell) crossbody.tell("time", now, root);
+    };
+    const frame = (stamp) => {
+      if (!running) return;
+      const t = now + (Math.min(stamp - last, 100) / 1000) * Number(speed.value);
+      last = stamp;
+      seek(t >= end ? 0 : t, true);
+      requestAnimationFrame(frame);
+    };
+    const run = (go) => {
+      running = go;
+      play.textContent = go ? "Pause" : "Play";
+      play.setAttribute("aria-pressed", go);
+      last = performance.now();
+      if (go) requestAnimationFrame(frame);
+    };
+
+    const usual = nice((end || 1) / 10);
+    for (const factor of [0.01, 0.1, 0.2, 0.5, 1, 2, 5]) {
+      const option = new Option(`${shortNumber(usual * factor)} × real time`, usual * factor, factor === 1, factor === 1);
+      speed.append(option);
+    }
+    play.addEventListener("click", () => run(!running));
+    clock.addEventListener("input", () => seek((clock.value / 1000) * end, true));
+    [view, forces].forEach((field) => field.addEventListener("change", redraw));
+    if (space) {
+      canvas.style.touchAction = "none";
+      canvas.addEventListener("pointermove", (event) => {
+        if (!event.buttons) return;
+        turn += event.movementX * 0.01;
+        tilt = Math.min(1.5, Math.max(-1.5, tilt + event.movementY * 0.01));
+        redraw();
+      });
+      canvas.addEventListener("keydown", (event) => {
+        const step = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
+        if (!step) return;
+        event.preventDefault();
+        turn += step[0];
+        tilt += step[1];
+        redraw();
+      });
+    }
+    crossbody.on("time", (t, from) => { if (from !== root && root.closest("[data-page]").contains(from)) seek(t, false); });
+    for (const what of ["engines", "theme", "page"]) crossbody.on(what, redraw);
+    new ResizeObserver(redraw).observe(canvas);
+    redraw();
+  };
+  document.querySelectorAll(".player").forEach(start);
+})();

@@ -1,0 +1,92 @@
+// Plots: drawn when they come near the screen, coloured by the theme, one cursor and one zoom over those that share time.
+(() => {
+  const charts = new Map();
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const axes = (layout) => Object.keys(layout).filter((key) => /^[xy]axis\d*$/.test(key));
+  const scheme = (layout) => {
+    const out = {
+      paper_bgcolor: colour("--paper"), plot_bgcolor: colour("--paper"), "font.color": colour("--ink"),
+      "modebar.color": colour("--soft"), "modebar.activecolor": colour("--ink"), "modebar.bgcolor": "rgba(0,0,0,0)",
+    };
+    for (const key of axes(layout)) {
+      for (const part of ["gridcolor", "linecolor", "zerolinecolor"]) out[`${key}.${part}`] = colour("--line");
+    }
+    return out;
+  };
+  const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  const themed = (layout) => {
+    const out = structuredClone(layout);
+    for (const [path, value] of Object.entries(scheme(layout))) {
+      const keys = path.split(".");
+      const last = keys.pop();
+      let at = out;
+      for (const key of keys) at = at[key] ??= {};
+      at[last] = value;
+    }
+    if (innerWidth < 600) {
+      out.margin = { ...out.margin, l: 58, r: 6 };
+      out.font = { ...out.font, size: 10 };
+    }
+    return out;
+  };
+  const visible = (data) => data.map((trace) => (trace.meta && !crossbody.shown(trace.meta) ? false : true));
+
+  let busy = false;
+  const zoom = (from, update) => {
+    if (busy || !from.hasAttribute("data-time")) return;
+    const key = Object.keys(update).find((name) => /^xaxis\d*\.(range|autorange)/.test(name));
+    if (!key) return;
+    const axis = key.split(".")[0];
+    const wide = key.endsWith("autorange");
+    const range = update[`${axis}.range`] || [update[`${axis}.range[0]`], update[`${axis}.range[1]`]];
+    busy = true;
+    const others = [...charts].filter(([box]) => box !== from && box.hasAttribute("data-time")
+      && box.closest("[data-page]") === from.closest("[data-page]"));
+    Promise.all(others.map(([box]) => Plotly.relayout(box, wide ? { "xaxis.autorange": true } : { "xaxis.range": range })))
+      .finally(() => { busy = false; });
+  };
+  const cursor = (box, t) => {
+    const { mark } = charts.get(box);
+    const axis = box._fullLayout && box._fullLayout.xaxis;
+    if (!axis || !box.hasAttribute("data-time")) return;
+    const x = axis.l2p(t);
+    mark.style.display = x >= 0 && x <= axis._length ? "block" : "none";
+    mark.style.transform = `translateX(${axis._offset + x}px)`;
+  };
+  const near = (box) => {
+    const { top, bottom } = box.getBoundingClientRect();
+    return bottom > 0 && top < innerHeight;
+  };
+
+  const draw = (box) => {
+    if (charts.has(box)) return charts.get(box).ready;
+    const figure = JSON.parse(document.querySelector(`script[data-plot="${CSS.escape(box.id)}"]`).textContent);
+    const mark = document.createElement("div");
+    mark.className = "cursor";
+    const shown = visible(figure.data);
+    figure.data.forEach((trace, i) => { trace.visible = shown[i]; });
+    const ready = Plotly.newPlot(box, figure.data, themed(figure.layout), options).then(() => {
+      box.append(mark);
+      box.dataset.drawn = "";
+      box.on("plotly_hover", (event) => { if (box.hasAttribute("data-time")) crossbody.tell("time", event.points[0].x, box); });
+      box.on("plotly_relayout", (update) => zoom(box, update));
+    });
+    charts.set(box, { mark, ready });
+    return ready;
+  };
+  const watch = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting) continue;
+      watch.unobserve(entry.target);
+      draw(entry.target);
+    }
+  }, { rootMargin: "500px" });
+  document.querySelectorAll(".plot").forEach((box) => watch.observe(box));
+  addEventListener("beforeprint", () => document.querySelectorAll(".plot").forEach(draw));
+  crossbody.on("theme", () => charts.forEach((_, box) => Plotly.relayout(box, scheme(box.layout))));
+  crossbody.on("engines", () => charts.forEach((_, box) => Plotly.restyle(box, { visible: visible(box.data) })));
+  let clock = null;
+  const marks = () => { if (clock !== null) charts.forEach((_, box) => { if (near(box)) cursor(box, clock); }); };
+  crossbody.on("time", (t) => { clock = t; marks(); });
+  addEventListener("scroll", marks, { passive: true });
+})();
