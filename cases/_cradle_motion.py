@@ -36,12 +36,13 @@ class _Course:
         self.starts.append(t)
 
 
-def _collision(t: float, row: int, impulse: float) -> tuple[Event, Event]:
-    """FREE -> COLLISION -> FREE at one instant."""
-    return (
-        Event(t=t, contact=row, before=Mode.FREE, after=Mode.COLLISION),
-        Event(t=t, contact=row, before=Mode.COLLISION, after=Mode.FREE, impulse=impulse),
-    )
+def _collisions(t: float, struck: dict[int, float]) -> list[Event]:
+    """FREE -> COLLISION -> FREE at one instant, of all rows that are struck together."""
+    begun = [Event(t=t, contact=row, before=Mode.FREE, after=Mode.COLLISION) for row in struck]
+    return begun + [
+        Event(t=t, contact=row, before=Mode.COLLISION, after=Mode.FREE, impulse=impulse)
+        for row, impulse in struck.items()
+    ]
 
 
 class Motion:
@@ -81,8 +82,8 @@ class Motion:
             after = np.diff(v)
             for row, impulse in impulses.items():
                 work[row] += 0.5 * impulse * (rates[row] + after[row])
-                if impulse > 0.0 and rates[row] < -SLOW * self.row.speed:
-                    course.events += _collision(t, row, impulse)
+            closed = {i: p for i, p in impulses.items() if p > 0.0 and rates[i] < -SLOW * self.row.speed}
+            course.events += _collisions(t, closed)
             rates = after
             if len(course.events) >= 2 * MAX_IMPACTS:
                 break

@@ -124,8 +124,8 @@ def test_buffers_grow_without_loss():
 
 def test_interrupt_is_answered_at_once():
     code = (
-        "import sys; sys.path.insert(0, 'tests'); from test_core_faults import *;"
-        "print('ready', flush=True); r = simulate(ball(), [1.0], [0.0], 1e4, max_step=1e-5,"
+        "import sys; sys.path.insert(0, 'tests'); from mechanisms import ball;"
+        "from crossbody.reference import simulate; print('ready', flush=True); r = simulate(ball(), [1.0], [0.0], 1e4, max_step=1e-5,"
         " max_steps=10**9, samples=[0.0]); print(r.outcome, flush=True)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
@@ -167,3 +167,20 @@ def test_kernels_give_complex_derivatives():
     system.gaps(0.0, q, np.zeros(2, complex), system.p.astype(complex), h, hd)
     H = system.constraint([0.3, 0.4])[0]
     assert h.imag[0] / 1e-30 == pytest.approx(H[0, 0], rel=1e-15)
+
+
+@kernels.dynamics
+def _still(t, q, v, u, p, M, f, w):
+    M[0, 0], f[0] = 1.0, 0.0
+
+
+@kernels.switch
+def _lost_at_once(t, q, v, p, mode, fired):
+    return 2 if fired == -1 else 0
+
+
+def test_a_run_that_is_lost_at_its_start_still_shows_the_start():
+    run = simulate(System(n=1, dynamics=_still, switch=_lost_at_once), [0.3], [0.1], 1.0)
+    assert run.outcome is Outcome.LOST
+    assert run.t.tolist() == [0.0]
+    assert run.q.tolist() == [[0.3]]
