@@ -58,7 +58,9 @@ def _limits(bounds: Bounds) -> Iterator[Limit]:
         yield Limit(metric=metric, value=value, why=why)
         yield Limit(metric=metric, value=value, why=why, engine="mujoco", profile="default", known=OBVIOUS)
         if metric in _MOTION:
-            yield Limit(metric=metric, value=_MULTISTEP * value, why=_STIFF, engine="reference", profile="cvode")
+            yield Limit(
+                metric=metric, value=_MULTISTEP * _MOTION[metric][0], why=_STIFF, engine="reference", profile="cvode"
+            )
     yield Limit(metric="audit", value=0.0, engine="mujoco", profile="default", known=OBVIOUS)
 
 
