@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test slow bench check picture format clean
+.PHONY: run test slow bench check docs wheel-check picture format clean
 
 run: $(READY)
 	$(BIN)/crossbody run --out out
@@ -25,12 +25,22 @@ check: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+docs: $(VENV)/.docs
+	$(BIN)/mkdocs build --quiet --strict --site-dir out/docs
+
+wheel-check:
+	PYTHON=$(PYTHON) .ci/wheel-check
+
 picture: $(READY)
 	$(BIN)/python docs/picture.py
 
 format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+$(VENV)/.docs: $(READY)
+	$(BIN)/python -m pip install --quiet '.[docs]'
+	touch $@
 
 $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

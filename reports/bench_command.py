@@ -10,10 +10,11 @@ from pathlib import Path
 import pandas as pd
 
 from crossbody.cases import CrossbodyError, InvalidValue
-from crossbody.reports import bench, bench_against, bench_scenes, jobs, output, page, study
+from crossbody.reports import bench, bench_against, bench_scenes, jobs, output, page, study, voice
 from crossbody.reports.bench_headline import headline
-from crossbody.reports.commands import progress
+from crossbody.reports.commands import where
 from crossbody.reports.provenance import provenance
+from crossbody.reports.voice import progress
 
 SHOWN = {
     "bench": ["case", "engine", "profile", "knob", "setting", "error", "honesty", "median_ms", "iqr_ms", "call_ms",
@@ -49,7 +50,7 @@ def run(
     tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
     losses = None if base is None else bench_against.lost(rows, tables["headline"], *base)
     write(out, tables | ({} if losses is None else {"lost": losses}), provenance(command, repeats=effort.repeats))
-    show(tables, out)
+    show(tables | ({} if losses is None or not voice.as_json() else {"lost": losses}), out)
     return 0 if losses is None else tell_losses(losses, against)
 
 
@@ -69,18 +70,19 @@ def write(out: Path, tables: Mapping[str, pd.DataFrame], told: Mapping[str, obje
 
 def show(tables: Mapping[str, pd.DataFrame], out: Path) -> None:
     """The tables in the terminal, and where the page is."""
-    for name, table in tables.items():
+    for name, table in tables.items() if not voice.told_as_json(tables) and not voice.quiet() else ():
         print(f"\n{name}")
         shown = table[SHOWN[name]] if name in SHOWN else table
         print(shown.to_string(index=False, float_format=lambda x: "-" if math.isnan(x) else f"{x:.3g}"))
-    print(f"Report: {(out / page.PAGE).absolute()}")
+    where(out)
 
 
 def tell_losses(losses: pd.DataFrame, against: Path | None) -> int:
     """Every loss with its reason; 1 if there is one."""
-    for loss in losses.to_dict(orient="records"):
+    for loss in losses.to_dict(orient="records") if not voice.as_json() else ():
         print(f"lost {loss['what']}: {loss['case']} {loss['engine']}:{loss['profile']}: {loss['why']}.")
-    print(f"Against {against}: {len(losses)} lost.")
+    if not voice.silent():
+        print(f"Against {against}: {len(losses)} lost.")
     return int(len(losses) > 0)
 
 
@@ -90,7 +92,7 @@ def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequen
         raise CrossbodyError(f"The table {name} has no rows.")
     write(out, {name: rows}, provenance(command))
     show({name: rows}, out)
-    for line in failed:
+    for line in failed if not voice.as_json() else ():
         print(f"outside: {line}")
     return int(bool(failed))
 

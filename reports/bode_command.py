@@ -7,7 +7,8 @@ from pathlib import Path
 
 from crossbody.cases import InvalidValue
 from crossbody.reports import bode as responses
-from crossbody.reports import jobs, output, page, study
+from crossbody.reports import jobs, output, page, study, voice
+from crossbody.reports.commands import where
 from crossbody.reports.provenance import provenance
 
 
@@ -37,6 +38,9 @@ def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
         study.write_table(made / "bode", rows, told)
         study.write_table(made / "poles", poles, told)
         page.write(made)
-    print(responses.growths(poles).to_string(index=False, float_format=lambda x: f"{x:.4g}"))
-    print(f"Report: {(out / page.PAGE).absolute()}")
+    growths = responses.growths(poles)
+    if not voice.told_as_json({"bode": rows, "poles": poles, "growths": growths}):
+        if not voice.quiet():
+            print(growths.to_string(index=False, float_format=lambda x: f"{x:.4g}"))
+        where(out)
     return 0

@@ -6,6 +6,7 @@ sentence on stderr. Whatever is not needed to read the command line is imported 
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from typing import TypeVar
 import click
 
 from crossbody.cases import CrossbodyError
+from crossbody.reports.voice import as_json, quiet, speaks
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
 
@@ -28,12 +30,17 @@ def cli() -> None:
 
 
 @cli.command("list")
-def list_() -> None:
+@click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
+def list_(plain: bool) -> None:
     """List cases, engines, metrics and stress suites."""
     from crossbody import cases, engines
     from crossbody.reports import metrics, suites
 
     listed = (("Cases", cases), ("Engines", engines), ("Metrics", metrics), ("Stress suites", suites))
+    if plain:
+        kinds = {title.lower(): {name: source.summary(name) for name in source.names()} for title, source in listed}
+        click.echo(json.dumps(kinds, indent=1))
+        return
     for title, source in listed:
         click.echo(f"{title}:")
         width = max(map(len, source.names()), default=0)
@@ -59,15 +66,15 @@ def _shared(command: _Work) -> _Work:
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
-@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON and nothing else.")
+@speaks
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, settings: tuple[str, ...], as_json: bool,
+    rtol: float | None, settings: tuple[str, ...],
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
     from crossbody.reports.commands import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, settings, as_json, _command())
+    return work(names, wanted, variant, pairs, out, rtol, settings, _command())
 
 
 @cli.command()
@@ -77,6 +84,7 @@ def run(
 @click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier benchmark.")
 @click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
 @click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
+@speaks
 def bench(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
     repeats: int | None, full: bool, against: Path | None, what: str | None,
@@ -105,6 +113,7 @@ def bench(
 @click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
 @click.option("--points", type=click.IntRange(2, 10_000), default=61, show_default=True, help="Gaps from s = 0 to 3.")
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
 def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: Path) -> int:
     """Map energy created and pattern of Newton's cradle over the gap between its balls."""
     from crossbody.reports.commands import gap_map as work
@@ -115,6 +124,7 @@ def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: P
 @cli.command()
 @click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
 def stability(wanted: tuple[str, ...], out: Path) -> int:
     """Map from which scenes the closed-loop ball maze still comes to its centre."""
     from crossbody.reports.commands import stability_map as work
@@ -131,10 +141,10 @@ def stability(wanted: tuple[str, ...], out: Path) -> int:
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
 @click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("stress"), show_default=True, metavar="DIR")
-@click.option("--json", "as_json", is_flag=True, help="Print the failures as JSON and nothing else.")
+@speaks
 def stress(
     names: tuple[str, ...], wanted: tuple[str, ...], runs: int | None, seed: int, jobs: int, scheduler: str | None,
-    resume: bool, out: Path, as_json: bool,
+    resume: bool, out: Path,
 ) -> int:  # fmt: skip
     """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
 
@@ -144,13 +154,14 @@ def stress(
     from crossbody.reports.sweep.command import stress as work
 
     asked = Ask(names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, resume=resume)
-    return work(asked, out, as_json, _command())
+    return work(asked, out, _command())
 
 
 @cli.command()
 @click.argument("name", metavar="CASE")
 @click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
 def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
     """Frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
     from crossbody.reports.bode_command import bode as work
@@ -160,11 +171,16 @@ def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
 
 @cli.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@speaks
 def report(folder: Path) -> int:
     """Make the page of an earlier run again."""
     from crossbody.reports import page
 
-    click.echo(f"Report: {page.write(folder).absolute()}")
+    made = page.write(folder).absolute()
+    if as_json():
+        click.echo(json.dumps({"report": str(made)}))
+    elif not quiet():
+        click.echo(f"Report: {made}")
     return 0
 
 
@@ -178,6 +194,7 @@ def log() -> None:
 @click.option("--columns", metavar="MAP", help="Column map (TOML) to check it by.")
 @click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart.")
 @click.option("--draft", is_flag=True, help="Print a draft of a column map and nothing else.")
+@speaks
 def log_info(path: Path, columns: str | None, part: int | None, draft: bool) -> int:
     """Show channels, rates, gaps and ranges of LOG, what is wrong with it, and a draft of a column map."""
     from crossbody.reports.log import info

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody import engines
 from crossbody.cases import Case, InvalidValue
-from crossbody.reports import jobs, output, page, study
+from crossbody.reports import jobs, output, page, study, voice
 from crossbody.reports.audit import SEED
 from crossbody.reports.provenance import provenance
 from crossbody.reports.verdict import Word, exit_code
+from crossbody.reports.voice import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pandas as pd
 
 GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
@@ -29,7 +27,7 @@ COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yello
 
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    rtol: float | None, settings: Sequence[str], as_json: bool, command: str,
+    rtol: float | None, settings: Sequence[str], command: str,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
@@ -41,15 +39,15 @@ def run(
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
     output.check(out)
-    with progress(len(cases) * (len(picks) + 1), quiet=as_json) as tell:
+    with progress(len(cases) * (len(picks) + 1)) as tell:
         results = [jobs.run_case(case, picks, rtol, tell, asked) for case in cases]
     rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol, settings) for case in cases})
     told = provenance(command, rtol=rtol, seed=SEED)
     with output.folder(out) as made:
         study.write(made, results, rows, told)
         page.write(made)
-    if as_json:
-        print(rows.to_json(orient="records", double_precision=15))
+    if voice.as_json():
+        print(voice.rows_as_json(rows))
     else:
         show(rows, out)
     return exit_code(rows["verdict"])
@@ -68,7 +66,8 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "gapmap", rows, told)
         page.write(made)
-    show_gap_map(gapmap.summary(rows), out)
+    if not voice.told_as_json({"gapmap": rows, "summary": gapmap.summary(rows)}):
+        show_gap_map(gapmap.summary(rows), out)
     return 0
 
 
@@ -85,7 +84,10 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "stability", rows, told)
         page.write(made)
-    return show_stability(rows, stability.surprises(rows), out)
+    surprises = stability.surprises(rows)
+    if not voice.told_as_json({"stability": rows, "surprises": surprises}):
+        show_stability(rows, surprises, out)
+    return int(len(surprises) > 0)
 
 
 def repeat(
@@ -99,34 +101,16 @@ def repeat(
     return shlex.join(words + (["--rtol", f"{rtol:g}"] if rtol is not None else []))
 
 
-@contextmanager
-def progress(steps: int, quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """A bar on stderr, advanced each time it is told what is being done."""
-    if quiet:
-        yield lambda _text: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=steps, completed=-1)
-
-        def tell(text: str) -> None:
-            bar.update(task, description=text, advance=1)
-
-        yield tell
-
-
 def show(rows: pd.DataFrame, out: Path) -> None:
     """One line a run with its worst errors and verdicts, every row that is outside, and where the report is."""
     from rich.console import Console
 
     console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
-    console.print(_summary(rows))
-    counts = rows["verdict"].value_counts()
-    console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
-    told = rows[rows["verdict"].isin([Word.SKIPPED, Word.OUTSIDE])]
+    if not voice.quiet():
+        console.print(_summary(rows))
+        counts = rows["verdict"].value_counts()
+        console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
+    told = rows[rows["verdict"].isin([Word.OUTSIDE] if voice.quiet() else [Word.SKIPPED, Word.OUTSIDE])]
     for row in told.to_dict(orient="records"):
         run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
         number = (
@@ -134,7 +118,13 @@ def show(rows: pd.DataFrame, out: Path) -> None:
         )
         text = f"{row['verdict']}: {run} {row['metric']}{number}. {row['why']}"
         console.print(text, soft_wrap=True, highlight=False, markup=False)
-    print(f"Report: {(out / page.PAGE).absolute()}", file=sys.stdout)
+    where(out)
+
+
+def where(out: Path) -> None:
+    """The path of the report, unless nothing but what is wrong is to be said."""
+    if not voice.silent():
+        print(f"Report: {(out / page.PAGE).absolute()}")
 
 
 def _summary(rows: pd.DataFrame) -> Any:
@@ -165,17 +155,18 @@ def _count(count: int, word: Word) -> str:
 
 def show_gap_map(lines: pd.DataFrame, out: Path) -> None:
     """One line an engine in the terminal, then what those say that failed or were skipped."""
-    print(lines.drop(columns="why").to_string(index=False, float_format=lambda x: f"{x:.4g}"))
+    if not voice.quiet():
+        print(lines.drop(columns="why").to_string(index=False, float_format=lambda x: f"{x:.4g}"))
     for line in lines[lines["why"] != ""].to_dict(orient="records"):
         print(f"{line['n']} balls, {line['engine']}:{line['profile']}, {line['machine']}: {line['why']}")
-    print(f"Report: {(out / page.PAGE).absolute()}")
+    where(out)
 
 
-def show_stability(rows: pd.DataFrame, surprises: pd.DataFrame, out: Path) -> int:
-    """One line a scene in the terminal, then those that ended otherwise than published; 1 if there are any."""
-    table = rows.drop(columns=["change", "why"])
-    print(table.to_string(index=False, float_format=lambda x: f"{x:.4g}"))
+def show_stability(rows: pd.DataFrame, surprises: pd.DataFrame, out: Path) -> None:
+    """One line a scene in the terminal, then those that ended otherwise than published."""
+    if not voice.quiet():
+        table = rows.drop(columns=["change", "why"])
+        print(table.to_string(index=False, float_format=lambda x: f"{x:.4g}"))
     for row in surprises.to_dict(orient="records"):
         print(f"outside: {row['engine']}:{row['profile']} {row['scene']}: {row['expected']} expected. {row['why']}")
-    print(f"Report: {(out / page.PAGE).absolute()}")
-    return int(len(surprises) > 0)
+    where(out)

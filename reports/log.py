@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody import hw
+from crossbody.reports import voice
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from crossbody.hw import Finding, GroupSurvey
+    from crossbody.hw import Finding, GroupSurvey, Survey
 
 WIDTH = 120  # of the tables in a file or a pipe
 
@@ -34,23 +37,62 @@ def info(path: Path, columns: str | None, part: int | None, draft_only: bool) ->
         print(hw.draft_text(found))
         found.refuse()
         return 0
-    print(f"{printable(str(path))}: {found.format}, read by {found.library}")
-    for group in found.groups:
-        _show_group(group)
-    for name, why in found.refused.items():
-        print(f"not read: {printable(name)} {printable(why)}")
+    if not voice.silent():
+        _show(found)
+    told = found.findings if columns is None else hw.check(path, columns, part)
+    if voice.as_json():
+        print(json.dumps(plain(found, told), indent=1, allow_nan=False))
+    else:
+        _show_findings([one for one in told if one.fault or not voice.quiet()])
     if columns is None:
-        _show_findings(found.findings)
-        print("\nDraft of a column map:\n")
-        print(hw.draft_text(found))
+        if not voice.silent():
+            print(f"\nDraft of a column map:\n\n{hw.draft_text(found)}")
         found.refuse()
         return 0
-    told = hw.check(path, columns, part)
-    _show_findings(told)
     for finding in told:
         if finding.fault:
             raise finding.error(path)
     return 0
+
+
+def plain(found: Survey, told: Sequence[Finding]) -> dict[str, Any]:
+    """A survey and what is doubtful about it in plain values, None for what is not finite."""
+    groups = [
+        {
+            "name": group.group.name, "rows": group.rows, "clock": group.clock.column if group.clock else None,
+            "duration": group.duration, "step": group.step, "longest": group.longest, "lost": group.lost,
+            "jitter": group.jitter,
+            "channels": [
+                {"name": one.column.name, "unit": one.column.unit, "type": one.column.type, "smallest": one.low,
+                 "largest": one.high, "not_finite": one.missing}
+                for one in group.columns
+            ],
+        }
+        for group in found.groups
+    ]  # fmt: skip
+    findings = [asdict(one) for one in told]
+    known = {"path": str(found.path), "format": found.format, "library": found.library, "refused": found.refused}
+    finite: dict[str, Any] = _finite(known | {"groups": groups, "findings": findings})
+    return finite
+
+
+def _finite(value: Any) -> Any:
+    """Plain values with None where a number is not finite, which JSON cannot say."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(one) for one in value]
+    if isinstance(value, (str, bool, int)) or value is None:
+        return value
+    return float(value) if math.isfinite(value) else None
+
+
+def _show(found: Survey) -> None:
+    print(f"{printable(str(found.path))}: {found.format}, read by {found.library}")
+    for group in found.groups:
+        _show_group(group)
+    for name, why in found.refused.items():
+        print(f"not read: {printable(name)} {printable(why)}")
 
 
 def printable(text: str) -> str:
@@ -88,7 +130,8 @@ def _table(group: GroupSurvey) -> Any:
 
 
 def _show_findings(findings: Sequence[Finding]) -> None:
-    print("\nFindings:" if findings else "\nNothing is wrong with it.")
+    if not voice.quiet():
+        print("\nFindings:" if findings else "\nNothing is wrong with it.")
     for one in findings:
         kind = "fault" if one.fault else "note"
         when = f", t = {one.t:.9g} s" if math.isfinite(one.t) else ""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from crossbody.cases import InvalidValue, OutputError
-from crossbody.reports import jobs, page, study, suites
+from crossbody.reports import jobs, page, study, suites, voice
 from crossbody.reports.provenance import provenance
 from crossbody.reports.suites._contract import Suite
 from crossbody.reports.sweep import draw, pools
@@ -45,7 +45,7 @@ class Ask:
     resume: bool = False
 
 
-def stress(ask: Ask, out: Path, as_json: bool, command: str) -> int:
+def stress(ask: Ask, out: Path, command: str) -> int:
     """Run suites, or what is left of them; the exit code.
 
     Raises:
@@ -57,13 +57,13 @@ def stress(ask: Ask, out: Path, as_json: bool, command: str) -> int:
         raise OutputError(f"{out} holds no sweep to go on with; leave --resume out to begin one.")
     with _client(ask.scheduler) as client:
         store = Store(out, identity(specs, chunk, {"seed": ask.seed}))
-        sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=as_json)
+        sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=voice.silent())
     rows, times = store.table()
-    with _bar(None, quiet=as_json) as tell:
+    with _bar(None, quiet=voice.silent()) as tell:
         small = reproducers(rows, specs, tell)
     _finish(store, rows, times, small, provenance(command, seed=ask.seed))
-    if as_json:
-        print(small.to_json(orient="records", double_precision=15))
+    if voice.as_json():
+        print(voice.rows_as_json(small))
     else:
         _show(rows, small, out)
     return exit_code(rows["verdict"])
@@ -170,14 +170,16 @@ def _bar(steps: int | None, quiet: bool, done: int = 0) -> Iterator[Callable[[st
 
 def _show(rows: pd.DataFrame, small: pd.DataFrame, out: Path) -> None:
     """One line a suite and engine, the reproducers, and where the page is."""
-    print(summary(rows).to_string(index=False, float_format=lambda x: f"{x:.2g}"))
-    print(f"{len(rows)} runs, {len(failures(rows))} ended before their horizon or are outside")
+    if not voice.quiet():
+        print(summary(rows).to_string(index=False, float_format=lambda x: f"{x:.2g}"))
+        print(f"{len(rows)} runs, {len(failures(rows))} ended before their horizon or are outside")
     for line in small.head(SHOWN).to_dict(orient="records"):
         print(f"{line['verdict']}: {line['outcome']} ({line['count']}x): {line['command']}")
         print(f"    {line['why'][:300]}")
     if len(small) > SHOWN:
         print(f"and {len(small) - SHOWN} more kinds in {out / 'reproducers.csv'}")
-    print(f"Report: {(out / page.PAGE).absolute()}")
+    if not voice.quiet():
+        print(f"Report: {(out / page.PAGE).absolute()}")
 
 
 __all__ = ["STABILITY", "Ask", "plan", "stress", "sweep"]

@@ -1,0 +1,92 @@
+"""How a command speaks: tables, nothing but what is wrong, or JSON. Progress goes to stderr, and only to a terminal."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import wraps
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_Work = TypeVar("_Work", bound=Callable[..., int])
+_KEY = "crossbody.voice"
+QUIET, JSON = "quiet", "json"
+
+
+def speaks(command: _Work) -> _Work:
+    """Give a command the options --quiet and --json; it takes none of them as arguments."""
+
+    @wraps(command)
+    def spoken(*args: Any, quiet: bool, as_json: bool, **more: Any) -> int:
+        click.get_current_context().meta[_KEY] = {QUIET: quiet, JSON: as_json}
+        return command(*args, **more)
+
+    options = (
+        click.option("--quiet", "-q", is_flag=True, help="Print nothing but what is wrong; no progress."),
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else."),
+    )
+    told: Any = spoken
+    for option in options:
+        told = option(told)
+    speaking: _Work = told
+    return speaking
+
+
+def _asked(word: str) -> bool:
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(_KEY, {}).get(word))
+
+
+def quiet() -> bool:
+    """Whether tables and paths are left out."""
+    return _asked(QUIET)
+
+
+def as_json() -> bool:
+    """Whether the result is printed as JSON and nothing else is."""
+    return _asked(JSON)
+
+
+def silent() -> bool:
+    """Whether nothing may be said besides the result."""
+    return quiet() or as_json()
+
+
+def rows_as_json(rows: pd.DataFrame) -> str:
+    """A table as a JSON list of its rows."""
+    return str(rows.to_json(orient="records", double_precision=15))
+
+
+def told_as_json(tables: Mapping[str, pd.DataFrame]) -> bool:
+    """Print tables as one JSON object if that was asked for; whether it was."""
+    if as_json():
+        print(json.dumps({name: json.loads(rows_as_json(rows)) for name, rows in tables.items()}))
+    return as_json()
+
+
+@contextmanager
+def progress(steps: int, hidden: bool = False) -> Iterator[Callable[[str], None]]:
+    """A bar on stderr with the time left, advanced each time it is told what is being done."""
+    if hidden or silent() or not sys.stderr.isatty():
+        yield lambda _text: None
+        return
+    from rich import progress as shown
+    from rich.console import Console
+
+    columns = (
+        shown.BarColumn(), shown.MofNCompleteColumn(), shown.TimeElapsedColumn(), shown.TextColumn("left"),
+        shown.TimeRemainingColumn(), shown.TextColumn("{task.description}"),
+    )  # fmt: skip
+    with shown.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=steps, completed=-1)
+
+        def tell(text: str) -> None:
+            bar.update(task, description=text, advance=1)
+
+        yield tell

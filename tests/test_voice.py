@@ -1,0 +1,118 @@
+"""Every command can be quiet and can speak JSON alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import log_files
+import numpy as np
+import pytest
+
+from crossbody.reports import voice
+from crossbody.reports.cli import cli, main
+
+
+def leaves(group: click.Group, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], click.Command]]:
+    for name, command in group.commands.items():
+        if isinstance(command, click.Group):
+            yield from leaves(command, (*path, name))
+        else:
+            yield (*path, name), command
+
+
+COMMANDS = dict(leaves(cli))
+
+
+@pytest.fixture(autouse=True)
+def _here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    return int(end.value.code or 0)
+
+
+@pytest.mark.parametrize("name", COMMANDS, ids=" ".join)
+def test_every_command_has_both(name: tuple[str, ...]) -> None:
+    options = {text for parameter in COMMANDS[name].params for text in parameter.opts}
+    assert options >= ({"--json"} if name == ("list",) else {"--json", "--quiet", "-q"})
+
+
+def test_the_list_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("list", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {"cases", "engines", "metrics"} <= set(told)
+    assert told["cases"]["bouncing_ball"].startswith("A ball dropped")
+
+
+RUN = ("run", "bouncing_ball", "--variant", "linear", "-e", "reference:compiled")
+
+
+def test_quiet_says_nothing_where_nothing_is_wrong_and_that_alone_else(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(*RUN, "-q") == 0
+    told = capsys.readouterr()
+    assert told.out == told.err == ""
+    assert Path("out/index.html").is_file()
+    assert call("report", "out", "--quiet") == 0
+    assert capsys.readouterr().out == ""
+    assert call(*RUN, "-q", "--setting", "rtol=0.1") == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines
+    assert all(line.startswith("outside: bouncing_ball:linear reference:compiled ") for line in lines)
+
+
+def test_the_frequency_responses_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("bode", "soft_contact", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert set(told) == {"bode", "poles", "growths"}
+    assert all(told.values())
+
+
+def test_a_log_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = log_files.table(200)
+    path = log_files.write("csv", tmp_path, table)
+    assert call("log", "info", str(path), "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    (group,) = told["groups"]
+    assert (group["rows"], group["lost"]) == (200, 0)
+    channels = {channel["name"]: channel for channel in group["channels"]}
+    assert channels["torque"]["smallest"] == pytest.approx(table["torque"].min(), rel=1e-12)
+    assert call("log", "info", str(path), "--quiet") == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_a_faulty_log_tells_the_fault_even_quietly(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    t = np.arange(200) * 1e-3
+    t[70] = t[69]
+    rows = "\n".join(f"{a:.6f},{b:.6f}" for a, b in zip(t, np.sin(t), strict=True))
+    (tmp_path / "log.csv").write_text(f"t,x\n{rows}\n")
+    (tmp_path / "map.toml").write_text('[time]\ncolumn = "t"\nunit = "s"\n[coordinates.x]\ncolumn = "x"\nunit = "m"\n')
+    assert call("log", "info", "log.csv", "--columns", "map.toml", "--json") == 2
+    told = json.loads(capsys.readouterr().out)
+    assert [(one["check"], one["row"]) for one in told["findings"] if one["fault"]] == [("time", 70)]
+    assert call("log", "info", "log.csv", "--columns", "map.toml", "-q") == 2
+    said = capsys.readouterr().out.strip()
+    assert said.startswith("fault: time: time, row 70")
+    assert said.count("\n") == 0
+
+
+def test_progress_tells_the_time_left_to_a_terminal_only(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with voice.progress(2) as tell:
+        tell("one")
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    with voice.progress(2) as tell:
+        tell("one")
+        tell("two")
+    said = capsys.readouterr().err
+    assert "left" in said
+    assert "two" in said
