@@ -20,10 +20,12 @@ if TYPE_CHECKING:
     from crossbody.hw._finding import Finding
     from crossbody.hw._fit import Estimate, Fit
     from crossbody.hw._identify import identify
+    from crossbody.hw._inverse import estimate_force, inverse
     from crossbody.hw._log import Channel, Log, Provenance, Repair
     from crossbody.hw._read import Scan, check, parts, read, scan
     from crossbody.hw._replay import replay
     from crossbody.hw._rows import Rows
+    from crossbody.hw._sensors import Sensor, unlagged
     from crossbody.hw._store import store
     from crossbody.hw._survey import GroupSurvey, Survey, survey
     from crossbody.hw._synthetic_log import Sensors, delta_log
@@ -36,10 +38,12 @@ _HOMES = {
     "_finding": ("Finding",),
     "_fit": ("Estimate", "Fit"),
     "_identify": ("identify",),
+    "_inverse": ("estimate_force", "inverse"),
     "_log": ("Channel", "Log", "Provenance", "Repair"),
     "_read": ("Scan", "check", "parts", "read", "scan"),
     "_replay": ("replay",),
     "_rows": ("Rows",),
+    "_sensors": ("Sensor", "unlagged"),
     "_store": ("store",),
     "_synthetic_log": ("Sensors", "delta_log"),
     "_synthetic_plant": ("Plant", "Push", "delta_plant"),
@@ -64,6 +68,7 @@ __all__ = [
     "Role",
     "Rows",
     "Scan",
+    "Sensor",
     "Sensors",
     "Signal",
     "Survey",
@@ -73,6 +78,9 @@ __all__ = [
     "delta_plant",
     "draft_text",
     "dump_columns",
+    "estimate_force",
+    "identify",
+    "inverse",
     "load_columns",
     "maps",
     "models",
@@ -83,6 +91,7 @@ __all__ = [
     "scan",
     "store",
     "survey",
+    "unlagged",
 ]
 
 

@@ -44,6 +44,7 @@ class Exact:
     how = "complex step through the motion"
     most = 200
     tolerance = 1e-3
+    ftol = 1e-12
 
     def __init__(
         self, model: Model, numbers: Mapping[str, Value], free: Sequence[str], cut: Sequence[Window], starts: bool,
@@ -94,6 +95,10 @@ class Exact:
     def checked(self, x: Floats, J: Floats, sizes: Floats, low: Floats) -> float:
         """Largest relative difference of the first columns of J, one for each size, and central differences."""
         return max(apart(self.residual, x, J, i, 1e-5 * size, low[i]) for i, size in enumerate(sizes))
+
+    def flat(self, x: Floats) -> dict[int, str]:
+        """Nothing: exact derivatives tell what is flat."""
+        return {}
 
     def owners(self) -> NDArray[np.int64]:
         """The window of every residual (N,)."""

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from crossbody.cases import InvalidValue, UnknownName, Value
 from crossbody.hw._derivative import apart
@@ -37,6 +38,7 @@ class Differences:
 
     most = 30
     tolerance = 0.5
+    ftol = 1e-4
 
     def __init__(
         self, model: Model, numbers: Mapping[str, Value], free: Sequence[str], cut: Sequence[Window], starts: bool,
@@ -51,7 +53,7 @@ class Differences:
         name, _, profile = (engine or model.engine).partition(":")
         self.engine, self.profile = name, profile or model.profiles.get(name, "matched")
         self.how = f"central differences of {100 * STEP:g} % through {name}"
-        self.starts, self.k = False, len(model.seen)
+        self.starts, self.k = False, model.differ(cut[0].y, cut[0].y).shape[1]
         self.grids = [np.arange(0, len(w.t), stride) for w in cut]
 
     def first(self) -> Floats:
@@ -71,6 +73,31 @@ class Differences:
         """Largest relative difference of the columns of J and those at half the step."""
         return max(apart(self.residual, x, J, i, 0.5 * STEP * abs(x[i]), low[i]) for i in range(len(sizes)))
 
+    def flat(self, x: Floats) -> dict[int, str]:
+        """Parameters that half or double their value hardly worsens: index -> that in words.
+
+        A value is worse if the sums of squares of the windows are larger by more than their scatter explains (one-sided
+        t test at 97.5 %). Local derivatives of such a motion say less: they feel single touches that shift.
+        """
+        best = self._sums(x)
+        found = {}
+        for i, name in enumerate(self.free):
+            low, high = self.model.parameters[name].low, self.model.parameters[name].high
+            for factor in (0.5, 2.0):
+                other = x.copy()
+                other[i] = min(max(factor * x[i], low), high)
+                rise = self._sums(other) - best
+                if np.mean(rise) <= stats.t.ppf(0.975, max(len(rise) - 1, 1)) * stats.sem(rise):
+                    change = 100.0 * (np.sqrt(np.sum(best + rise) / np.sum(best)) - 1.0)
+                    found[i] = (
+                        f"at {other[i]:.4g} {self.model.parameters[name].unit} the rmse changes by {change:+.1f} %"
+                    )
+        return found
+
+    def _sums(self, x: Floats) -> Floats:
+        r, owners = self.residual(x), self.owners()
+        return np.bincount(owners, weights=r * r)
+
     def owners(self) -> NDArray[np.int64]:
         """The window of every residual (N,)."""
         return np.repeat(np.arange(len(self.cut)), [self.k * len(grid) for grid in self.grids])
@@ -87,4 +114,5 @@ class Differences:
         run, _ = run_window(self.model, numbers, window, self.engine, self.profile, {})
         yhat, _ = self.model.see(self.model, run, np.ascontiguousarray(window.age[grid, 0]))
         found = self.model.differ(window.y[grid], yhat)
-        return np.where(np.isfinite(found), found, window.y[grid]).T.ravel()
+        plain = self.model.differ(window.y[grid], np.zeros_like(yhat))
+        return np.where(np.isfinite(found), found, plain).T.ravel()

@@ -68,7 +68,7 @@ def identify(
     x0 = np.clip(problem.first(), low, high)
     found = least_squares(
         problem.residual, x0, jac=problem.jacobian, bounds=(low, high), x_scale=_sizes(x0, low, high), method="trf",
-        xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=problem.most,
+        xtol=problem.ftol, ftol=problem.ftol, gtol=1e-12, max_nfev=problem.most,
     )  # fmt: skip
     return _judged(chosen, numbers, free, problem, x0, found, (low, high), cut, (fitted, held), kind, stride, more)
 
@@ -115,7 +115,8 @@ def _judged(
     count, x = len(free), found.x
     J = problem.jacobian(x)
     wide = spread(J, found.fun, problem.owners(), _sizes(x, *limits))
-    estimates = tuple(_estimate(model, name, i, x, x0, wide, limits) for i, name in enumerate(free))
+    flat = problem.flat(x)
+    estimates = tuple(_estimate(model, name, i, x, x0, wide, limits, i not in flat) for i, name in enumerate(free))
     sizes = _sizes(np.where(np.abs(x) > 1e-9 * np.abs(x0), x, x0), *limits)[:count]
     off = problem.checked(x, J, sizes, limits[0])
     sides = [
@@ -128,13 +129,13 @@ def _judged(
         parameters=dict(numbers) | values, delay=float(x[free.index(DELAY)]) if DELAY in free else 0.0,
         fitted=tuple(parts[0]), held=tuple(parts[1]), before=before, after=after,
         sensitivities=f"{problem.how}; central differences at the solution differ by {off:.1e} of their size",
-        covariance=wide.how, warnings=_warnings(estimates, wide, off, found, limits, problem.tolerance),
+        covariance=wide.how, warnings=_warnings(estimates, wide, off, found, flat, problem.tolerance),
         evaluations=int(found.nfev), success=bool(found.success), message=str(found.message),
     )  # fmt: skip
 
 
 def _estimate(
-    model: Model, name: str, i: int, x: Floats, x0: Floats, wide: Spread, limits: tuple[Floats, Floats]
+    model: Model, name: str, i: int, x: Floats, x0: Floats, wide: Spread, limits: tuple[Floats, Floats], steep: bool
 ) -> Estimate:
     unknown = bool(np.any(np.abs(wide.null[:, i]) > 1e-2)) if len(wide.null) else False
     std = np.inf if unknown else float(np.sqrt(max(wide.covariance[i, i], 0.0)))
@@ -145,7 +146,7 @@ def _estimate(
     return Estimate(
         name=name, unit="s" if name == DELAY else model.parameters[name].unit, value=float(x[i]), std=std,
         low=float(x[i]) - half, high=float(x[i]) + half, start=float(x0[i]), bounds=bounds,
-        identifiable=bool(told and np.isfinite(half)),
+        identifiable=bool(told and steep and np.isfinite(half)),
     )  # fmt: skip
 
 
@@ -179,7 +180,7 @@ def _ends(r: Floats, k: int) -> Floats:
 
 
 def _warnings(
-    estimates: Sequence[Estimate], wide: Spread, off: float, found: Any, limits: tuple[Floats, Floats], tolerance: float
+    estimates: Sequence[Estimate], wide: Spread, off: float, found: Any, flat: Mapping[int, str], tolerance: float
 ) -> tuple[str, ...]:
     told = []
     count = len(estimates)
@@ -188,7 +189,9 @@ def _warnings(
         told.append(f"{', '.join(part)}: the data tell a combination of them only; keep one of them.")
     C = _correlation(wide, estimates)
     for i, e in enumerate(estimates):
-        if np.isfinite(e.std) and not e.identifiable:
+        if i in flat:
+            told.append(f"{e.name} is not identifiable: {flat[i]}.")
+        elif np.isfinite(e.std) and not e.identifiable:
             told.append(f"{e.name} is not identifiable: {e.value:.4g} +- {e.high - e.value:.2g} {e.unit}.")
         if e.low <= e.bounds[0] <= 0.0 < e.high and e.identifiable:
             told.append(f"{e.name} cannot be told from its bound {e.bounds[0]:g} {e.unit}.")

@@ -115,7 +115,7 @@ def _felt(log: Log, model: Model, delay: float, half: int, degree: int, rows: Ro
     lacking = [name for name in model.inputs if name not in log.names("inputs")]
     if lacking:
         raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
-    shift = log.channel("coordinates", model.measured[0].name).delay + delay
+    shift = log.channel("coordinates", model.channels[0]).delay + delay
     return felt(log.time, log.matrix("inputs", model.inputs), shift, half, degree, rows)
 
 
@@ -147,7 +147,7 @@ def _balance(
         q = terms[0]
         found.append(terms[1:])
     needed, inputs, mass = (np.array([one[i] for one in found]) for i in range(3))
-    shift = log.channel("coordinates", model.measured[0].name).delay + delay
+    shift = log.channel("coordinates", model.channels[0]).delay + delay
     return _Balance(t=log.time[rows] - shift, needed=needed, inputs=inputs, mass=mass, noise=noise)
 
 

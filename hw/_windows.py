@@ -62,9 +62,7 @@ def windows(
     if not 0.0 <= reach < math.inf or (length == 0.0 and reach > 0.0) or (length > 0.0 and reach == 0.0):
         raise InvalidValue(f"horizon is {reach!r} s; it must be above 0, and restart too.")
     y, yd = model.read(model, log)
-    named = [c.name for c in model.measured]
-    delays = np.array([log.channel("coordinates", name).delay + delay for name in named])[: y.shape[1]]
-    delays = delays if len(delays) == y.shape[1] else np.full(y.shape[1], delays[0])
+    delays = _delays(log, model) + delay
     recorded = [name for name in model.inputs if name in log.names("inputs")]
     u = log.matrix("inputs", recorded) if len(recorded) == len(model.inputs) else np.zeros((len(log), 0))
     cuts = _cuts(log.time, length, reach)
@@ -73,6 +71,12 @@ def windows(
         yd = np.zeros_like(y)
         yd[starts] = rates_by_fit(log.time, y, starts)
     return tuple(_window(log, y, yd, u, delays, a, b) for a, b in cuts)
+
+
+def _delays(log: Log, model: Model) -> Floats:
+    """Delay of every compared coordinate (k,), s, as the column map says; one for all where they are made of others."""
+    each = np.array([log.channel("coordinates", name).delay for name in model.channels])
+    return np.full(len(model.measured), each[0]) if model.needs else each
 
 
 def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:

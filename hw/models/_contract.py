@@ -74,8 +74,9 @@ class Model:
     Attributes:
         name, title: which model; the title says it in words.
         parameters: its numbers, with units and bounds.
-        measured: names and units of the coordinates that a log must have.
+        measured: names and units of what is compared; the coordinates that a log must have, but for `needs`.
         seen: which coordinates of the case they are.
+        needs: names of the coordinates that a log must have, where they are others.
         inputs: names of the recorded inputs that drive it; a log without them is a free motion.
         forces: names of the case's further inputs: what acts besides, and may be estimated.
         build: (parameters, segment) -> the scene of one stretch.
@@ -99,6 +100,7 @@ class Model:
     parameters: Mapping[str, Parameter]
     measured: tuple[Coordinate, ...]
     seen: tuple[int, ...]
+    needs: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     build: Callable[[Numbers, Segment], Case]
@@ -128,10 +130,15 @@ class Model:
             found[name] = self.parameters[name].checked(f"{self.name}: {name}", value)
         return found
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the coordinates that a log must have."""
+        return self.needs or tuple(c.name for c in self.measured)
+
     def check_log(self, log: Log) -> None:
         """Raise SceneError for a log that lacks a measured coordinate; it names what there is."""
         have = log.names("coordinates")
-        lacking = [c.name for c in self.measured if c.name not in have]
+        lacking = [name for name in self.channels if name not in have]
         if lacking:
             raise SceneError(
                 f"The log has no coordinate {', '.join(lacking)}, which {self.name} needs; it has: "
