@@ -114,7 +114,8 @@ class March:
         scene = self.scene
         if scene.arm is not None:
             scene.arm(guess)
-            if scene.hook is not None:  # called even when no row is there: a third of the cost of a free step
+            # Called even when no row is there: a third of the cost of a free step.
+            if scene.hook is not None and not scene.always:
                 mujoco.set_mjcb_control(scene.hook if any(guess) else None)
         mujoco.mj_forward(scene.model, scene.data)
         return scene.modes()

@@ -31,7 +31,8 @@ class Scene:
         chart: positions and velocities of the model -> those of the case; None where they are the same.
         instants: when the inputs change, s, increasing.
         change: puts in force what acts from such an instant on.
-        hook: adds to efc_aref what solref cannot say; None if nothing.
+        hook: adds to efc_aref what solref cannot say, and sets forces that depend on the state; None if nothing.
+        always: whether the hook acts while all rows are free too.
         arm: opens and closes rows to suit their modes (matched profile only).
         margins: -> for every row its gap, m, and the sign of the multiplier that it would have without the bound
             lam >= 0 (matched profile only).
@@ -51,6 +52,7 @@ class Scene:
     instants: Sequence[float] = ()
     change: Callable[[float], None] = _nothing
     hook: Hook | None = None
+    always: bool = False
     arm: Callable[[Modes], None] | None = None
     margins: Callable[[], list[tuple[float, float]]] | None = None
     machine: str = "memoryless"

@@ -39,14 +39,15 @@ class TwoSets(Pairs):
         law: constants of every row, linear.
         small: gap, m, and multiplier, N, that count as zero.
         gaps: -> gap of every row (nc,), m, at the present state.
-        drift: -> H' v of every row (nc,), m/s^2.
+        drift: -> H' v of every row (nc,), m/s^2; None where it is 0.
         jacobian: -> H (nc, nv).
         weights: diagonal of the mass matrix (nv,).
     """
 
     def __init__(
         self, model: Any, data: Any, geoms: Sequence[tuple[str, str]], law: Law, small: tuple[float, float],
-        gaps: Callable[[], Floats], drift: Callable[[], Floats], jacobian: Callable[[], Floats], weights: Floats,
+        gaps: Callable[[], Floats], drift: Callable[[], Floats] | None, jacobian: Callable[[], Floats],
+        weights: Floats,
     ) -> None:  # fmt: skip
         super().__init__(model, data, geoms, one_set(law), small, gaps, drift)
         self.jacobian, self.weights = jacobian, weights
