@@ -10,11 +10,12 @@ linearise       the linear model at one state; `tangents` its derivatives at man
 poses           trim, minimal model and poles of many held poses
 modes, locus, controllable, observable         what a linear model says
 sensitivity     derivatives of a motion by its start and parameters, through its contacts
-estimate        forces that were not measured, from motion and torque, with their covariance
+filtered, balanced    forces that were not measured, from motion and torque, with their covariance
 """
 
 from __future__ import annotations
 
+from crossbody.reference.linear._estimate import Estimate, Unknown, balanced, filtered
 from crossbody.reference.linear._linearise import linearise
 from crossbody.reference.linear._many import Tangents, tangents
 from crossbody.reference.linear._model import LinearModel
@@ -24,6 +25,7 @@ from crossbody.reference.linear._sensitivity import Jump, Sensitivity, sensitivi
 from crossbody.reference.linear._trim import Trim, trim
 
 __all__ = [
+    "Estimate",
     "Jump",
     "LinearModel",
     "Locus",
@@ -32,7 +34,10 @@ __all__ = [
     "Sensitivity",
     "Tangents",
     "Trim",
+    "Unknown",
+    "balanced",
     "controllable",
+    "filtered",
     "linearise",
     "locus",
     "modes",

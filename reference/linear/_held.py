@@ -56,7 +56,7 @@ def eliminate(A: Floats, n: int, rows: Index) -> int:
 @compiled
 def admitted(H: Array, T: Floats) -> int:
     """T (n, m) with H T = 0, the identity in the coordinates that are free; 1 if H has not full rank."""
-    na, n = H.shape
+    n = H.shape[1]
     A, rows = H.real.copy(), np.empty(n, np.int64)
     if eliminate(A, n, rows) != 0:
         return 1
