@@ -162,11 +162,13 @@ class System:
         """M(q) as a dense (n, n) matrix."""
         return self.terms(q, v, u)[0]
 
-    def terms(self, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None) -> tuple[Floats, Floats]:
-        """M(q) dense (n, n) and f(q, v, u) (n,) at t = 0."""
+    def terms(
+        self, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None, t: float = 0.0
+    ) -> tuple[Floats, Floats]:
+        """M(q) dense (n, n) and f(t, q, v, u) (n,) in the discrete state of the start."""
         n, k = self.n, self.mass_block
         blocks, f = np.zeros((n, k)), np.zeros(n)
-        self.dynamics(0.0, *self._state(q, v), self._input(u), np.array(self.p), blocks, f, np.zeros(self.scratch))
+        self.dynamics(t, *self._state(q, v), self._input(u), np.array(self.p), blocks, f, np.zeros(self.scratch))
         M = np.zeros((n, n))
         for b in range(0, n, k):
             M[b : b + k, b : b + k] = blocks[b : b + k]

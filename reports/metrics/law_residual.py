@@ -44,10 +44,10 @@ def _equations(case: Case) -> Any:
 
 
 def multipliers(
-    system: Any, case: Case, q: Floats, v: Floats, rows: NDArray[np.intp], fast: NDArray[np.bool_]
+    system: Any, case: Case, t: float, q: Floats, v: Floats, rows: NDArray[np.intp], fast: NDArray[np.bool_]
 ) -> Floats:
     """Lam (len(rows),) that the law asks for at one state with those rows active, `fast` with those of COLLISION."""
-    M, f = system.terms(q, v)
+    M, f = system.terms(q, v, t=t)
     H, h, Hdv = (part[rows] for part in system.constraint(q, v))
     law = case.law
     a0, a1 = (np.where(fast, b, a)[rows] for a, b in ((law.a0, law.b0), (law.a1, law.b1)))
@@ -61,7 +61,7 @@ def multipliers(
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples.
 
-    None where lam is not known, and where inputs act that the run does not record.
+    None where lam is not known, and where inputs or discrete variables act that a row of the run does not show.
     """
     if case.inputs is not None:
         return None
@@ -70,12 +70,12 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if not len(some) or np.isnan(run.lam).any():
         return None
     system = _equations(case)
-    if system is None or system.control is not None:
+    if system is None or system.control is not None or system.switch is not None:
         return None
     worst, scale = 0.0, 0.0
     for i in some[:: max(1, len(some) // SAMPLES)]:
         rows = np.flatnonzero(closed[i])
-        lam = multipliers(system, case, run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION)
+        lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION)
         worst = max(worst, float(np.max(np.abs(run.lam[i, rows] - lam))))
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / scale if scale else None
