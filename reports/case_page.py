@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
-
-import pandas as pd
 
 from crossbody.reports import figures
 from crossbody.reports.figures import label, style, suits
 from crossbody.reports.html import Page
 from crossbody.reports.playback import playback
 from crossbody.reports.results import CaseFiles, Results
-from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.store import Trace
 
 PLOTTED = 700_000
@@ -50,7 +49,8 @@ def _lead(about: Mapping[str, Any]) -> str:
     if not about:
         return "No motion of this case is stored."
     truth = f" Truth: {about['tier']} ({about['source']})." if about.get("tier") else ""
-    return f"{about['title'].rstrip('.')}.{truth}"
+    title = about["title"].rstrip(".")
+    return f"{title[:1].upper()}{title[1:]}.{truth}"
 
 
 def _engines(traces: Sequence[Trace]) -> list[Mapping[str, Any]]:
@@ -58,12 +58,12 @@ def _engines(traces: Sequence[Trace]) -> list[Mapping[str, Any]]:
 
 
 def _verdicts(found: Results, case: CaseFiles) -> Section:
-    rows = found.verdicts[found.verdicts["label"] == case.label]
+    rows = found.rows.get(case.label, [])
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": records(rows), "counts": rows["verdict"].value_counts().to_dict(), "missing": case.missing,
-            "engines": list(dict.fromkeys(rows["who"])),
+            "rows": rows, "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
+            "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
         },
     )  # fmt: skip
 
@@ -100,10 +100,9 @@ def _run(trace: Trace) -> dict[str, Any]:
 
 
 def _audit(found: Results, case: CaseFiles) -> Section:
-    rows = found.audit[found.audit["case"] == case.label] if len(found.audit) else pd.DataFrame()
     told = [
         row | {"who": f"{row['engine']}:{row['profile']}", "verdict": "within" if row["same"] else "outside"}
-        for row in records(rows)
+        for row in found.audits.get(case.label, [])
     ]
     failed = sum(not row["same"] for row in told)
     text = f"{AUDIT_TEXT} {failed} of {len(told)} quantities differ." if told else f"{AUDIT_TEXT} None was audited."

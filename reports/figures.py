@@ -11,6 +11,7 @@ from plotly.subplots import make_subplots
 
 from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
+from crossbody.reports.filled import filled
 from crossbody.reports.metrics._impulse import cumulative
 from crossbody.reports.store import Trace
 from crossbody.reports.strips import modes
@@ -20,7 +21,7 @@ from crossbody.reports.thin import POINTS, keep
 SAMPLE = 15
 """Room of one sample of one line on a page, bytes (time and value as base64)."""
 FEWEST = 60
-MOST_SIGNALS = 8
+MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
 FINE = 2e-5
 """Distance of samples over the horizon below which times are written in double precision."""
@@ -49,13 +50,15 @@ class _Sheet:
         self.figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=gap)
         self.data: list[dict[str, Any]] = []
         for i, name in enumerate(rows, start=1):
-            self.figure.update_yaxes(title_text=name, title_standoff=4, row=i, col=1)
+            self.figure.update_yaxes(
+                title_text=name, title_standoff=4, title_font_size=12, exponentformat="power", row=i, col=1
+            )
         self.figure.update_xaxes(title_text="time [s]", row=len(rows), col=1)
         self.figure.update_layout(title_text=title, height=130 + 170 * len(rows), showlegend=False)
 
     def logarithmic(self, *rows: int) -> None:
         for row in rows:
-            self.figure.update_yaxes(type="log", exponentformat="power", nticks=5, row=row, col=1)
+            self.figure.update_yaxes(type="log", nticks=5, row=row, col=1)
 
     def line(self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, **more: Any) -> None:
         """One line of one engine into plot `row`, thinned; what is not finite is a gap."""
@@ -102,21 +105,27 @@ def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
     return difference
 
 
+def _floors(traces: Sequence[Trace], units: Sequence[str]) -> dict[str, float]:
+    """One floor a unit: a coordinate that stays at 0 is compared with its neighbours' size."""
+    q = traces[0].run.q
+    return {unit: floor_of(q[:, [k for k, u in enumerate(units) if u == unit]]) for unit in units}
+
+
 def motion(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
-    """Every coordinate of every engine, and under it log |difference to the truth| at the same instants."""
+    """Every coordinate of every engine, and under it log |difference to the truth|, impacts matched."""
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
+    floors = _floors(traces, [unit for _, unit in names])
     shown = drawn(len(names))
-    rows = [
-        row for k in shown for row in (f"{names[k][0]} [{names[k][1]}]", f"|{names[k][0]} - truth| [{names[k][1]}]")
-    ]
-    sheet = _Sheet(rows, "Coordinates, and |difference to the truth| at the same instant", points)
-    for place, k in enumerate(shown):
-        floor = floor_of(traces[0].run.q[:, k])
-        for i, trace in enumerate(traces):
-            sheet.line(trace, i, 2 * place + 1, trace.run.q[:, k])
+    rows = [text for k in shown for text in ("{}<br>[{}]".format(*names[k]), f"|error|<br>[{names[k][1]}]")]
+    sheet = _Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points)
+    for i, trace in enumerate(traces):
+        t, q = filled(trace.run)
+        for place, k in enumerate(shown):
+            sheet.line(trace, i, 2 * place + 1, q[:, k], t)
             if trace.truth is not None:
-                sheet.line(trace, i, 2 * place + 2, apart(trace.run.q[:, k], trace.truth.q[:, k], floor))
-        sheet.logarithmic(2 * place + 2)
+                error = apart(trace.run.q[:, k], trace.truth.q[:, k], floors[names[k][1]])
+                sheet.line(trace, i, 2 * place + 2, error)
+    sheet.logarithmic(*range(2, len(rows) + 1, 2))
     return sheet.done()
 
 
@@ -124,13 +133,13 @@ def force(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
     shown = drawn(len(contacts))
-    each = ("lam {} [N]", "impulse {} [N s]", "|impulse {} - truth| [N s]")
+    each = ("lam {}<br>[N]", "impulse<br>[N s]", "|error|<br>[N s]")
     rows = [text.format(contacts[k]) for k in shown for text in each]
     sheet = _Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points)
     summed = [cumulative(trace.run) for trace in traces]
+    floor = floor_of(summed[0])
     true = [None if trace.truth is None else cumulative(trace.truth) for trace in traces]
     for place, k in enumerate(shown):
-        floor = floor_of(summed[0][:, k])
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
                 continue
@@ -145,7 +154,7 @@ def force(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
 
 def energy(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     """Total energy, work of the contacts, and what neither they nor inputs nor damping explain."""
-    rows = ["total energy [J]", "work of contacts [J]", "|unexplained energy| [J]"]
+    rows = ["total energy<br>[J]", "work of contacts<br>[J]", "|unexplained|<br>[J]"]
     sheet = _Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points)
     floor = floor_of(traces[0].run.energy)
     for i, trace in enumerate(traces):
@@ -166,7 +175,7 @@ def penetration(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     contacts = traces[0].about["contacts"]
     shown = drawn(len(contacts))
     always = [bool((traces[0].run.mode[:, k] == Mode.BILATERAL).all()) for k in shown]
-    rows = [f"{'|gap|' if on else 'depth'} {contacts[k]} [m]" for k, on in zip(shown, always, strict=True)]
+    rows = [f"{'|gap|' if on else 'depth'} {contacts[k]}<br>[m]" for k, on in zip(shown, always, strict=True)]
     sheet = _Sheet(rows, "Penetration, and drift of rows that are always on", points)
     for row, (k, on) in enumerate(zip(shown, always, strict=True), start=1):
         for i, trace in enumerate(traces):
@@ -201,7 +210,11 @@ def note(name: str, traces: Sequence[Trace]) -> str:
 
 
 NOTES = {
-    "motion": "Differences end at a common floor, the rounding of the largest value: there nothing is left to compare.",
+    "motion": (
+        "Impacts are matched first and the arcs between them compared; how far impacts are off is the metric "
+        "event_times. Differences end at a common floor, the rounding of the largest value of that unit: below it "
+        "nothing is left to compare. Where a solver took long steps, a cubic through q and v of both ends is drawn."
+    ),
     "force": "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that.",
 }
 FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int], go.Figure]]] = {

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
-
-import pandas as pd
 
 from crossbody.reports.case_page import provenance
 from crossbody.reports.changes import changes
@@ -41,13 +40,8 @@ def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], 
 
 
 def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> Section:
-    rows = found.verdicts
-    engines = list(dict.fromkeys(rows["who"]))
-    counted = {key: group["verdict"].value_counts() for key, group in rows.groupby(["label", "who"], sort=False)}
-    why = rows[rows["verdict"] == Word.SKIPPED.value].set_index(["label", "who"])["why"].to_dict()
-    lines = [
-        {"case": case, "cells": [_cell(found, counted, why, case.label, who) for who in engines]} for case in cases
-    ]
+    engines = list(dict.fromkeys(found.verdicts["who"]))
+    lines = [{"case": case, "cells": _line(found, case.label, engines)} for case in cases]
     return Section(
         name="matrix", title="Verdicts", template="matrix.html",
         context={
@@ -66,18 +60,25 @@ def _heads(engines: Sequence[str]) -> list[dict[str, Any]]:
     return [{"engine": engine, "profiles": profiles} for engine, profiles in groups.items()]
 
 
-def _cell(
-    found: Results, counted: Mapping[Any, pd.Series], why: Mapping[Any, str], label: str, who: str
-) -> dict[str, Any]:
+def _line(found: Results, label: str, engines: Sequence[str]) -> list[dict[str, Any]]:
+    """One case: a cell for every engine."""
+    counts: dict[str, Counter[str]] = {}
+    why: dict[str, str] = {}
+    for row in found.rows.get(label, ()):
+        counts.setdefault(row["who"], Counter())[row["verdict"]] += 1
+        why[row["who"]] = row["why"]
+    walls = found.walls
+    return [_cell(label, who, counts.get(who), why.get(who, ""), walls.get((label, who))) for who in engines]
+
+
+def _cell(label: str, who: str, counts: Counter[str] | None, why: str, wall: float | None) -> dict[str, Any]:
     """Worst word of one engine on one case, how many of how many, and its run time."""
-    counts = counted.get((label, who))
     if counts is None:
         return {"word": "", "who": who, "text": "", "title": f"{who} was not asked for {label}."}
-    judged = {word: int(counts.get(word, 0)) for word in JUDGED}
-    word = next((word for word, n in judged.items() if n), "skipped" if "skipped" in counts else "not judged")
-    wall = found.walls.get((label, who))
+    judged = {word: counts[word] for word in JUDGED}
+    word = next((word for word, n in judged.items() if n), "skipped" if counts["skipped"] else "not judged")
     said = ", ".join(f"{n} {word}" for word, n in judged.items() if n)
-    title = f"{who} on {label}: {said or why.get((label, who), word)}"
+    title = f"{who} on {label}: {said or why or word}"
     total = sum(judged.values())
     text = (str(total) if word == "within" else f"{judged[word]} of {total}") if total else ""
     return {"word": word, "who": who, "text": text, "title": title, "wall": _time(wall)}
@@ -93,7 +94,7 @@ def _time(wall: float | None) -> str:
 def _tiles(found: Results, engines: Sequence[str]) -> list[dict[str, Any]]:
     counts = found.verdicts["verdict"].value_counts()
     words = {word: int(counts.get(word, 0)) for word in ("within", "expected-outside", "outside", "skipped")}
-    different = 0 if found.audit.empty else int((~found.audit["same"].astype(bool)).sum())
+    different = sum(not row["same"] for rows in found.audits.values() for row in rows)
     return [
         {"value": len(found.cases), "title": "cases", "word": ""},
         {"value": len(engines), "title": "engines with profile", "word": ""},

@@ -9,10 +9,12 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import CrossbodyError
 from crossbody.cases._arrays import Floats
 from crossbody.reports import scenes
+from crossbody.reports.filled import filled
 from crossbody.reports.section import Section
 from crossbody.reports.store import Trace
 from crossbody.reports.styles import TRUTH, label, style
@@ -22,7 +24,7 @@ ROOM = 280_000
 FEWEST, MOST = 60, 900
 TEXT = (
     "All engines over one clock, which the plots below share. Arrows are contact forces, as long as lam; each shows "
-    "the largest force since the picture before, so that no blow is missed. Drag to turn a scene in space."
+    "the largest force since the picture before, so that no blow is missed."
 )
 
 
@@ -65,41 +67,48 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene) -> dict[str, Any]:
 
 def _track(trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int) -> dict[str, Any]:
     run = trace.run
-    at = chosen(run.t, np.array([e.t for e in run.events]), frames)
-    q, lam = run.q[at], peaks(run.lam, at)
-    poses = np.nan_to_num(scene.poses(q, parameters)).reshape(len(at), -1)
-    arrows = np.nan_to_num(scene.arrows(q, lam, parameters)).reshape(len(at), -1)
+    t, q = filled(run)
+    at = chosen(t, np.array([e.t for e in run.events]), frames)
+    lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t[at], side="right"), 1))
+    poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)
     look = style(trace, i)
     return {
         "name": label(trace), "color": look["color"], "strokes": look["strokes"], "truth": label(trace) == TRUTH,
-        "t": _base64(run.t[at]), "poses": _base64(poses), "arrows": _base64(arrows),
+        "t": _base64(t[at]), "poses": _base64(poses), "arrows": _base64(arrows),
     }  # fmt: skip
 
 
-def chosen(t: Floats, events: Floats, frames: int) -> Any:
+def chosen(t: Floats, events: Floats, frames: int) -> NDArray[np.intp]:
     """Indices of samples for pictures: half evenly in time, half around the events, first and last."""
     even = np.searchsorted(t, np.linspace(t[0], t[-1], max(2, frames // 2)))
-    spread = (
-        events[np.linspace(0, len(events) - 1, min(len(events), frames // 8)).astype(int)] if len(events) else events
-    )
-    near = np.searchsorted(t, spread)[:, None] + np.array([-2, 0, 1, 3])
+    some = np.linspace(0, len(events) - 1, min(len(events), frames // 8)).astype(np.intp)
+    near = np.searchsorted(t, events[some])[:, None] + np.array([-2, 0, 1, 3])
     return np.unique(np.clip(np.concatenate([even, near.ravel()]), 0, len(t) - 1))
 
 
-def peaks(lam: Floats, at: Any) -> Floats:
-    """Of every multiplier the value of largest size since the picture before (frames, nc)."""
-    found = np.empty((len(at), lam.shape[1]))
-    for i, (a, b) in enumerate(zip([0, *(at[:-1] + 1)], at + 1, strict=True)):
-        part = np.nan_to_num(lam[a:b])
+def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
+    """Of every multiplier the value of largest size in the samples since the picture before.
+
+    Args:
+        lam: (n, nc), N.
+        ends: of each picture, how many samples are past (frames,), nondecreasing, at least 1.
+
+    Returns:
+        (frames, nc), N; 0 where the engine cannot tell.
+    """
+    known = np.nan_to_num(lam)
+    found = np.empty((len(ends), lam.shape[1]))
+    for i, (a, b) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+        part = known[min(a, b - 1) : b]
         found[i] = part[np.argmax(np.abs(part), axis=0), np.arange(lam.shape[1])]
     return found
 
 
 def _scale(traces: Sequence[Trace]) -> float:
-    """The force that is drawn as the longest arrow, N: the truth's largest."""
-    lam = np.abs(traces[0].run.lam)
-    return float(np.max(lam[np.isfinite(lam)], initial=0.0)) or 1.0
+    """The force that is drawn as the longest arrow, N: the median of the largest of each engine that has one."""
+    largest = [float(np.max(np.abs(np.nan_to_num(trace.run.lam)), initial=0.0)) for trace in traces]
+    return float(np.median([x for x in largest if x > 0.0] or [1.0]))
 
 
 def _base64(array: Floats) -> str:
-    return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
+    return base64.b64encode(np.ascontiguousarray(np.nan_to_num(array), dtype="<f4").tobytes()).decode()

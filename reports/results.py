@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import pandas as pd
 from crossbody.cases import OutputError
 from crossbody.reports.html import file_name
 from crossbody.reports.output import MARKER
+from crossbody.reports.section import records
 from crossbody.reports.store import Trace, load, peek
 from crossbody.reports.study import read_json
 from crossbody.reports.verdict import Verdict, Word
@@ -48,7 +49,8 @@ class Results:
 
     Attributes:
         out: the folder.
-        verdicts, audit: their rows; `base` the verdicts compared with, and `base_name` where they stand.
+        verdicts: their rows; `base` those compared with, and `base_name` where they stand.
+        rows, audits: verdicts and parity audit of each case (by its label), as plain rows.
         told: provenance.
         cases: in the order of their verdicts.
         walls: (case:variant, engine:profile) -> run time, s.
@@ -56,7 +58,8 @@ class Results:
 
     out: Path
     verdicts: pd.DataFrame
-    audit: pd.DataFrame
+    rows: Mapping[str, list[dict[str, Any]]]
+    audits: Mapping[str, list[dict[str, Any]]]
     told: Mapping[str, Any]
     cases: tuple[CaseFiles, ...]
     walls: Mapping[tuple[str, str], float]
@@ -80,13 +83,22 @@ def read(out: Path, against: Path | None = None) -> Results:
         raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
     told = read_json(out / "provenance.json")
     verdicts = _verdicts(out)
-    audit = pd.DataFrame(read_json(out / "audit.json")["rows"])
+    audits = _by(read_json(out / "audit.json")["rows"], "case")
     cases, walls = _cases(out, verdicts)
     base = None if against is None else _verdicts(against)
     return Results(
-        out=out, verdicts=verdicts, audit=audit, told=told, cases=cases, walls=walls, base=base,
+        out=out, verdicts=verdicts, rows=_by(records(verdicts), "label"), audits=audits, told=told,
+        cases=cases, walls=walls, base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
+
+
+def _by(rows: Iterable[dict[str, Any]], key: str) -> dict[str, list[dict[str, Any]]]:
+    """Rows by the value of one column: pandas would look through all of them for every case."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        found.setdefault(row[key], []).append(row)
+    return found
 
 
 def _verdicts(out: Path) -> pd.DataFrame:

@@ -26,7 +26,8 @@ class Trace:
     Attributes:
         about: case, variant, engine, profile, settings, names and units; plain values.
         run: the motion.
-        truth: the truth's q, v, gap and lam at the same instants; None for the truth itself.
+        truth: the truth's q, v, gap and lam beside every sample, impacts matched; NaN where nothing is compared, None
+            for the truth itself.
     """
 
     about: Mapping[str, Any]

@@ -38,8 +38,8 @@ def modes(traces: Sequence[Trace], points: int = LONGEST) -> go.Figure:
         title_text="Modes of the state machine", barmode="overlay", height=height, bargap=0.25,
         legend={"orientation": "h", "y": 1.0, "yanchor": "bottom"},
     )  # fmt: skip
-    figure.update_xaxes(title_text="time [s]")
-    figure.update_yaxes(title_text="contact and engine [-]", automargin=True, tickfont={"size": 10})
+    figure.update_xaxes(title_text="time [s]", range=[0.0, float(traces[0].run.t[-1])])
+    figure.update_yaxes(automargin=True, tickfont={"size": 10})
     return figure
 
 

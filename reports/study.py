@@ -12,10 +12,11 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from crossbody.cases import Case, OutputError
+from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports.comparison import Entry, table, verdicts
 from crossbody.reports.jobs import CaseResult
+from crossbody.reports.metrics._align import aligned
 from crossbody.reports.store import Trace, save
 from crossbody.reports.styles import TRUTH
 from crossbody.reports.thin import keep
@@ -87,8 +88,23 @@ def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
     assert entry.run is not None
     about = _about(case, entry.engine, entry.profile) | {"settings": dict(entry.settings)}
     about["steps"] = _steps(entry.run.t if entry.stepped is None else entry.stepped)
-    inside = bool(len(entry.run.t)) and entry.run.t[-1] <= case.t_end
-    return Trace(about=about, run=entry.run, truth=truth.at(entry.run.t) if inside else None)
+    return Trace(about=about, run=entry.run, truth=_beside(truth, entry.run))
+
+
+def _beside(truth: Truth, run: Trajectory) -> Trajectory | None:
+    """The truth at every sample of a run, impacts matched as the metrics match them; NaN where nothing is compared."""
+    if not len(run.t):
+        return None
+    inside, exact = aligned(truth, run)
+    if not inside.any():
+        return None
+    rows: dict[str, Floats] = {}
+    for name in ("q", "v", "gap", "lam", "energy"):
+        rows[name] = np.full((len(run.t), getattr(exact, name).shape[1]), np.nan)
+        rows[name][inside] = getattr(exact, name)
+    mode = np.full((len(run.t), exact.mode.shape[1]), -1, dtype=np.int8)
+    mode[inside] = exact.mode
+    return Trajectory(t=run.t, mode=mode, **rows)
 
 
 def _steps(t: Floats) -> list[list[float]]:

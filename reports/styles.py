@@ -8,7 +8,7 @@ from crossbody.reports.store import Trace
 
 TRUTH = "truth"
 # Okabe and Ito's colours: told apart by colour-blind readers, on light and on dark.
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00", "#7F7FFF", "#999999")
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00", "#7F7FFF", "#9B59D0")
 DASHES = ("solid", "dash", "dot", "dashdot")
 STROKES = {"solid": "none", "dash": "7 4", "dot": "2 3", "dashdot": "7 3 2 3"}
 """The same dashes as lengths, for what plotly does not draw."""

@@ -6,7 +6,7 @@
   };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const nice = (x) => {
-    const ten = 10 ** Math.floor(Math.log10(x));
+    const ten = 10 ** Math.floor(Math.log10(x) + 1e-9);
     return ten * [1, 2, 5, 10].find((k) => k * ten >= x * 0.999);
   };
   const shortNumber = (x) => String(Number(x.toPrecision(3)));
@@ -20,7 +20,7 @@
       return { ...track, t, poses, arrows, width: poses.length / t.length, pushes: arrows.length / t.length };
     });
     const find = (name) => root.querySelector(`[data-${name}]`);
-    const [play, clock, readout, speed, view, forces] = ["play", "clock", "readout", "speed", "view", "forces"].map(find);
+    const [play, clock, readout, speed, view, forces, longer] = ["play", "clock", "readout", "speed", "view", "forces", "longer"].map(find);
     const canvas = root.querySelector("canvas");
     const g = canvas.getContext("2d");
     let [now, running, last, turn, tilt] = [0, false, 0, 0.6, 0.35];
@@ -92,8 +92,8 @@
         trace(s.points.map((p) => to(move(p))));
         if (s.closed) g.closePath();
       }
-      if (s.fill) {
-        g.globalAlpha = ghost ? 0.12 : 0.3;
+      if (s.fill && !ghost) {
+        g.globalAlpha = 0.25;
         g.fill();
         g.globalAlpha = 1;
       }
@@ -142,7 +142,7 @@
         const point = [0, 1, 2].slice(0, n).map((i) => push(k + i));
         const force = [0, 1, 2].slice(0, n).map((i) => push(k + n + i));
         const from = to(point);
-        const unit = (0.28 * h) / scene.force / (from[2] || 1);
+        const unit = (0.28 * h) / scene.force / (from[2] || 1) * Number(longer.value);
         const long = Math.hypot(...force) * unit * from[2];
         const cut = long > 0.45 * h ? (0.45 * h) / long : 1;
         arrow(from, to(point.map((x, i) => x + force[i] * unit * cut)));
@@ -157,7 +157,8 @@
       // A length and a force to measure by.
       const scale = to([middle[0], middle[1], middle[2] || 0])[2];
       const metres = nice(60 / scale);
-      const newtons = nice((scene.force * 60) / (0.28 * h));
+      const newton = (0.28 * h * Number(longer.value)) / scene.force;
+      const newtons = nice(60 / newton);
       g.fillStyle = g.strokeStyle = colour("--soft");
       g.lineWidth = 2;
       g.font = "12px system-ui, sans-serif";
@@ -167,7 +168,7 @@
         g.fillText(text, x + length + 6, y - down + 4);
       };
       draw(metres * scale, `${shortNumber(metres)} m`, 0);
-      if (forces.checked) draw((newtons / scene.force) * 0.28 * h, `${shortNumber(newtons)} N`, 16);
+      if (forces.checked) draw(newtons * newton, `${shortNumber(newtons)} N`, 16);
     };
     const draw = () => {
       const box = canvas.getBoundingClientRect();
@@ -182,7 +183,7 @@
       if (view.value === "ghosts") {
         const to = camera(0, 0, box.width, box.height);
         still(to);
-        shown.forEach((track) => paint(track, to, box.height, !track.truth));
+        shown.forEach((track, i) => paint(track, to, box.height, i > 0));
         bar(to, 12, box.height - 12, box.height);
       } else if (shown.length) {
         const columns = Math.max(1, Math.min(shown.length, Math.round(Math.sqrt((shown.length * box.width) / box.height))));
@@ -238,7 +239,7 @@
     }
     play.addEventListener("click", () => run(!running));
     clock.addEventListener("input", () => seek((clock.value / 1000) * end, true));
-    [view, forces].forEach((field) => field.addEventListener("change", redraw));
+    [view, forces, longer].forEach((field) => field.addEventListener("change", redraw));
     if (space) {
       canvas.style.touchAction = "none";
       canvas.addEventListener("pointermove", (event) => {

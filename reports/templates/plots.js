@@ -42,7 +42,7 @@
     busy = true;
     const others = [...charts].filter(([box]) => box !== from && box.hasAttribute("data-time")
       && box.closest("[data-page]") === from.closest("[data-page]"));
-    Promise.all(others.map(([box]) => Plotly.relayout(box, wide ? { "xaxis.autorange": true } : { "xaxis.range": range })))
+    Promise.all(others.map(([box]) => Plotly.relayout(box, wide ? (box.dataset.range ? { "xaxis.range": JSON.parse(box.dataset.range) } : { "xaxis.autorange": true }) : { "xaxis.range": range })))
       .finally(() => { busy = false; });
   };
   const cursor = (box, t) => {
@@ -68,6 +68,7 @@
     const ready = Plotly.newPlot(box, figure.data, themed(figure.layout), options).then(() => {
       box.append(mark);
       box.dataset.drawn = "";
+      if (figure.layout.xaxis?.range) box.dataset.range = JSON.stringify(figure.layout.xaxis.range);
       box.on("plotly_hover", (event) => { if (box.hasAttribute("data-time")) crossbody.tell("time", event.points[0].x, box); });
       box.on("plotly_relayout", (update) => zoom(box, update));
     });
