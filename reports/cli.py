@@ -11,7 +11,7 @@ import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import click
 
@@ -32,11 +32,19 @@ def cli() -> None:
 @cli.command("list")
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
 def list_(plain: bool) -> None:
-    """List cases, engines, metrics and stress suites."""
+    """List cases, engines, metrics, stress suites and models that logs are replayed on."""
     from crossbody import cases, engines
+    from crossbody.hw import models
     from crossbody.reports import metrics, suites
 
-    listed = (("Cases", cases), ("Engines", engines), ("Metrics", metrics), ("Stress suites", suites))
+    sources = {
+        "Cases": cases,
+        "Engines": engines,
+        "Metrics": metrics,
+        "Stress suites": suites,
+        "Models of logs": models,
+    }
+    listed = tuple(sources.items())
     if plain:
         kinds = {title.lower(): {name: source.summary(name) for name in source.names()} for title, source in listed}
         click.echo(json.dumps(kinds, indent=1))
@@ -170,6 +178,28 @@ def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
 
 
 @cli.command()
+@click.argument("name", metavar="CASE")
+@click.option("--variant", metavar="V", help="Variant of the case; the first if not given.")
+@click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
+@click.option("--at", metavar="K=V", multiple=True, help="Where to look: x, y, z of the flange, m; repeatable.")
+@click.option("--bode", is_flag=True, help="Frequency responses too.")
+@click.option("--locus", metavar="PARAM=a..b", help="Poles over a parameter of the case.")
+@click.option("--map", "mapped", is_flag=True, help="Stability over the workspace.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for tables and figures.")
+@speaks
+def analyse(
+    name: str, variant: str | None, pairs: tuple[str, ...], at: tuple[str, ...], bode: bool, locus: str | None,
+    mapped: bool, out: Path | None,
+) -> int:  # fmt: skip
+    """Equilibria of a case, their linear models, poles, ranks, responses and maps."""
+    from crossbody.reports.analyse_command import analyse as work
+
+    return work(
+        name, variant, pairs, at, bode=bode, locus=locus, mapped=mapped, out=out, command=_command()
+    )  # fmt: skip
+
+
+@cli.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @speaks
 def report(folder: Path) -> int:
@@ -182,6 +212,51 @@ def report(folder: Path) -> int:
     elif not quiet():
         click.echo(f"Report: {made}")
     return 0
+
+
+def _replayed(command: _Work) -> _Work:
+    """Options that say which log is replayed on which model."""
+    options = (
+        click.argument("path", metavar="LOG", type=click.Path(path_type=Path)),
+        click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them."),
+        click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
+        click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart."),
+        click.option("--repair", metavar="R", multiple=True, help="fill_dropped or drop_duplicates; repeatable."),
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the model; repeatable."),
+        click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
+        click.option("--horizon", type=float, metavar="S", help="Length of a window, s, if not to the next restart."),
+        click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of what was measured, s."),
+        click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR"),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@cli.command()
+@_replayed
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--closed-loop", is_flag=True, help="Recorded references through the model's controller.")
+@speaks
+def replay(wanted: tuple[str, ...], closed_loop: bool, out: Path, **log: Any) -> int:
+    """Replay LOG on a model and say how well it matches."""
+    from crossbody.reports.replay_command import Ask, run_replay
+
+    return run_replay(Ask(**log), "closed_loop" if closed_loop else "forward", wanted, out, _command())
+
+
+@cli.command()
+@_replayed
+@click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter, or delay; repeatable.")
+@click.option("--hold", type=int, default=2, show_default=True, help="Every so manieth window is held out; 0: none.")
+@click.option("--starts", type=click.Choice(["measured", "free"]), default="measured", show_default=True)
+@click.option("--stride", type=int, default=1, show_default=True, help="Of so many samples one is compared.")
+@speaks
+def identify(free: tuple[str, ...], hold: int, starts: str, stride: int, out: Path, **log: Any) -> int:
+    """Identify parameters of a model from LOG, with intervals, judged on windows that were held out."""
+    from crossbody.reports.replay_command import Ask, run_identify
+
+    return run_identify(Ask(**log), free, hold, starts, stride, out, _command())
 
 
 @cli.group()

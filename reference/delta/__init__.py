@@ -18,6 +18,7 @@ from crossbody.reference.delta.kinematics import (
     virtual_jacobian,
 )
 from crossbody.reference.delta.model import kick, system
+from crossbody.reference.delta.reach import inverses
 from crossbody.reference.delta.robot import HEAVY, LIGHT, SETS, Robot, Servo
 from crossbody.reference.delta.singularity import Margins, elbow_angle, ill_posed_tilts, margins, pendulum_rate
 from crossbody.reference.delta.statics import gravity_torque, holding_pose, task_mass
@@ -38,6 +39,7 @@ __all__ = [
     "holding_pose",
     "ill_posed_tilts",
     "inverse",
+    "inverses",
     "jacobians",
     "kick",
     "margins",

@@ -1,6 +1,6 @@
 """Forces that were not measured, from a measured motion and torque, with their uncertainty (spec 2.7, 5.7).
 
-The unknown forces F are inputs of the mechanism (a force on the flange) or multipliers of rows whose law is not trusted:
+Unknown forces F are inputs of the mechanism (a force on the flange) or multipliers of rows whose law is not trusted:
 
     M v' = f(q, v, u + F) + H_A^T lam_A + H_F^T F        lam_A from the laws of the active rows
 

@@ -1,0 +1,45 @@
+"""Equilibria of a case: poles, root loci, frequency responses, stability over a workspace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.study import read_json
+
+TITLE = "Equilibria and linear models"
+TEXT = (
+    "Linear models about the equilibria of the case, in the modes named, by exact derivatives of the equations. Rows "
+    "that are held are eliminated, so the law that holds them adds no poles, unless it is what is looked at. A pole to "
+    "the right of 0 grows; to the left it decays. Linear stability says nothing about how an equilibrium is reached."
+)
+COLUMNS = columns(
+    place="Equilibrium", states=("States", Kind.NUMBER), controllable=("Controllable", Kind.NUMBER),
+    observable=("Observable", Kind.NUMBER), growth=("Growth [1/s]", Kind.NUMBER),
+)  # fmt: skip
+PREFIX = "analysis-"
+
+
+def sections(out: Path) -> tuple[Section, ...]:
+    """One section, if there is an analysis."""
+    if not (out / f"{PREFIX}ranks.json").is_file():
+        return ()
+    from crossbody.reports import analyse_figure as draw
+
+    drawn = {
+        "poles": draw.pole_figure, "locus": draw.locus_figure, "responses": draw.response_figure,
+        "map": draw.map_figure,
+    }  # fmt: skip
+    plots = tuple(
+        Plot(name=f"{PREFIX}{name}", figure=figure(_rows(out, name)))
+        for name, figure in drawn.items()
+        if (out / f"{PREFIX}{name}.json").is_file()
+    )
+    ranks = Table(title="Linear models", columns=COLUMNS, rows=records(_rows(out, "ranks")), file=f"{PREFIX}ranks.csv")
+    return (Section(name="analysis", title=TITLE, text=TEXT, plots=plots, tables=(ranks,)),)
+
+
+def _rows(out: Path, name: str) -> pd.DataFrame:
+    return pd.DataFrame(read_json(out / f"{PREFIX}{name}.json")["rows"])
