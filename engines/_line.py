@@ -7,7 +7,7 @@ h_0 = q_0 above a floor; h_i = gap + q_(i+1) - q_i between neighbours. Every row
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,9 +119,8 @@ def line(case: Case) -> Line:
 
 def followed(case: Case) -> Case | None:
     """The same rows without ballistic memory; None where several rows are not those of the law (`spring`)."""
-    if case.mechanism == "ball":
-        return replace(case, fsm="memoryless", closed_form=None, claims=()) if case.law.unilateral[0] else None
-    return in_real_time(case, "memoryless") if len(case.contacts) == 1 else None
+    alone = len(case.contacts) == 1 and bool(case.law.unilateral[0])
+    return in_real_time(case, "memoryless") if alone else None
 
 
 def _ball(case: Case) -> Line:

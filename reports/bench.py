@@ -114,7 +114,7 @@ class _Truths:
     def _followed(self, run: Any) -> Case | None:
         case, followed = self.case, getattr(run, "follows", None)
         if followed is None and run.settings.get("law") == "memoryless" and case.law.unilateral.any():
-            followed = replace(case, fsm="memoryless", closed_form=None)
+            followed = replace(case, fsm="memoryless", collisions="resolved", closed_form=None)
         same = followed is None or (followed.fsm, followed.collisions) == (case.fsm, case.collisions)
         return None if same else followed
 

@@ -1,0 +1,155 @@
+"""Many runs at once: the compiled reference in threads beside MuJoCo's own batch stepping on the same cores."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+import pandas as pd
+
+from crossbody import cases, engines
+from crossbody.cases import EngineUnavailable, Outcome
+from crossbody.cases._arrays import Floats
+from crossbody.reference import ensemble
+
+COLUMNS = ["what", "value", "unit", "limit", "held", "beside", "how"]
+RTOL = 1e-9
+STEP = 1e-3
+"""Of MuJoCo, s."""
+RUNS, BATCH = 4000, 200
+"""Runs of the reference, and of MuJoCo, whose are slower."""
+LEAST_RATIO, LEAST_TWO = 40.0, 1.7
+SPINNING = 1.9
+"""Two threads that only count must be given this many cores, or the machine has no second one to give."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draw:
+    """Heights (N,), m, and dampings a1 (N,), 1/s, about those of the case: every run its own."""
+
+    heights: Floats
+    a1: Floats
+
+
+def draw(count: int) -> Draw:
+    """The same for the same count."""
+    random = np.random.default_rng(20240917)
+    return Draw(heights=random.uniform(0.9, 1.1, count), a1=random.uniform(15.0, 25.0, count))
+
+
+def reference(count: int, threads: int, rtol: float = RTOL) -> float:
+    """Runs a second of the case "listing" by `ensemble`; every one must finish."""
+    case, given = cases.load("bouncing_ball", "listing"), draw(count)
+    system = engines.load("reference").prepare(case, "compiled").system  # type: ignore[attr-defined]
+    found = ensemble(
+        system, given.heights[:, None], np.zeros((count, 1)), case.t_end, law={"a1": given.a1}, threads=threads,
+        rtol=rtol,
+    )  # fmt: skip
+    assert all(outcome is Outcome.FINISHED for outcome in found.outcome)
+    return count / found.wall_s
+
+
+def mujoco(count: int, threads: int, integrator: str = "Euler") -> float:
+    """Runs a second of the same drops by MuJoCo's batch, stepped in its own threads at 1 ms.
+
+    Its batch takes no Python callback, so the cubic part of the law is missing: this is less work than the case's.
+
+    Args:
+        count: runs.
+        threads: of the batch.
+        integrator: "Euler", MuJoCo's own and fastest, or "RK4".
+    """
+    import mujoco as mj
+    from mujoco import batch
+
+    case, given = cases.load("bouncing_ball", "listing"), draw(count)
+    model = engines.load("mujoco").prepare(case, "matched", dt=STEP).scene.model  # type: ignore[attr-defined]
+    model.opt.timestep, model.opt.integrator = STEP, getattr(mj.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    model.pair_margin[0] = 0.0
+    many = batch.Batch(model, count, threads, persistent=True)
+    many.bind("qpos")[:, 0] = given.heights
+    steps = round(case.t_end / STEP)
+    many.step(nstep=1)
+    began = time.perf_counter()
+    many.step(nstep=steps - 1)
+    return count / (time.perf_counter() - began)
+
+
+@numba.njit(nogil=True)  # type: ignore[untyped-decorator, unused-ignore]
+def _spin(count: int) -> int:
+    state = 1
+    for _ in range(count):
+        state = (state * 1103515245 + 12345) & 0x7FFFFFFF
+    return state
+
+
+def spinning(count: int = 30_000_000) -> float:
+    """How many cores two threads that only count are given: processor time over wall time, at most 2."""
+    _spin(1)
+    cpu, began = time.process_time(), time.perf_counter()
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(_spin, [count] * 2))
+    return (time.process_time() - cpu) / (time.perf_counter() - began)
+
+
+def best_pair(
+    one: Callable[[], float], two: Callable[[], float], pairs: int, given: Callable[[], float] = spinning
+) -> tuple[float, float, float, float]:
+    """The largest ratio two/one of interleaved pairs, its two throughputs, and the cores that were given beside it.
+
+    Pairs beside which two cores were given come first.
+    """
+    found = [(given(), one(), two()) for _ in range(pairs)]
+    cores, a, b = max(found, key=lambda pair: (pair[0] >= SPINNING, pair[2] / pair[1]))
+    return b / a, a, b, cores
+
+
+def _row(
+    what: str, value: float, limit: float, held: bool, beside: Sequence[tuple[str, float]], how: str
+) -> dict[str, Any]:
+    told = ", ".join(f"{name}: {rate:.4g} runs/s" for name, rate in beside)
+    return {"what": what, "value": value, "unit": "1", "limit": limit, "held": held, "beside": told, "how": how}
+
+
+def against_mujoco(repeats: int, integrator: str) -> dict[str, Any]:
+    """Median of the interleaved ratios.
+
+    Raises:
+        EngineUnavailable: without MuJoCo.
+    """
+    cores = len(os.sched_getaffinity(0))
+    pairs = [(reference(RUNS, cores), mujoco(BATCH, cores, integrator)) for _ in range(repeats)]
+    ratio = statistics.median(a / b for a, b in pairs)
+    a, b = (statistics.median(side) for side in zip(*pairs, strict=True))
+    return _row(
+        f"runs of `listing` at {RTOL:g} over MuJoCo's batch, {integrator} at {1e3 * STEP:g} ms, {cores} threads",
+        ratio, LEAST_RATIO, ratio >= LEAST_RATIO, (("reference", a), ("MuJoCo", b)),
+        "compiled, in threads without the interpreter",
+    )  # fmt: skip
+
+
+def two_cores(repeats: int) -> dict[str, Any]:
+    """The best of interleaved pairs; not judged where the machine does not give two cores."""
+    ratio, one, two, cores = best_pair(lambda: reference(RUNS, 1), lambda: reference(RUNS, 2), repeats)
+    able, how = cores >= SPINNING, f"two spinning threads are given {cores:.2f} cores"
+    return _row(
+        "runs on two threads over one", ratio, LEAST_TWO, ratio >= LEAST_TWO or not able,
+        (("one", one), ("two", two)), how if able else f"not judged: {how}",
+    )  # fmt: skip
+
+
+def measure(repeats: int) -> pd.DataFrame:
+    """One row a ratio; those over MuJoCo are not measured where it is not installed."""
+    rows: list[dict[str, Any]] = []
+    try:
+        rows += [against_mujoco(repeats, integrator) for integrator in ("Euler", "RK4")]
+    except EngineUnavailable as error:
+        rows.append(_row("runs over MuJoCo's batch", float("nan"), LEAST_RATIO, True, (), f"skipped: {error}"))
+    return pd.DataFrame([*rows, two_cores(repeats)], columns=COLUMNS)

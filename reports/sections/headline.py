@@ -1,0 +1,34 @@
+"""The compiled reference beside every engine: ratio of run times at the error that the engine reaches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from crossbody.reports.section import Kind, Section, Table, columns, records
+from crossbody.reports.study import read_json
+
+TITLE = "Lead of the reference"
+TEXT = (
+    "For each engine its best error and the time that it took there, beside the cheapest run of the compiled reference "
+    "that is at least as accurate. The least ratio is that of all errors which the engine reaches. Errors below 1e-13 "
+    "are rounding. An engine that follows another law is judged against that law's truth."
+)
+COLUMNS = columns(
+    case="Case", who="Engine", tier="Tier", against="Against the truth of", best_error=("Best error [1]", Kind.NUMBER),
+    engine_ms=("Its run [ms]", Kind.NUMBER), reference_ms=("Reference [ms]", Kind.NUMBER),
+    ratio=("Ratio [1]", Kind.NUMBER), ratio_call=("Ratio of the Python calls [1]", Kind.NUMBER),
+    least_ratio=("Least ratio [1]", Kind.NUMBER), says=("Says", Kind.LONG),
+)  # fmt: skip
+
+
+def sections(out: Path) -> tuple[Section, ...]:
+    """One section, if engines were timed."""
+    if not (out / "headline.json").is_file():
+        return ()
+    rows = pd.DataFrame(read_json(out / "headline.json")["rows"])
+    if len(rows):
+        rows = rows.assign(who=rows["engine"] + ":" + rows["profile"])
+    table = Table(title=TITLE, columns=COLUMNS, rows=records(rows), file="headline.csv")
+    return (Section(name="headline", title="How much faster the reference is", text=TEXT, tables=(table,)),)

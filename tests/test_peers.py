@@ -1,0 +1,173 @@
+"""Optional engines on bodies on a line, against truths that are written out here; one that is absent is a skip."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crossbody import cases, engines
+from crossbody.cases import CaseUnsupported, EngineUnavailable, Mode, Outcome
+from crossbody.engines._line import line
+from crossbody.engines._peer import ended, sampled
+from crossbody.reports import metrics
+from crossbody.reports.audit import audit
+from crossbody.reports.truth import law_of
+
+PACKAGES = {"exudyn": "exudyn", "drake": "pydrake", "dart": "dartpy", "pymunk": "pymunk"}
+LAW = ("exudyn", "drake")
+STEPPED = ("dart", "pymunk")
+SOFTENED = {"dart": 3e-5, "pymunk": 1e-9}
+"""DART adds 1e-5 to the diagonal of its complementarity problem."""
+G, A0, T_END = 9.81, 1e5, 2.0
+
+
+def peer(name: str) -> Any:
+    try:
+        return engines.load(name)
+    except EngineUnavailable as error:
+        pytest.skip(str(error))
+
+
+def drop(**given: float) -> cases.Case:
+    return cases.load("bouncing_ball", "elastic", **{"a0": A0, "a1": 0.0, "a2": 0.0, "t_end": T_END} | given)
+
+
+def height(t: float) -> float:
+    """Without memory: parabolas between half sines of length pi/w, h = -v/w sin(w s)."""
+    v, w = np.sqrt(2.0 * G), np.sqrt(A0)
+    contact, flight = np.pi / w, 2.0 * v / G
+    s = (t - v / G) % (contact + flight)
+    s, inside = (s - contact, False) if s > contact else (s, True)
+    return float(-v / w * np.sin(w * s) if inside else v * s - 0.5 * G * s * s)
+
+
+@pytest.mark.parametrize("name", LAW)
+def test_adaptive_engines_follow_the_memoryless_law(name: str) -> None:
+    engine = peer(name)
+    errors = [abs(engine.prepare(drop(), rtol=rtol).run().q[-1, 0] - height(T_END)) for rtol in (1e-5, 1e-12)]
+    assert errors[1] < 1e-8
+    assert errors[1] < 1e-3 * errors[0]
+
+
+@pytest.mark.parametrize("name", LAW)
+def test_every_metric_is_small_against_the_law_that_is_followed(name: str) -> None:
+    run = peer(name).prepare(drop(), rtol=1e-12)
+    own = law_of(run.follows)
+    assert own is not None
+    found = run.run()
+    for metric, limit in (("position", 1e-8), ("event_times", 1e-8), ("energy_drift", 1e-7), ("lam_impulse", 1e-8)):
+        value = metrics.load(metric).measure(own, found, drop())
+        assert value is not None
+        assert value < limit, metric
+    assert metrics.load("touch_count").measure(own, found, drop()) == 0.0
+
+
+@pytest.mark.parametrize("name", LAW)
+@pytest.mark.parametrize("variant", ["listing", "bilateral"])
+def test_the_cases_law_reached_the_engine(name: str, variant: str) -> None:
+    case = cases.load("bouncing_ball", variant)
+    mine = peer(name).prepare(case).audit()
+    theirs = engines.load("reference").prepare(case, "compiled").audit()
+    rows = {row.quantity: row for row in audit(mine, theirs, case)}
+    assert all(row.ok for row in rows.values())
+    assert rows["constants"].difference == 0.0
+    if name == "exudyn":
+        assert rows["lam"].difference < 1e-12
+
+
+@pytest.mark.parametrize("name", LAW)
+def test_one_pair_of_sliders_swaps_its_speeds_after_half_a_period(name: str) -> None:
+    case = cases.load("newtons_cradle", "sliders", n=2, collisions="resolved", masses="4,2")
+    run = peer(name).prepare(case, rtol=1e-12).run()
+    np.testing.assert_allclose(run.v[-1], [1.0 / 3.0, 4.0 / 3.0], atol=1e-7)
+    release = next(e.t for e in run.events if e.before == Mode.CONTACT)
+    assert release == pytest.approx(np.pi / np.sqrt(case.law.a0[0]), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", [*LAW, *STEPPED])
+def test_momentum_of_a_cradle_is_kept(name: str) -> None:
+    case = cases.load("newtons_cradle", "sliders", n=3, masses="1,2,4")
+    engine = peer(name)
+    for profile in engine.profiles:
+        run = engine.prepare(case, profile).run()
+        assert run.outcome.ok, run.message
+        np.testing.assert_allclose(run.v @ [1.0, 2.0, 4.0], 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("name", STEPPED)
+def test_restitution_of_an_impact(name: str, e: float) -> None:
+    case = cases.load("bouncing_ball", "linear", gravity=0.0, speed=1.0, height=0.1, t_end=0.3)
+    run = peer(name).prepare(case, restitution=e).run()
+    assert run.v[-1, 0] == pytest.approx(e, abs=SOFTENED[name])
+    impulse = float(np.sum(run.lam[1:, 0] * np.diff(run.t)))
+    assert impulse == pytest.approx(1.0 + e, rel=SOFTENED[name])
+
+
+def test_a_discrete_plant_loses_energy_that_a_continuous_one_keeps() -> None:
+    """What is asked for is not what is had: at its own step of 1 ms the discrete plant takes most of a bounce."""
+    engine = peer("drake")
+    kept = {}
+    for profile in ("continuous", "default"):
+        run = engine.prepare(drop(), profile).run()
+        kept[profile] = run.total_energy[-1] / run.total_energy[0]
+    assert kept["continuous"] == pytest.approx(1.0, abs=1e-3)
+    assert kept["default"] < 0.5
+
+
+@pytest.mark.parametrize("name", [*LAW, *STEPPED])
+def test_what_they_cannot_do_they_say(name: str) -> None:
+    engine = peer(name)
+    for case in (cases.load("delta_impulse"), cases.load("newtons_cradle", "pendulums")):
+        reason = engine.why_not(case, "matched")
+        assert reason
+        assert case.mechanism in reason
+        with pytest.raises(CaseUnsupported):
+            engine.prepare(case)
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_an_absent_engine_names_the_extra_that_brings_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in [m for m in sys.modules if m.startswith(f"crossbody.engines.{name}")]:
+        monkeypatch.delitem(sys.modules, module)
+    for module in [m for m in sys.modules if m.partition(".")[0] == PACKAGES[name]]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setattr(sys, "meta_path", [_Absent(PACKAGES[name]), *sys.meta_path])
+    with pytest.raises(EngineUnavailable, match=rf"crossbody\[{name}\]"):
+        engines.load(name)
+
+
+class _Absent:
+    """An import hook that finds nothing of one package."""
+
+    def __init__(self, package: str) -> None:
+        self.package = package
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        if name.partition(".")[0] == self.package:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+def test_touches_between_steps_are_put_in_where_free_flight_has_them() -> None:
+    case = drop(t_end=0.5)
+    scene = line(case)
+    at = np.sqrt(2.0 / G)
+    t = np.array([0.0, 0.45, 0.455])
+    w, v = np.sqrt(A0), np.sqrt(2.0 * G)
+    q = np.array([[1.0], [1.0 - 0.5 * G * 0.45**2], [-v / w * np.sin(w * (0.455 - at))]])
+    rates = np.array([[0.0], [-G * 0.45], [-v * np.cos(w * (0.455 - at))]])
+    run = sampled(scene, t, q, rates, scene.memoryless(q, rates), wall_s=0.0, steps=2)
+    assert len(run.t) == 4
+    assert run.t[2] == pytest.approx(at, abs=1e-15)
+    assert run.v[2, 0] == pytest.approx(-v, rel=1e-14)
+    assert [(e.t, e.after) for e in run.events] == [(run.t[2], Mode.CONTACT)]
+
+
+def test_a_state_that_leaves_the_scene_has_diverged() -> None:
+    scene, q = line(drop()), np.array([0.0])
+    assert ended(scene, q, np.array([-4.0])) is Outcome.FINISHED
+    assert ended(scene, q, np.array([1e9])) is Outcome.DIVERGED
+    assert ended(scene, q, np.array([np.nan])) is Outcome.NOT_FINITE
