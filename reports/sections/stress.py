@@ -13,8 +13,9 @@ from crossbody.reports.study import read_json
 TITLE = "Stress"
 TEXT = (
     "Quasi-random and gridded scenes up to their extremes, each bounded in steps and time. A run is outside if it "
-    "threw, leaked a warning or returned what is not a number; the reference also if it is further from a truth of tier "
-    "A to C, or leaves more of its energy account open, than its limit. Failures of engines are shown with their outcome."
+    "threw, leaked a warning or returned what is not a number; the reference also if it is further from a truth of "
+    "tier A to C, or leaves more of its energy account open, than its limit. Failures of engines are shown with their "
+    "outcome."
 )
 MAPPED = "Worst error over damping ratios 0 to 10, by stiffness and by tolerance or step; a cross where a run failed."
 SMALL = (

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crossbody import engines
-from crossbody.cases import Case, Tier, Trajectory
+from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.metrics._contacts import contacts
@@ -100,15 +100,29 @@ def against_second(case: Case, run: Trajectory, max_steps: int, time_limit: floa
 
 def _against(truth: Truth, run: Trajectory, case: Case) -> Error:
     """Positions on matched arcs, instants of contact, speeds at the end; infinite if a contact is missing."""
-    missing = _lasting(run) - _lasting(truth.trajectory)
+    truth, run = replace(truth, trajectory=lasting(truth.trajectory)), lasting(run)
+    missing = len(contacts(run)) - len(contacts(truth.trajectory))
     if missing:
         return Error(value=math.inf, tier=truth.tier.value, until=case.t_end, why=f"{missing:+g} contacts")
     return _before(truth, run, case)
 
 
-def _lasting(run: Trajectory) -> int:
-    """Contacts that last: one that is over at the instant of its touch is told by some machines and not by others."""
-    return sum(contact.release > contact.touch for contact in contacts(run))
+def lasting(run: Trajectory) -> Trajectory:
+    """The run without contacts that are over at the instant of their touch: some machines tell them, others do not.
+
+    Collisions in no time are another thing: they stay.
+    """
+    kept: list[Event] = []
+    for event in run.events:
+        last = kept[-1] if kept else None
+        same = last is not None and (last.t, last.contact, last.after) == (event.t, event.contact, event.before)
+        if last is None or not same or event.before != Mode.CONTACT:
+            kept.append(event)
+            continue
+        kept.pop()
+        if last.before != event.after:
+            kept.append(replace(last, after=event.after))
+    return replace(run, events=tuple(kept))
 
 
 def _before(truth: Truth, run: Trajectory, case: Case) -> Error:
@@ -137,14 +151,17 @@ def _parted(other: Trajectory, run: Trajectory, times: Floats) -> float:
 
 
 def residual(run: Trajectory) -> float:
-    """What the energy account leaves open over the largest energy in it; NaN without an account (spec 1.4)."""
+    """What the energy account leaves open (spec 1.4), over the largest energy that moved, stood or was turned over.
+
+    NaN without an account.
+    """
     if run.ledger is None or not len(run.t):
         return math.nan
     works = [run.ledger.input, run.ledger.dissipated, *run.ledger.contact.T]
     book = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
     change = run.total_energy - run.total_energy[0]
-    turned = [float(np.ptp(work)) for work in (*run.energy.T, *works)]
-    scale = max(turned, default=0.0)
+    turned = [float(np.ptp(work)) for work in (run.energy[:, 1], *works)]
+    scale = max(float(run.energy[:, 0].max()), *turned)
     if scale == 0.0:
         return 0.0
     return float(np.max(np.abs(change - (book - book[0])))) / scale

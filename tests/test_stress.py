@@ -1,0 +1,350 @@
+"""Stress suites: what is drawn, how a run ends in a row whatever it does, and how a failure is made small."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from crossbody import cases, engines
+from crossbody.cases import CaseUnsupported, InvalidValue, Outcome, SceneError, Trajectory, UnknownName
+from crossbody.reports import suites
+from crossbody.reports.jobs import Pick
+from crossbody.reports.suites._axis import Levels, Linear, Log, Whole, decades
+from crossbody.reports.suites._contract import Family, Ladder, Suite
+from crossbody.reports.sweep import draw
+from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
+from crossbody.reports.sweep.execute import COLUMNS, execute
+from crossbody.reports.sweep.map import stability_map, summary
+from crossbody.reports.sweep.minimise import failures, shrink
+from crossbody.reports.sweep.spec import Spec
+from crossbody.reports.sweep.together import together
+
+REFERENCE = Pick(engine="reference", profile="compiled")
+AXES = {"a0": Log(1e2, 1e6), "mass": Linear(0.5, 2.0)}
+FAMILY = Family(case="bouncing_ball", variant="linear", axes=AXES, fixed={"t_end": 0.6})
+
+
+def drawn(family: Family = FAMILY, runs: int = 6, seed: int = 0, *picks: Pick) -> list[Spec]:
+    suite = Suite(families=(family,))
+    return draw.specs([("one", suite)], {"one": picks or (REFERENCE,)}, runs, seed, share=False)
+
+
+@pytest.mark.parametrize("axis", [Linear(-2.0, 3.0), Log(1e-6, 1e6), Whole(2, 9), Levels((1, 5)), decades(0, 3)])
+def test_an_axis_stays_inside_and_reaches_both_ends(axis: Any) -> None:
+    values = [float(axis.at(u)) for u in np.linspace(0.0, 1.0, 1001)]
+    low, high = (axis.values[0], axis.values[-1]) if isinstance(axis, Levels) else (axis.low, axis.high)
+    assert min(values) == low
+    assert max(values) == pytest.approx(high, rel=1e-12)
+    assert np.all(np.diff(values) >= 0.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Linear(1.0, 1.0), "below its high end"),
+        (lambda: Linear(0.0, math.inf), "finite"),
+        (lambda: Log(0.0, 1.0), "use Linear"),
+        (lambda: Levels(()), "at least one"),
+        (lambda: Levels((1, 1)), "each once"),
+        (lambda: Ladder(rtol=(1e-3,), dt=(1e-2, 1e-3)), "as many"),
+        (lambda: Ladder(rtol=(1e-3, 1e-2), dt=(1e-2, 1e-3)), "must fall"),
+        (lambda: replace(FAMILY, grid={"a0": Levels((1.0,))}), "a0 is asked for twice"),
+        (lambda: replace(FAMILY, fixed={"mass": 1.0}), "mass is asked for twice"),
+        (lambda: Family(case="bouncing_ball", variant="linear"), "needs an axis"),
+        (lambda: Suite(families=()), "at least one family"),
+        (lambda: Suite(families=(FAMILY,), runs=0), "one run"),
+        (lambda: drawn(runs=0), "at least 1"),
+        (lambda: checked(replace(FAMILY, fixed={"t_end": -1.0})), "t_end is -1"),
+        (lambda: checked(Family(case="bouncing_ball", variant="linear", grid={"mass": Levels((-1.0,))})), "mass is -1"),
+    ],
+)
+def test_contradictory_grids_are_one_sentence(make: Callable[[], Any], says: str) -> None:
+    with pytest.raises(InvalidValue, match=says) as error:
+        make()
+    assert "\n" not in str(error.value)
+
+
+def checked(family: Family) -> None:
+    draw.check("one", Suite(families=(family,)))
+
+
+@pytest.mark.parametrize(
+    "family",
+    [
+        replace(FAMILY, case="bouncing_bal"),
+        replace(FAMILY, variant="linea"),
+        replace(FAMILY, axes={"stiffness": Log(1.0, 2.0)}),
+        replace(FAMILY, fixed={"t_ende": 1.0}),
+    ],
+)
+def test_names_that_do_not_exist_are_told_before_anything_runs(family: Family) -> None:
+    with pytest.raises(UnknownName):
+        checked(family)
+
+
+@pytest.mark.parametrize("name", suites.names())
+def test_every_suite_can_be_drawn_and_says_what_it_stresses(name: str) -> None:
+    suite = suites.load(name)
+    draw.check(name, suite)
+    assert suites.summary(name)
+    for place, family in enumerate(suite.families):
+        scenes = list(draw.scenes(name, family, place, 12, 0))
+        assert scenes
+        built = 0
+        for scene in scenes:
+            try:
+                cases.load(family.case, family.variant, **scene.parameters)
+                built += 1
+            except cases.CrossbodyError:
+                continue  # an edge of the workspace may lie just outside it
+        assert built >= len(scenes) // 2
+
+
+def test_a_suite_of_ones_own_is_run_by_its_path(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from crossbody.reports.suites._axis import Log\nfrom crossbody.reports.suites._contract import Family, Suite\n"
+        "SUITE = Suite(families=(Family(case='bouncing_ball', variant='linear', axes={'a0': Log(1.0, 2.0)}),))\n"
+    )
+    assert suites.load(str(path)).runs == 200
+    path.write_text("SUIT = 1\n")
+    with pytest.raises(SceneError, match="SUITE"):
+        suites.load(str(path))
+    with pytest.raises(UnknownName, match="damping"):
+        suites.load("dampin")
+    with pytest.raises(UnknownName, match="suite file"):
+        suites.load(str(tmp_path / "nowhere.py"))
+
+
+def test_the_longer_sweep_begins_with_the_shorter_one_and_engines_share_draws() -> None:
+    short, long = drawn(runs=5), drawn(runs=11)
+    assert [s.parameters for s in short] == [s.parameters for s in long[:5]]
+    assert [s.seed for s in short] == [s.seed for s in long[:5]]
+    both = drawn(FAMILY, 5, 0, REFERENCE, Pick(engine="mujoco", profile="matched"))
+    assert [s.parameters for s in both[:5]] == [s.parameters for s in both[5:]] == [s.parameters for s in short]
+    assert [s.parameters for s in drawn(seed=1)] != [s.parameters for s in drawn(seed=0)]
+
+
+def test_a_grid_is_whole_once_and_its_first_part_is_spread() -> None:
+    grid = {"a0": Levels((1e2, 1e3, 1e4)), "mass": Levels((1.0, 2.0))}
+    ladder = Ladder(rtol=(1e-3, 1e-6), dt=(1e-2, 1e-3))
+    family = Family(case="bouncing_ball", variant="linear", grid=grid, ladder=ladder)
+    specs = drawn(family, runs=1000)
+    seen = {(s.parameters["a0"], s.parameters["mass"], s.rung) for s in specs}
+    assert len(specs) == len(seen) == 12
+    assert len({s.parameters["a0"] for s in specs[:6]}) > 1
+
+
+class FakeRun:
+    """A run that does what it is told."""
+
+    engine, profile, settings = "fake", "x", {"dt": 1e-3}
+
+    def __init__(self, does: Callable[[], Trajectory]) -> None:
+        self.does = does
+
+    def run(self) -> Trajectory:
+        return self.does()
+
+
+@pytest.fixture
+def fake(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], Trajectory]], Spec]:
+    """An engine that does what it is told, and a spec for it."""
+
+    class Fake:
+        does: Callable[[], Trajectory]
+
+        def prepare(self, case: Any, profile: str, **settings: Any) -> FakeRun:
+            for name in settings:
+                if name not in ("dt", "max_steps"):
+                    raise UnknownName("setting of fake", name, ("dt", "max_steps"))
+            return FakeRun(self.does)
+
+    engine = Fake()
+    monkeypatch.setattr(engines, "load", lambda name: engine)
+
+    def made(does: Callable[[], Trajectory]) -> Spec:
+        engine.does = does
+        return drawn(FAMILY, 1, 0, Pick(engine="fake", profile="x"))[0]
+
+    return made
+
+
+def exact(**changed: Any) -> Trajectory:
+    case = cases.load("bouncing_ball", "linear", **{str(k): v for k, v in drawn()[0].parameters.items()})
+    assert case.closed_form is not None
+    return replace(case.closed_form(np.linspace(0.0, case.t_end, 50)), **changed)
+
+
+def raised() -> Trajectory:
+    raise RuntimeError("the solver fell over")
+
+
+def unsupported() -> Trajectory:
+    raise CaseUnsupported("it has no such thing")
+
+
+def warned() -> Trajectory:
+    warnings.warn("beware", RuntimeWarning, stacklevel=1)
+    return exact()
+
+
+def endless() -> Trajectory:
+    while True:
+        time.sleep(0.001)
+
+
+@pytest.mark.parametrize(
+    ("does", "outcome", "verdict", "says"),
+    [
+        (exact, "finished", "not judged", ""),
+        (raised, "exception", "outside", "RuntimeError: the solver fell over"),
+        (unsupported, "skipped", "skipped", "no such thing"),
+        (warned, "finished", "outside", "leaked: RuntimeWarning: beware"),
+        (lambda: exact(q=np.full((50, 1), np.nan)), "finished", "outside", "q is not finite"),
+        (lambda: exact(outcome=Outcome.DIVERGED, message="gone"), "diverged", "not judged", "gone"),
+        (endless, "time_limit", "not judged", "time limit"),
+    ],
+)
+def test_a_run_ends_in_one_row_whatever_it_does(
+    fake: Callable[..., Spec], does: Callable[[], Trajectory], outcome: str, verdict: str, says: str
+) -> None:
+    row = execute(replace(fake(does), time_limit=0.2))
+    assert (row["outcome"], row["verdict"]) == (outcome, verdict)
+    assert says in row["why"]
+    assert set(COLUMNS) < set(row)
+
+
+def test_a_run_that_stops_short_but_says_finished_is_outside(fake: Callable[..., Spec]) -> None:
+    spec = replace(fake(exact), parameters={**drawn()[0].parameters, "t_end": 9.0})
+    row = execute(spec)
+    assert row["verdict"] == "outside"
+    assert "says finished at t = 0.6 s of 9 s" in row["why"]
+
+
+def test_the_error_of_a_wrong_run_is_seen(fake: Callable[..., Spec]) -> None:
+    good, off = execute(fake(exact)), execute(fake(lambda: exact(q=1.01 * exact().q)))
+    assert good["error"] < 1e-13
+    assert off["error"] == pytest.approx(0.01, rel=1e-6)
+    missing = execute(fake(lambda: exact(events=())))
+    assert missing["error"] == math.inf
+
+
+@pytest.mark.parametrize("spec", drawn(), ids=str)
+def test_the_reference_is_within_on_drawn_balls(spec: Spec) -> None:
+    row = execute(spec)
+    assert (row["verdict"], row["outcome"]) == ("within", "finished"), row["why"]
+    assert row["tier"].startswith("A")
+    assert 0.0 <= row["error"] < 1e-8
+    assert 0.0 <= row["residual"] < 1e-6
+
+
+def test_a_bound_on_steps_is_an_outcome() -> None:
+    family = replace(FAMILY, axes={"height": Linear(0.1, 0.2)}, fixed={"a1": 0.0, "t_end": 5.0}, max_steps=5)
+    row = execute(drawn(family, 1)[0])
+    assert row["outcome"] == "step_limit"
+    assert row["verdict"] == "outside"
+    assert execute(replace(drawn(family, 1)[0], finishes=False))["verdict"] == "not judged"
+
+
+def test_only_the_end_gives_the_end_of_the_whole_run() -> None:
+    family = replace(FAMILY, ends=True)
+    many = together(drawn(family, 20))
+    single = [execute(spec) for spec in drawn(FAMILY, 20)]
+    assert [row["outcome"] for row in many] == [row["outcome"] for row in single]
+    assert all(row["error"] < 1e-8 and row["verdict"] == "within" for row in many)
+    assert [row["parameters"] for row in many] == [row["parameters"] for row in single]
+    alone = [together([spec])[0] for spec in drawn(family, 20)]
+    for a, b in zip(many, alone, strict=True):
+        assert a["error"] == b["error"]
+        assert a["steps"] == b["steps"]
+
+
+def test_a_scene_that_cannot_be_built_is_refused_with_its_sentence() -> None:
+    spec = replace(drawn()[0], parameters={"mass": -1.0})
+    assert execute(spec)["outcome"] == "refused"
+    assert "mass is -1" in execute(spec)["why"]
+    assert together([replace(spec, ends=True)])[0]["outcome"] == "refused"
+
+
+def test_what_a_library_writes_to_the_process_is_heard(capfd: pytest.CaptureFixture[str]) -> None:
+    import os
+
+    heard: list[str] = []
+    with overheard(heard):
+        os.write(2, b"from below\n")
+    assert heard == ["from below"]
+    assert capfd.readouterr().err == ""
+
+
+def test_a_bound_on_time_leaves_nothing_behind() -> None:
+    with pytest.raises(Overdue), bounded(0.05):
+        endless()
+    for _ in range(200):
+        with bounded(10.0):
+            pass
+    time.sleep(0.1)
+
+
+@pytest.mark.parametrize(("needs", "left"), [({"a"}, {"a": 8.0}), ({"a", "b"}, {"a": 8.0, "b": 3.0}), (set(), {})])
+def test_a_failure_keeps_only_what_it_needs(needs: set[str], left: Mapping[str, float]) -> None:
+    given = {"a": 8.123, "b": 3.03, "c": 5.0, "name": "word"}
+    own = {"a": 1.0, "b": 1.0, "c": 1.0, "name": "other"}
+
+    def fails(parameters: Mapping[str, Any]) -> bool:
+        full = {**own, **parameters}
+        return all(float(full[name]) > 0.9 * float(given[name]) for name in needs)
+
+    small, tries = shrink(given, own, fails)
+    assert set(small) == set(left)
+    assert all(small[name] == pytest.approx(value, rel=0.1) for name, value in left.items())
+    assert fails(small)
+    assert tries < 60
+
+
+def test_a_failure_that_does_not_repeat_stays_as_it_came() -> None:
+    assert shrink({"a": 2.0}, {"a": 1.0}, lambda _: False) == ({"a": 2.0}, 1)
+
+
+def test_the_command_of_a_row_repeats_its_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    import shlex
+
+    from crossbody.reports.cli import main
+
+    row = execute(drawn()[0])
+    words = shlex.split(row["command"])
+    with pytest.raises(SystemExit):
+        main([*words[1:], "--setting", "rtol=1e-8", "--json", "--out", str(tmp_path / "out")])
+    told = json.loads(capsys.readouterr().out)
+    assert {line["engine"] for line in told} == {"reference"}
+    assert "rtol=1e-08" in told[0]["settings"]
+
+
+def test_the_map_has_a_cell_for_every_stiffness_and_rung_with_the_worst_of_each() -> None:
+    ladder = Ladder(rtol=(1e-3, 1e-6), dt=(1e-2, 1e-3))
+    family = Family(
+        case="bouncing_ball", variant="linear", ladder=ladder, fixed={"t_end": 0.5, "height": 0.2},
+        grid={"a0": Levels((1e2, 1e6)), "a1": Levels((0.0, 10.0))},
+    )  # fmt: skip
+    specs = [replace(spec, suite="stiffness") for spec in drawn(family, 100)]
+    rows = pd.DataFrame([execute(spec) for spec in specs])
+    cells = stability_map(rows)
+    assert len(cells) == 4
+    assert (cells["runs"] == 2).all()
+    for cell in cells.to_dict(orient="records"):
+        stiff = rows["parameters"].map(json.loads).map(lambda given: given["a0"]) == cell["a0"]
+        mine = rows[stiff & (rows["settings"] == json.dumps({"rtol": cell["setting"]}))]
+        assert cell["worst_error"] == mine["error"].max()
+    line = summary(rows).iloc[0]
+    assert line["runs"] == line["finished"] == 8
+    assert not len(failures(rows))
