@@ -12,6 +12,7 @@ import numpy as np
 
 from crossbody.cases import Coordinate, Outcome, Trajectory, Value
 from crossbody.hw import _measures
+from crossbody.hw._impacts import impacts, least_of, matched
 from crossbody.hw._log import Log
 from crossbody.hw._rates import Floats, rates_by_fit
 from crossbody.hw._whiteness import Correlation, autocorrelation, crosscorrelation
@@ -75,6 +76,8 @@ class Comparison:
         predictions: one an engine.
         skipped: engine, profile -> why there is none.
         delay: of the measured coordinates beyond what the column map says, s.
+        falls: which coordinate jumps in its rate at impacts; -1 for none.
+        mass: of what strikes, kg.
     """
 
     log: Log
@@ -88,6 +91,8 @@ class Comparison:
     predictions: tuple[Prediction, ...]
     skipped: Mapping[tuple[str, str], str] = field(default_factory=lambda: MappingProxyType({}))
     delay: float = 0.0
+    falls: int = -1
+    mass: float = 1.0
 
     @property
     def measured(self) -> Floats:
@@ -152,8 +157,31 @@ class Comparison:
             errors = self.after(prediction, age)
             yield row(f"error_{age:g}s_median", _quantile(errors, 50.0), unit)
             yield row(f"error_{age:g}s_90", _quantile(errors, 90.0), unit)
+        for metric, value, unit in self._impacts(prediction):
+            yield row(metric, value, unit, self.coordinates[self.falls].name)
         yield row("windows_failed", float(prediction.failed), "1")
         yield row("speed", sum(w.segment.t_end for w in self.windows) / max(prediction.wall_s, 1e-12), "1")
+
+    def _impacts(self, prediction: Prediction) -> Iterator[tuple[str, float, str]]:
+        """How far impacts are from the measured ones: in number, in time, and in impulse over all of them."""
+        if self.falls < 0 or prediction.failed:
+            return
+        own, other, offsets, jumps = 0.0, 0, [], []
+        for window, yhat in zip(self.windows, prediction.y, strict=True):
+            t, y = window.t, window.y[:, self.falls]
+            least = least_of(t, y)
+            seen, said = impacts(t, y, least), impacts(t, yhat[:, self.falls], least)
+            offset, jump = matched(seen, said)
+            own, other = own + float(seen.jump.sum()), other + len(said.t) - len(seen.t)
+            offsets.append(offset)
+            jumps.append(jump)
+        late, off = np.concatenate(offsets), np.concatenate(jumps)
+        yield "impacts_too_many", float(other), "1"
+        if len(late):
+            yield "impact_offset_median", float(np.median(late)), "s"
+            yield "impact_offset_largest", float(np.max(np.abs(late))), "s"
+            yield "impulse_error", self.mass * float(np.sum(off)), "N s"
+            yield "impulse_measured", self.mass * own, "N s"
 
     def _ages(self) -> tuple[float, ...]:
         """Half and whole length of the windows, s."""

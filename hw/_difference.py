@@ -16,7 +16,7 @@ from crossbody.cases import InvalidValue, UnknownName, Value
 from crossbody.hw._derivative import apart
 from crossbody.hw._replay import run_window
 from crossbody.hw._windows import Window
-from crossbody.hw.models import Model
+from crossbody.hw.models._contract import Model
 
 Floats = NDArray[np.float64]
 STEP = 0.1
@@ -87,7 +87,7 @@ class Differences:
                 other = x.copy()
                 other[i] = min(max(factor * x[i], low), high)
                 rise = self._sums(other) - best
-                if np.mean(rise) <= stats.t.ppf(0.975, max(len(rise) - 1, 1)) * stats.sem(rise):
+                if np.mean(rise) <= _scatter(rise, best, len(self.owners())):
                     change = 100.0 * (np.sqrt(np.sum(best + rise) / np.sum(best)) - 1.0)
                     found[i] = (
                         f"at {other[i]:.4g} {self.model.parameters[name].unit} the rmse changes by {change:+.1f} %"
@@ -116,3 +116,10 @@ class Differences:
         found = self.model.differ(window.y[grid], yhat)
         plain = self.model.differ(window.y[grid], np.zeros_like(yhat))
         return np.where(np.isfinite(found), found, plain).T.ravel()
+
+
+def _scatter(rise: Floats, best: Floats, count: int) -> float:
+    """What a mean rise of the windows' sums of squares must exceed; of one window that of its white residuals."""
+    if len(rise) < 2:
+        return 4.0 * float(best[0]) / count
+    return float(stats.t.ppf(0.975, len(rise) - 1) * stats.sem(rise))

@@ -15,7 +15,7 @@ from crossbody.hw._difference import Differences
 from crossbody.hw._fit import Estimate, Fit, Floats, Spread, spread
 from crossbody.hw._log import Log
 from crossbody.hw._windows import Window, windows
-from crossbody.hw.models import Model
+from crossbody.hw.models._contract import Model
 
 LONGEST_DELAY = 0.1
 """Bound on an identified delay, s."""
@@ -32,7 +32,8 @@ def identify(
 ) -> Fit:  # fmt: skip
     """Fit parameters to a log.
 
-    The residuals are those of the measured coordinates in every window; windows i with i % hold = hold - 1 are held out.
+    The residuals are those of the measured coordinates in every window; windows i with i % hold = hold - 1 are held
+    out.
 
     Args:
         log: what was recorded; several are taken as windows of their own.

@@ -24,8 +24,7 @@ from crossbody.hw._lift import check_measured, lift, rows_at
 from crossbody.hw._log import Log
 from crossbody.hw._rates import DEGREE, HALF, Floats, Rows, derivatives, felt
 from crossbody.hw._system import system_of
-from crossbody.hw.models import Model
-from crossbody.hw.models._contract import Segment
+from crossbody.hw.models._contract import Model, Segment
 from crossbody.reference import System
 
 

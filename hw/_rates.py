@@ -73,7 +73,7 @@ def felt(t: Floats, u: Floats, delay: float, half: int, degree: int, rows: Rows)
     """What of a held input the acceleration of `derivatives` shows (m, k).
 
     The fitted acceleration sum w_k y_k is a mean of the true one with the weight that integrates w twice (Peano's
-    kernel); an acceleration a_j from t_j to t_(j+1) adds (x_+(t_j)^2 - x_+(t_(j+1))^2)/2, x = t_k - delay - t_j, to y_k.
+    kernel); a_j from t_j to t_(j+1) adds (x_+(t_j)^2 - x_+(t_(j+1))^2)/2 to y_k, with x(t) = t_k - delay - t.
 
     Args:
         t: times (n,), s.

@@ -17,7 +17,7 @@ from crossbody.hw._rates import Floats
 from crossbody.hw._starts import fitted_starts
 from crossbody.hw._system import run_once
 from crossbody.hw._windows import Window, windows
-from crossbody.hw.models import Model
+from crossbody.hw.models._contract import Model
 
 KINDS = ("forward", "closed_loop")
 REFERENCE = {"rtol": 1e-8}
@@ -76,6 +76,7 @@ def replay(
         log=log, model=chosen.name, title=chosen.title, kind=kind, parameters=MappingProxyType(numbers),
         units=MappingProxyType({k: p.unit for k, p in chosen.parameters.items()}), coordinates=chosen.measured,
         windows=cut, predictions=tuple(predictions), skipped=MappingProxyType(skipped), delay=delay,
+        falls=chosen.falls, mass=float(numbers.get("mass", 1.0)),
     )  # fmt: skip
 
 
@@ -111,7 +112,7 @@ def run_window(
     case = model.build(numbers, window.segment)
     asked = dict(model.settings.get(name, {})) | dict(settings)
     engine = engines.load(name)
-    reason = engine.why_not(case, profile)
+    reason = model.why_not.get(name) or engine.why_not(case, profile)
     if reason is not None:
         raise CaseUnsupported(reason)
     if name == "reference":

@@ -58,7 +58,7 @@ def _earlier(t: Floats, x: Floats, xd: Floats | None, delay: float) -> Floats:
 
 
 def lagged(t: Floats, x: Floats, rate: float, *, held: bool = True) -> Floats:
-    """y' = ks (x - y) from y = x at the start, exact for x that holds between samples, or is linear between them."""
+    """Y' = ks (x - y) from y = x at the start, exact for x that holds between samples, or is linear between them."""
     y = np.empty_like(x)
     y[0] = x[0]
     for k in range(len(t) - 1):
@@ -72,8 +72,12 @@ def lagged(t: Floats, x: Floats, rate: float, *, held: bool = True) -> Floats:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Unlagged:
-    """What a sensor with a lag felt: force (n - 1, k) from each of the times t (n - 1,) to the next, and its
-    standard deviation.
+    """What a sensor with a lag felt.
+
+    Attributes:
+        t (n - 1,): s.
+        force (n - 1, k): from each time to the next.
+        std (n - 1, k): its standard deviation.
     """
 
     t: Floats
@@ -84,7 +88,7 @@ class Unlagged:
 def unlagged(t: Floats, y: Floats, rate: float, noise: float, quantum: float = 0.0) -> Unlagged:
     """Undo a first-order lag: x_k = (y_(k+1) - c y_k)/(1 - c), c = e^(-ks (t_(k+1) - t_k)), for x that holds.
 
-    The noise of a reading comes out sqrt(1 + c^2)/(1 - c) times as large, that of neighbours correlated by -c/(1 + c^2).
+    The noise of a reading comes out sqrt(1 + c^2)/(1 - c) times as large, correlated by -c/(1 + c^2) with the next.
 
     Args:
         t: times (n,), s.

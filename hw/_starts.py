@@ -11,7 +11,7 @@ from crossbody.cases import Value
 from crossbody.hw._derivative import Exact
 from crossbody.hw._rates import HALF
 from crossbody.hw._windows import Window
-from crossbody.hw.models import Model
+from crossbody.hw.models._contract import Model
 
 ROUNDS = 2
 """Of Gauss and Newton with the first derivatives: over a few samples the motion is all but linear in its start."""

@@ -10,8 +10,7 @@ import numpy as np
 from crossbody.cases import InvalidValue, SceneError
 from crossbody.hw._log import Log
 from crossbody.hw._rates import rates_by_fit
-from crossbody.hw.models import Model
-from crossbody.hw.models._contract import Floats, Segment
+from crossbody.hw.models._contract import Floats, Model, Segment
 
 FEWEST = 8
 """Samples of a window."""

@@ -5,10 +5,14 @@ A model is a module here with one public name, `MODEL`, a `Model`.
 
 from __future__ import annotations
 
-from crossbody.cases import _registry
-from crossbody.hw.models._contract import Model
+from typing import TYPE_CHECKING
 
-__all__ = ["Model", "load", "names", "summary"]
+from crossbody.cases import _registry
+
+if TYPE_CHECKING:
+    from crossbody.hw.models._contract import Model
+
+__all__ = ["load", "names", "summary"]
 
 
 def names() -> tuple[str, ...]:

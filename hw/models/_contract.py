@@ -89,9 +89,11 @@ class Model:
         see: the measured coordinates of a run at given times.
         differ: (measured, predicted), both (n, k) -> what an identification makes small (n, k).
         engine: what runs it where derivatives are finite differences.
+        falls: which compared coordinate jumps in its rate at impacts; -1 for none.
         restart: usual time between restarts, s; 0 for a free run.
         start_span: length of what a window's start is fitted to, s; 0 where the measured state itself is the start.
         settings: engine -> settings of the usual profile.
+        why_not: engine -> the sentence why it cannot run the model.
         profiles: engine -> profile, where the usual one does not serve.
     """
 
@@ -111,9 +113,11 @@ class Model:
     see: Callable[[Model, Trajectory, Floats], tuple[Floats, Floats]] = see_by_hermite
     differ: Callable[[Floats, Floats], Floats] = plain_difference
     engine: str = "reference"
+    falls: int = -1
     restart: float = 0.0
     start_span: float = 0.0
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=lambda: MappingProxyType({}))
+    why_not: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     profiles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def numbers(self, given: Numbers | None = None) -> dict[str, Value]:

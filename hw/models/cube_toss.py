@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -75,5 +77,10 @@ MODEL = Model(
     read=read,
     see=see,
     differ=differ,
+    falls=2,
     engine="mujoco",
+    why_not=MappingProxyType(
+        {"reference": "Rows of the reference push along their normal: no Coulomb friction sticks and slips."}
+    ),
+    profiles=MappingProxyType({"pinocchio": "admm"}),
 )

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from crossbody.cases import Case, Coordinate, Inputs, Law, Parameter, Trajectory
+from crossbody.cases import Case, Coordinate, Inputs, Law, Trajectory
 from crossbody.cases._delta_scene import JOINTS, LOOPS, NAMES, ROBOT
 from crossbody.cases.delta_tracking import PARAMETERS
 from crossbody.hw._log import Log

@@ -1,0 +1,64 @@
+"""Impacts in sampled positions: when the acceleration jumps, how large the impulse is, and which belong together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+PART = 0.25
+"""Of the largest acceleration of the measurement: what is smaller is no impact."""
+TOGETHER = 0.05
+"""Largest distance of impacts that are the same one, s."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Impacts:
+    """Impacts of one motion.
+
+    Attributes:
+        t (m,): centroid of each acceleration, s.
+        jump (m,): change of the rate in it, m/s.
+    """
+
+    t: Floats
+    jump: Floats
+
+
+def impacts(t: Floats, y: Floats, least: float) -> Impacts:
+    """Stretches in which the second difference of y stays above `least`, m/s^2.
+
+    Args:
+        t: times (n,), s.
+        y: positions (n,), m.
+        least: an acceleration that only an impact has.
+    """
+    rate, middle = np.diff(y) / np.diff(t), 0.5 * (t[1:] + t[:-1])
+    step = np.diff(middle)
+    jump, hit = np.diff(rate), np.zeros(len(t), dtype=bool)
+    hit[1:-1] = jump / step > least
+    edges = np.flatnonzero(np.diff(hit.astype(np.int8)))
+    found = []
+    for a, b in zip(edges[::2], edges[1::2], strict=False):
+        weights = jump[a:b]
+        found.append((float(np.average(t[a + 1 : b + 1], weights=weights)), float(weights.sum())))
+    times, jumps = np.array(found).reshape(-1, 2).T
+    return Impacts(t=times, jump=jumps)
+
+
+def least_of(t: Floats, y: Floats) -> float:
+    """An acceleration that only an impact of this measurement has, m/s^2."""
+    return PART * float(np.max(np.diff(np.diff(y) / np.diff(t)) / np.diff(0.5 * (t[1:] + t[:-1])), initial=0.0))
+
+
+def matched(one: Impacts, other: Impacts) -> tuple[Floats, Floats]:
+    """Offsets in time (k,), s, and in the change of rate (k,), m/s, of impacts that belong together: other less one."""
+    if not len(one.t) or not len(other.t):
+        return np.zeros(0), np.zeros(0)
+    apart = other.t[None, :] - one.t[:, None]
+    nearest, back = np.argmin(np.abs(apart), axis=1), np.argmin(np.abs(apart), axis=0)
+    own = np.flatnonzero(back[nearest] == np.arange(len(one.t)))
+    own = own[np.abs(apart[own, nearest[own]]) <= TOGETHER]
+    return apart[own, nearest[own]], other.jump[nearest[own]] - one.jump[own]
