@@ -36,5 +36,6 @@ def work_precision(rows: pd.DataFrame) -> go.Figure:
         )  # fmt: skip
     figure.update_xaxes(type="log", title_text="relative error of position and event times [1]", exponentformat="power")
     figure.update_yaxes(type="log", title_text="run time, median [ms]", exponentformat="power")
-    figure.update_layout(title_text="Work against precision; a cross is a run that failed", height=560)
+    cases = ", ".join(rows["case"].unique())
+    figure.update_layout(title_text=f"Work against precision, {cases}; a cross is a run that failed", height=560)
     return figure

@@ -12,7 +12,20 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("crossbody", "numpy", "scipy", "numba", "pandas", "scikit-sundae", "mujoco", "pin")
+PACKAGES = (
+    "crossbody",
+    "numpy",
+    "scipy",
+    "numba",
+    "pandas",
+    "scikit-sundae",
+    "mujoco",
+    "pin",
+    "exudyn",
+    "drake",
+    "dartpy",
+    "pymunk",
+)
 
 
 def provenance(command: str, **more: Any) -> dict[str, Any]:
