@@ -1,0 +1,261 @@
+"""The command `crossbody`.
+
+Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2: wrong use, told in one
+sentence on stderr. Whatever is not needed to read the command line is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+from crossbody.cases import CrossbodyError
+from crossbody.reports.replay_cli import identify, replay
+from crossbody.reports.voice import as_json, quiet, speaks
+
+_Work = TypeVar("_Work", bound=Callable[..., int])
+
+DEFAULT_OUT = Path("out")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="crossbody")
+def cli() -> None:
+    """Cross-check a reference model of contact and constrained dynamics against rigid-body engines."""
+
+
+@cli.command("list")
+@click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
+def list_(plain: bool) -> None:
+    """List cases, engines, metrics, stress suites and models that logs are replayed on."""
+    from crossbody import cases, engines
+    from crossbody.hw import models
+    from crossbody.reports import metrics, suites
+
+    sources = {
+        "Cases": cases,
+        "Engines": engines,
+        "Metrics": metrics,
+        "Stress suites": suites,
+        "Models of logs": models,
+    }
+    listed = tuple(sources.items())
+    if plain:
+        kinds = {title.lower(): {name: source.summary(name) for name in source.names()} for title, source in listed}
+        click.echo(json.dumps(kinds, indent=1))
+        return
+    for title, source in listed:
+        click.echo(f"{title}:")
+        width = max(map(len, source.names()), default=0)
+        for name in source.names():
+            click.echo(f"  {name:<{width}}  {source.summary(name)}")
+
+
+def _shared(command: _Work) -> _Work:
+    """Options that say what is run."""
+    options = (
+        click.argument("names", metavar="[CASE]...", nargs=-1),
+        click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable."),
+        click.option("--variant", metavar="V", help="Variant of the case; all if not given."),
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
+        click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR"),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@cli.command()
+@_shared
+@click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
+@click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@speaks
+def run(
+    names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
+    rtol: float | None, settings: tuple[str, ...],
+) -> int:  # fmt: skip
+    """Run cases on engines, judge them, and write the report."""
+    from crossbody.reports.commands import run as work
+
+    return work(names, wanted, variant, pairs, out, rtol, settings, _command())
+
+
+@cli.command()
+@_shared
+@click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
+@click.option("--full", is_flag=True, help="Every case, every rung of every ladder; without it some minutes.")
+@click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier benchmark.")
+@click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
+@click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
+@speaks
+def bench(
+    names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
+    repeats: int | None, full: bool, against: Path | None, what: str | None,
+) -> int:  # fmt: skip
+    """Time engines against their error over ladders of tolerances and steps.
+
+    With --against the exit code is 1 if accuracy or a ratio of run times was lost.
+    """
+    from crossbody.reports import bench_command as work
+
+    if what is not None:
+        return work.alone(what, (names, wanted, variant, pairs, full, against), repeats, out, _command())
+    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command())
+
+
+@cli.command()
+@click.option(
+    "--n",
+    "counts",
+    type=click.IntRange(2, 200),
+    multiple=True,
+    default=(3, 5),
+    show_default=True,
+    help="Number of balls; repeatable.",
+)
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--points", type=click.IntRange(2, 10_000), default=61, show_default=True, help="Gaps from s = 0 to 3.")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
+def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: Path) -> int:
+    """Map energy created and pattern of Newton's cradle over the gap between its balls."""
+    from crossbody.reports.commands import gap_map as work
+
+    return work(counts, wanted, points, out, _command())
+
+
+@cli.command()
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
+def stability(wanted: tuple[str, ...], out: Path) -> int:
+    """Map from which scenes the closed-loop ball maze still comes to its centre."""
+    from crossbody.reports.commands import stability_map as work
+
+    return work(wanted, out, _command())
+
+
+@cli.command()
+@click.argument("names", metavar="[SUITE]...", nargs=-1)
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--runs", type=int, metavar="N", help="Runs of the first engine in each suite.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of every draw.")
+@click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one a processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
+@click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("stress"), show_default=True, metavar="DIR")
+@speaks
+def stress(
+    names: tuple[str, ...], wanted: tuple[str, ...], runs: int | None, seed: int, jobs: int, scheduler: str | None,
+    resume: bool, out: Path,
+) -> int:  # fmt: skip
+    """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
+
+    A sweep that was interrupted goes on where it stood when the same command is given again.
+    """
+    from crossbody.reports.sweep.command import Ask
+    from crossbody.reports.sweep.command import stress as work
+
+    asked = Ask(names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, resume=resume)
+    return work(asked, out, _command())
+
+
+@cli.command()
+@click.argument("name", metavar="CASE")
+@click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
+def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
+    """Frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
+    from crossbody.reports.bode_command import bode as work
+
+    return work(name, pairs, out, _command())
+
+
+@cli.command()
+@click.argument("name", metavar="CASE")
+@click.option("--variant", metavar="V", help="Variant of the case; the first if not given.")
+@click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
+@click.option("--at", metavar="K=V", multiple=True, help="Where to look: x, y, z of the flange, m; repeatable.")
+@click.option("--bode", is_flag=True, help="Frequency responses too.")
+@click.option("--locus", metavar="PARAM=a..b", help="Poles over a parameter of the case.")
+@click.option("--map", "mapped", is_flag=True, help="Stability over the workspace.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for tables and figures.")
+@speaks
+def analyse(
+    name: str, variant: str | None, pairs: tuple[str, ...], at: tuple[str, ...], bode: bool, locus: str | None,
+    mapped: bool, out: Path | None,
+) -> int:  # fmt: skip
+    """Equilibria of a case, their linear models, poles, ranks, responses and maps."""
+    from crossbody.reports.analyse_command import analyse as work
+
+    return work(
+        name, variant, pairs, at, bode=bode, locus=locus, mapped=mapped, out=out, command=_command()
+    )  # fmt: skip
+
+
+@cli.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@speaks
+def report(folder: Path) -> int:
+    """Make the page of an earlier run again."""
+    from crossbody.reports import page
+
+    made = page.write(folder).absolute()
+    if as_json():
+        click.echo(json.dumps({"report": str(made)}))
+    elif not quiet():
+        click.echo(f"Report: {made}")
+    return 0
+
+
+cli.add_command(replay)
+cli.add_command(identify)
+
+
+@cli.group()
+def log() -> None:
+    """Look at logs of hardware."""
+
+
+@log.command("info")
+@click.argument("path", metavar="LOG", type=click.Path(path_type=Path))
+@click.option("--columns", metavar="MAP", help="Column map (TOML) to check it by.")
+@click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart.")
+@click.option("--draft", is_flag=True, help="Print a draft of a column map and nothing else.")
+@speaks
+def log_info(path: Path, columns: str | None, part: int | None, draft: bool) -> int:
+    """Show channels, rates, gaps and ranges of LOG, what is wrong with it, and a draft of a column map."""
+    from crossbody.reports.log import info
+
+    return info(path, columns, part, draft)
+
+
+def _command() -> str:
+    return shlex.join(["crossbody", *sys.argv[1:]])
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point: every error of use is one sentence and exit code 2."""
+    try:
+        code = cli.main(args=arguments, prog_name="crossbody", standalone_mode=False)
+    except click.exceptions.Abort:
+        code = 130
+    except click.ClickException as error:
+        code = _say(error.format_message())
+    except CrossbodyError as error:
+        code = _say(str(error))
+    except KeyboardInterrupt:
+        code = 130
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _say(text: str) -> int:
+    click.echo("crossbody: " + " ".join(text.split()), err=True)
+    return 2
