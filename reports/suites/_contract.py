@@ -50,8 +50,8 @@ class Family:
         ladder: of tolerances and steps, a further axis of the grid.
         second: every how many runs the independent integrator is asked too (tier C), 0 for never; it is not needed
             where the case has a closed form.
-        limit: largest error of the reference against a truth of tier A to C, and largest residual of its energy
-            account, at its default tolerance; on a rung of a ladder it grows with the tolerance.
+        limit: largest error of the reference against a truth of tier A to C at its default tolerance; on a rung of a
+            ladder it grows with the tolerance. Its energy account may leave ten times as much open.
         finishes: whether the reference has to reach the horizon in each of them.
         ends: the end state alone is asked for: the reference runs them in threads, without a record and energy account.
         max_steps: bound on the steps of a run.

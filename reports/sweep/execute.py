@@ -21,6 +21,8 @@ from crossbody.reports.sweep.measure import Error, against_closed_form, against_
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.verdict import Word
 
+ACCOUNT = 10.0
+"""The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
 REFUSED, SKIPPED, EXCEPTION, CRASHED = "refused", "skipped", "exception", "crashed"
 """Ends of a run that never began, or that should not be: the words beside those of `Outcome`."""
 
@@ -170,7 +172,7 @@ def _verdict(spec: Spec, tried: Tried, error: Error, limit: float, open_: float,
         return (Word.OUTSIDE if reference and spec.finishes else Word.INFO), tried.message[:500]
     if reference and error.value > limit:
         return Word.OUTSIDE, error.why or f"error {error.value:.2e}"
-    if reference and open_ > limit:
+    if reference and open_ > ACCOUNT * limit:
         return Word.OUTSIDE, f"the energy account leaves {open_:.2e} open"
     judged = reference and (error.tier or not math.isnan(open_))
     return (Word.WITHIN if judged else Word.INFO), error.why
