@@ -202,12 +202,14 @@ def analyse(
 
 @cli.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--single-file", is_flag=True, help="One file with all pages, to be sent.")
+@click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier run to compare.")
 @speaks
-def report(folder: Path) -> int:
-    """Make the page of an earlier run again."""
+def report(folder: Path, single_file: bool, against: Path | None) -> int:
+    """Make the pages of an earlier run again."""
     from crossbody.reports import page
 
-    made = page.write(folder).absolute()
+    made = page.write(folder, single_file=single_file, against=against).absolute()
     if as_json():
         click.echo(json.dumps({"report": str(made)}))
     elif not quiet():

@@ -98,13 +98,16 @@ def _beside(truth: Truth, run: Trajectory) -> Trajectory | None:
     inside, exact = aligned(truth, run)
     if not inside.any():
         return None
-    rows: dict[str, Floats] = {}
-    for name in ("q", "v", "gap", "lam", "energy"):
-        rows[name] = np.full((len(run.t), getattr(exact, name).shape[1]), np.nan)
-        rows[name][inside] = getattr(exact, name)
-    mode = np.full((len(run.t), exact.mode.shape[1]), -1, dtype=np.int8)
-    mode[inside] = exact.mode
-    return Trajectory(t=run.t, mode=mode, **rows)
+
+    def put(rows: Floats) -> Floats:
+        whole = np.full((len(inside), rows.shape[1]), np.nan)
+        whole[inside] = rows
+        return whole
+
+    return Trajectory(
+        t=run.t, q=put(exact.q), v=put(exact.v), gap=put(exact.gap), lam=put(exact.lam), energy=put(exact.energy),
+        mode=np.where(inside[:, None], np.nan_to_num(put(exact.mode.astype(np.float64))), -1).astype(np.int8),
+    )  # fmt: skip
 
 
 def _steps(t: Floats) -> list[list[float]]:

@@ -1,0 +1,157 @@
+"""Pictures: what is drawn touches exactly where the mechanism's own gap says it does, and forces act there."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crossbody import cases
+from crossbody.cases import Case, Trajectory
+from crossbody.reports import scenes, study
+from crossbody.reports.playback import chosen, packed, peaks, playback
+from crossbody.reports.store import Trace
+
+CASES = (
+    ("bouncing_ball", "listing"), ("newtons_cradle", "sliders"), ("newtons_cradle", "pendulums"),
+    ("red_body", "resolved"), ("soft_contact", "axis"), ("soft_contact", "delta"), ("ball_maze", "inside"),
+    ("delta_impulse", "light"),
+)  # fmt: skip
+
+
+def states(case: Case, n: int = 5) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return case.q0 + 1e-3 * rng.standard_normal((n, len(case.q0)))
+
+
+def trace_of(case: Case, n: int = 50) -> Trace:
+    q, nc = states(case, n), len(case.contacts)
+    zero = np.zeros((n, nc))
+    run = Trajectory(
+        t=np.linspace(0.0, case.t_end, n), q=q, v=0.0 * q, gap=zero, lam=zero + 1.0, energy=np.zeros((n, 2)),
+        mode=zero.astype(np.int8),
+    )  # fmt: skip
+    about = study._about(case, "truth", "")
+    return Trace(about=about, run=run)
+
+
+def gaps(case: Case, q: np.ndarray) -> np.ndarray:
+    """By the reference's own kernel (n, nc)."""
+    from crossbody.engines import load
+
+    system = load("reference").prepare(case, "compiled").system
+    found = np.zeros((len(q), len(case.contacts)))
+    rate = np.zeros(len(case.contacts))
+    for i, row in enumerate(q):
+        system.gaps(0.0, row, np.zeros(len(row)), np.array(system.p), found[i], rate)
+    return found
+
+
+@pytest.mark.parametrize(("name", "variant"), CASES)
+def test_every_mechanism_has_a_picture(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    scene = scenes.load(case.mechanism)
+    stage, q = scene.stage(case.parameters), states(case)
+    poses = scene.poses(q, case.parameters)
+    arrows = scene.arrows(q, np.ones((len(q), len(case.contacts))), case.parameters)
+    assert poses.shape[0] == arrows.shape[0] == len(q)
+    assert poses.shape[2] == 3
+    assert arrows.shape[2] == 2 * stage.dimensions
+    assert np.isfinite(poses).all()
+    assert np.isfinite(arrows).all()
+    if stage.lines:
+        assert max(max(line) for line in stage.lines) < poses.shape[1]
+    else:
+        assert poses.shape[1] == len(stage.bodies)
+
+
+@pytest.mark.parametrize("variant", ["sliders", "pendulums"])
+def test_balls_are_as_far_apart_as_their_gap(variant: str) -> None:
+    case = cases.load("newtons_cradle", variant, gap=2e-3)
+    q = states(case)
+    centres = scenes.load(case.mechanism).poses(q, case.parameters)[:, :, :2]
+    apart = np.linalg.norm(np.diff(centres, axis=1), axis=2) - 2 * case.number("radius")
+    assert np.allclose(apart, gaps(case, q), atol=1e-13)
+
+
+def test_forces_of_a_pair_are_opposite() -> None:
+    case = cases.load("newtons_cradle", "pendulums")
+    q = states(case)
+    lam = np.random.default_rng(1).random((len(q), len(case.contacts)))
+    arrows = scenes.load(case.mechanism).arrows(q, lam, case.parameters)
+    left, right = np.split(arrows[:, :, 2:], 2, axis=1)
+    assert np.allclose(left, -right)
+    assert np.allclose(np.linalg.norm(right, axis=2), lam)
+
+
+def test_the_red_body_touches_where_its_gaps_say() -> None:
+    case = cases.load("red_body", "resolved")
+    q = states(case)
+    lam = np.ones((len(q), 5))
+    arrows = scenes.load("red_body").arrows(q, lam, case.parameters)
+    h = gaps(case, q)
+    assert np.allclose(arrows[:, :2, 1], h[:, :2], atol=1e-14)
+    assert np.allclose(case.number("wall") - arrows[:, 4, 0], h[:, 4], atol=1e-14)
+    normal, slab = arrows[:, 2, 2:], q[:, 3:5]
+    for k in (2, 3):
+        above = np.sum(normal * (arrows[:, k, :2] - slab), axis=1) - case.number("slab_half_height")
+        assert np.allclose(above, h[:, k], atol=1e-14)
+
+
+def test_the_arms_of_the_delta_robot_close_where_its_gaps_do() -> None:
+    case = cases.load("delta_impulse", "light")
+    q = states(case)
+    points = scenes.load("delta").poses(q, case.parameters)
+    apart = np.concatenate([_tip(points, 0, case) - _tip(points, i, case) for i in (1, 2)], axis=1)
+    assert np.allclose(apart, gaps(case, q), atol=1e-13)
+
+
+def _tip(points: np.ndarray, i: int, case: Case) -> np.ndarray:
+    """Centre of the flange as arm i has it: its wrist, less the flange's radius along the arm."""
+    hinge = points[:, 3 * i]
+    return points[:, 3 * i + 2] - case.number("r_flange") * hinge / np.linalg.norm(hinge, axis=1, keepdims=True)
+
+
+def test_the_soft_block_is_touched_where_its_gaps_say() -> None:
+    case = cases.load("soft_contact", "axis")
+    q = states(case)
+    arrows = scenes.load("soft_contact").arrows(q, np.ones((len(q), 2)), case.parameters)
+    poses = scenes.load("soft_contact").poses(q, case.parameters)
+    h = gaps(case, q)
+    assert np.allclose(arrows[:, 0, 0] - poses[:, 1, 0], h[:, 0], atol=1e-14)
+    assert np.allclose(poses[:, 2, 0] - arrows[:, 1, 0], h[:, 1], atol=1e-14)
+
+
+def test_peaks_miss_no_blow() -> None:
+    lam = np.zeros((1000, 2))
+    lam[437, 1], lam[10, 0], lam[998, 0] = -50.0, np.nan, 7.0
+    t = np.linspace(0.0, 1.0, 1000)
+    at = chosen(t, np.array([0.25]), 40)
+    assert at[0] == 0
+    assert at[-1] == 999
+    found = peaks(lam, at + 1)
+    assert found[:, 1].min() == -50.0
+    assert found[:, 0].max() == 7.0
+    assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize(("name", "variant"), CASES)
+def test_playback_is_small_and_holds_the_motion(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    trace = trace_of(case)
+    many = [trace] * 10
+    (section,) = playback(many)
+    assert len(section.context["scene"]) < 450e3
+    track = packed(many, scenes.load(case.mechanism))["tracks"][0]
+    t = np.frombuffer(base64.b64decode(track["t"]), "<f4")
+    assert t[0] == 0.0
+    assert t[-1] == pytest.approx(case.t_end, rel=1e-6)
+
+
+def test_an_unknown_mechanism_is_told() -> None:
+    trace = trace_of(cases.load("bouncing_ball", "listing"))
+    (section,) = playback([replace(trace, about=dict(trace.about) | {"mechanism": "../x"})])
+    assert "no picture of the mechanism ../x" in section.text
+    assert section.template == "section.html"
