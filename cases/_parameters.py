@@ -26,8 +26,9 @@ class Numbers(Parameter):
         Raises:
             InvalidValue: if a part is not a number inside the bounds.
         """
-        alone = isinstance(value, (int, float))
-        parts = [str(value)] if alone else value.split(",") if isinstance(value, str) else [str(part) for part in value]
+        if isinstance(value, (int, float)):
+            value = str(value)
+        parts = value.split(",") if isinstance(value, str) else [str(part) for part in value]
         if not parts:
             raise InvalidValue(f"{where} is empty; it must be one number or several separated by commas.")
         each = Parameter(default=0.0, unit=self.unit, low=self.low, high=self.high, open_low=self.open_low)
