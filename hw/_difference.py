@@ -96,7 +96,8 @@ class Differences:
 
     def _sums(self, x: Floats) -> Floats:
         r, owners = self.residual(x), self.owners()
-        return np.bincount(owners, weights=r * r)
+        sums: Floats = np.bincount(owners, weights=r * r).astype(np.float64)
+        return sums
 
     def owners(self) -> NDArray[np.int64]:
         """The window of every residual (N,)."""

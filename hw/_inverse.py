@@ -121,9 +121,9 @@ def _felt(log: Log, model: Model, delay: float, half: int, degree: int, rows: Ro
 def _solved(
     balance: _Balance, B: Floats, left: Floats, names: tuple[str, ...], unit: str, recorded: Floats
 ) -> Estimate:
-    value = np.linalg.solve(B, left[:, :, None])[:, :, 0]
+    value: Floats = np.linalg.solve(B, left[:, :, None])[:, :, 0]
     gain = np.linalg.solve(B, balance.mass)
-    std = np.sqrt(np.einsum("nij,nj->ni", gain**2, balance.noise**2))
+    std: Floats = np.sqrt(np.einsum("nij,nj->ni", gain**2, balance.noise**2))
     return Estimate(t=balance.t, names=names, unit=unit, value=value, std=std, recorded=recorded)
 
 

@@ -84,7 +84,8 @@ def _predict(
     model: Model, numbers: Mapping[str, Value], cut: Sequence[Window], name: str, profile: str, kind: str,
     settings: Mapping[str, Any],
 ) -> Prediction:  # fmt: skip
-    runs, used = [], {}
+    runs = []
+    used: dict[str, Any] = {}
     for window in cut:
         if kind == "closed_loop":
             run, used = _looped(model, numbers, window, name, profile)

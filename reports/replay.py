@@ -35,8 +35,10 @@ def verdicts(found: Comparison, command: str) -> pd.DataFrame:
     source = f"{found.kind}, {len(found.windows)} windows of {found.log.provenance.file}"
 
     def row(engine: str, profile: str, **more: Any) -> Verdict:
-        shared = {"case": found.model, "variant": variant(found.log), "tier": tier(found.log), "command": command}
-        return Verdict(engine=engine, profile=profile, **shared, **more)
+        return Verdict(
+            case=found.model, variant=variant(found.log), engine=engine, profile=profile, tier=tier(found.log),
+            command=command, **more,
+        )  # fmt: skip
 
     rows = [
         row(

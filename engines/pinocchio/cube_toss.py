@@ -116,7 +116,8 @@ class CubeRun:
         """Corners, in the body's axes, that are below the table in a pose."""
         corners = self.cube.half * CORNERS
         heights = ahead[2] + corners @ pin.Quaternion(ahead[3:]).matrix()[2]
-        return corners[heights <= 0.0]
+        low: Floats = corners[heights <= 0.0]
+        return low
 
     def _impulses(self, offset: Floats, places: list[Floats]) -> Floats:
         """Impulses (3 k,), N s, of points with friction at given places of the world."""

@@ -14,7 +14,7 @@ SCENE = ("height", "speed", "t_end")
 
 def build(numbers: Numbers, segment: Segment) -> Case:
     """One stretch from the measured height and speed; it has no closed form and claims nothing."""
-    case = cases.load("bouncing_ball", t_end=segment.t_end, **numbers)
+    case = cases.load("bouncing_ball", t_end=segment.t_end, **numbers)  # type: ignore[arg-type]
     return replace(
         case, name="ball", variant="replay", q0=segment.y, v0=segment.yd, closed_form=None, claims=(), limits=()
     )
