@@ -1,0 +1,107 @@
+"""The delta robot's synthetic logs: MuJoCo's motion from torques alone, the reference in closed loop, force, torque."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crossbody import hw
+
+pytest.importorskip("mujoco")
+
+PUSHES = (
+    hw.Push(start=0.5, length=0.2, force=(1.0, -2.0, 5.0)),
+    hw.Push(start=0.9, length=0.2, force=(-3.0, 2.0, 1.0)),
+)
+QUIET = hw.Sensors(noise=0.0, bits=44, delay=0.0, touch_noise=0.0, touch_step=0.0)
+DELAY = 4e-4
+
+
+@pytest.fixture(scope="module")
+def plant() -> hw.Plant:
+    return hw.delta_plant(t_end=1.2)
+
+
+@pytest.fixture(scope="module")
+def pushed() -> hw.Plant:
+    return hw.delta_plant(PUSHES, t_end=1.2)
+
+
+def worst(found: hw.Comparison) -> float:
+    return float(np.abs(found.residual(found.predictions[0])).max())
+
+
+def test_recorded_torques_give_the_recorded_motion(plant: hw.Plant) -> None:
+    quiet = hw.replay(hw.delta_log(plant, QUIET), "delta", restart=0.0)
+    assert worst(quiet) < 1e-9
+    noisy = hw.replay(hw.delta_log(plant), "delta", restart=0.4, delay=DELAY)
+    assert len(noisy.windows) == 2
+    assert worst(noisy) < 2e-4
+    rows = {(r.metric, r.channel): r.value for r in noisy.rows()}
+    assert rows["rmse", "q11"] < 5e-5
+    assert noisy.log.provenance.synthetic
+
+
+def test_torques_that_hold_a_sample_late_are_noticed(plant: hw.Plant) -> None:
+    log = hw.delta_log(plant, QUIET)
+    late = np.roll(log.matrix("inputs"), 1, axis=0)
+    late[0] = log.matrix("inputs")[0]
+    changed = tuple(
+        hw.Channel(role=c.role, name=c.name, unit=c.unit, values=late[:, i])
+        for i, c in enumerate(c for c in log.channels if c.role == "inputs")
+    )
+    rest = tuple(c for c in log.channels if c.role != "inputs")
+    other = hw.Log(time=log.time, channels=rest + changed, sample_time=log.sample_time, provenance=log.provenance)
+    assert worst(hw.replay(other, "delta", restart=0.0)) > 1e-6
+
+
+def test_the_recorded_reference_drives_model_and_controller(plant: hw.Plant) -> None:
+    found = hw.replay(hw.delta_log(plant), "delta", kind="closed_loop", wanted=("reference", "mujoco"))
+    assert [p.engine for p in found.predictions] == ["reference"]
+    assert "recorded reference" in found.skipped["mujoco", "matched"]
+    delays = [r.value for r in found.rows() if r.metric == "delay"]
+    assert np.median(delays) == pytest.approx(DELAY, abs=1e-4)
+    known = hw.replay(hw.delta_log(plant), "delta", kind="closed_loop", delay=DELAY)
+    assert worst(known) < 5e-4
+    rows = {(r.metric, r.channel): r.value for r in known.rows()}
+    assert min(rows["fit", c.name] for c in known.coordinates) > 99.0
+
+
+def test_torque_that_the_motion_needs_is_the_recorded_one(plant: hw.Plant) -> None:
+    found = hw.inverse(hw.delta_log(plant), "delta", delay=DELAY, stride=3)
+    error = found.value - found.recorded
+    assert np.sqrt(np.mean(error**2)) < 2.0 * found.std.mean()
+    assert np.mean(np.abs(error) < 2.0 * found.std) > 0.9
+    wrong = hw.inverse(hw.delta_log(plant), "delta", delay=DELAY, stride=30, parameters={"m3": 0.33})
+    assert np.mean(np.abs(wrong.value - wrong.recorded) < 2.0 * wrong.std) < 0.2
+
+
+def test_a_force_that_was_not_measured_is_found_within_its_uncertainty(pushed: hw.Plant) -> None:
+    found = hw.estimate_force(hw.delta_log(pushed), "delta", delay=DELAY, stride=2)
+    true = pushed.force[np.searchsorted(pushed.t, found.t + 1e-9) - 1]
+    edges = np.array([0.5, 0.7, 0.9, 1.1])
+    steady = np.abs(found.t[:, None] - edges).min(axis=1) > 27 * 0.88e-3  # a mean over the polynomial's samples
+    error = (found.value - true)[steady]
+    assert found.std.max() < 0.03
+    assert np.abs(true).max() == 5.0
+    assert np.mean(np.abs(error) < 2.0 * found.std[steady]) > 0.9
+    assert np.sqrt(np.mean(error**2)) < 1.5 * found.std.mean()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_touch_sensors_tell_the_force_within_their_uncertainty(pushed: hw.Plant, seed: int) -> None:
+    log = hw.delta_log(pushed, seed=seed)
+    found = hw.unlagged(log.time, log.matrix("sensors"), rate=200.0, noise=0.02, quantum=0.01)
+    error = (found.force - pushed.force[:-1]) / found.std
+    assert np.mean(np.abs(error) < 2.0) == pytest.approx(0.954, abs=0.02)
+    assert found.std.max() < 0.2
+
+
+def test_motion_and_touch_tell_the_same_force(pushed: hw.Plant) -> None:
+    """The estimate of the motion, put through the sensor's lag, is what the sensor showed."""
+    log = hw.delta_log(pushed)
+    found = hw.estimate_force(log, "delta", delay=DELAY)
+    shown = hw.Sensor(rate=200.0).read(found.t, found.value)
+    read = log.matrix("sensors")[np.searchsorted(log.time, found.t - 1e-9)]
+    steady = (found.t > 0.6) & (found.t < 0.66)
+    np.testing.assert_allclose(shown[steady].mean(axis=0), read[steady].mean(axis=0), atol=0.05)
