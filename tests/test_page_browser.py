@@ -1,0 +1,195 @@
+"""The pages in a browser: quiet console, no request, plots drawn, motion that moves, both themes readable by all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import chromium
+import numpy as np
+import pytest
+
+from crossbody.cases import load
+from crossbody.reports import page, study
+from crossbody.reports.comparison import Entry
+from crossbody.reports.jobs import CaseResult
+from crossbody.reports.output import folder
+from crossbody.reports.truth import truth_of
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(
+        chromium.binary() is None, reason="Chromium is not installed (Debian: apt-get install chromium)."
+    ),
+]
+INDEX, CASE = "index.html", "case-bouncing_ball.linear.html"
+LOOKS = [(width, theme) for width in (1400, 400) for theme in ("light", "dark")]
+RULES = "{ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa'] }"
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    case = load("bouncing_ball", "linear")
+    truth = truth_of(case)
+    runs = [
+        replace(truth.trajectory, q=truth.trajectory.q * (1 + 1e-3 * np.sin(k * truth.trajectory.t))[:, None])
+        for k in (1, 2)
+    ]
+    entries = tuple(Entry(engine="fake", profile=f"p{k}", run=run) for k, run in enumerate(runs))
+    results = [CaseResult(case=case, truth=truth, entries=entries)]
+    path = tmp_path_factory.mktemp("browser") / "out"
+    with folder(path) as made:
+        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
+        page.write(made)
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
+    opened = chromium.Browser(tmp_path_factory.mktemp("profile"))
+    yield opened
+    opened.close()
+
+
+DRAWN = "[...document.querySelectorAll('.plot')].filter((box) => 'drawn' in box.dataset).length"
+
+
+def draw_all(browser: chromium.Browser) -> None:
+    browser.js("document.querySelectorAll('.plot').forEach((box) => box.scrollIntoView())")
+    browser.wait(
+        "[...document.querySelectorAll('.plot')].every((box) => { if (!('drawn' in box.dataset)) box.scrollIntoView();"
+        " return 'drawn' in box.dataset; })"
+    )
+
+
+@pytest.mark.parametrize(("width", "theme"), LOOKS)
+@pytest.mark.parametrize("name", [INDEX, CASE])
+def test_a_page_is_quiet_and_fits(out: Path, browser: chromium.Browser, name: str, width: int, theme: str) -> None:
+    browser.open(out / name, width, theme)
+    draw_all(browser)
+    assert browser.js("document.documentElement.scrollWidth <= innerWidth")
+    assert browser.complaints() == []
+
+
+def test_plots_have_lines(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE)
+    draw_all(browser)
+    assert browser.js(
+        "[...document.querySelectorAll('.plot')].every((p) => p.querySelector('path.js-line, .bars path'))"
+    )
+
+
+def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    browser.wait(DRAWN)
+    first = browser.picture(".player canvas")
+    browser.js("document.querySelector('[data-play]').click()")
+    browser.wait("Number(document.querySelector('[data-clock]').value) > 50")
+    browser.js("document.querySelector('[data-play]').click()")
+    assert browser.picture(".player canvas") != first
+    at = "document.querySelector('.plot[data-drawn] .cursor').getBoundingClientRect().x"
+    before = browser.js(at)
+    browser.js(
+        "(() => { const clock = document.querySelector('[data-clock]'); clock.value = 900;"
+        " clock.dispatchEvent(new Event('input')); })()"
+    )
+    assert browser.js(at) > before + 100
+    side = browser.picture(".player canvas")
+    browser.js(
+        "(() => { const view = document.querySelector('[data-view]'); view.value = 'beside';"
+        " view.dispatchEvent(new Event('change')); })()"
+    )
+    browser.js("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert browser.picture(".player canvas") != side
+    assert browser.complaints() == []
+
+
+def test_zoom_is_shared_and_keeps_events_sharp(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE)
+    draw_all(browser)
+    event = truth_of(load("bouncing_ball", "linear")).trajectory.events[0].t
+    around = f"[{event - 1e-2}, {event + 1e-2}]"
+    browser.js(f"Plotly.relayout(document.querySelector('.plot'), {{ 'xaxis.range': {around} }}).then(() => 0)")
+    seen = "[...document.querySelectorAll('.plot[data-time]')].map((box) => box._fullLayout.xaxis.range[0])"
+    browser.wait(f"{seen}.every((x) => Math.abs(x - {event - 1e-2}) < 1e-9)")
+    line = "document.querySelector('.plot').data[0].x"
+    assert browser.js(f"[...{line}].filter((x) => Math.abs(x - {event}) < 1e-2).length") >= 6
+
+
+def test_engines_are_hidden_everywhere(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE)
+    draw_all(browser)
+    browser.js("document.querySelector('[data-show=\"fake:p0\"]').click()")
+    browser.wait(
+        "document.querySelector('.plot').data.filter((line) => line.meta === 'fake:p0').every((l) => !l.visible)"
+    )
+    assert browser.js(
+        "[...document.querySelectorAll('.verdicts tr[data-engine=\"fake:p0\"]')].every((row) => row.hidden)"
+    )
+
+
+def test_a_cell_leads_to_the_verdicts_of_its_engine(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / INDEX)
+    browser.js("document.querySelectorAll('.cell a')[1].click()")
+    browser.wait("location.pathname.endsWith('linear.html') && document.readyState === 'complete'")
+    browser.wait("document.querySelector('[data-filter=engine]').value === 'fake:p1'")
+    rows = "[...document.querySelectorAll('.verdicts tbody tr')].filter((row) => !row.hidden)"
+    assert browser.js(f"{rows}.length > 0 && {rows}.every((row) => row.dataset.engine === 'fake:p1')")
+
+
+def test_a_table_is_saved_with_all_digits(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE)
+    browser.js(
+        "URL.createObjectURL = (blob) => { blob.text().then((text) => { window.saved = text; }); return 'blob:x'; };"
+        "HTMLAnchorElement.prototype.click = function () {}; document.querySelector('.save').click()"
+    )
+    browser.wait("window.saved")
+    lines = browser.js("window.saved").splitlines()
+    assert lines[0].startswith("Verdict,Engine,Metric,Value")
+    assert len(lines) == 1 + browser.js("document.querySelectorAll('.verdicts tbody tr').length")
+    assert any(len(line.split(",")[3]) > 12 for line in lines)
+
+
+def test_the_switch_turns_the_theme(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE, theme="light")
+    paper = "getComputedStyle(document.body).backgroundColor"
+    before = browser.js(paper)
+    browser.js("theme.value = 'dark'; theme.dispatchEvent(new Event('change'))")
+    assert browser.js(paper) != before
+    browser.js("theme.value = ''; theme.dispatchEvent(new Event('change'))")
+    assert browser.js(paper) == before
+
+
+def test_one_file_shows_one_page_at_a_time(out: Path, browser: chromium.Browser) -> None:
+    page.write(out, single_file=True)
+    try:
+        browser.open(out / INDEX)
+        shown = "[...document.querySelectorAll('[data-page]')].filter((p) => !p.hidden).map((p) => p.id).join()"
+        browser.wait(f"{shown} === 'index'")
+        browser.js("document.querySelector('.matrix tbody th a').click()")
+        browser.wait(f"{shown} === 'case-bouncing_ball.linear'")
+        draw_all(browser)
+        assert browser.complaints() == []
+    finally:
+        page.write(out)
+
+
+@pytest.mark.skipif(find_spec("axe_core_python") is None, reason="axe is not installed (pip install axe-core-python).")
+@pytest.mark.parametrize(("width", "theme"), LOOKS)
+@pytest.mark.parametrize("name", [INDEX, CASE])
+def test_axe_has_nothing_to_say(out: Path, browser: chromium.Browser, name: str, width: int, theme: str) -> None:
+    package = find_spec("axe_core_python")
+    assert package is not None
+    assert package.origin is not None
+    (script,) = Path(package.origin).parent.rglob("axe.min.js")
+    browser.open(out / name, width, theme)
+    draw_all(browser)
+    browser.js(f"{script.read_text(encoding='utf-8')}; 0")
+    told = browser.js(
+        f"axe.run(document, {RULES}).then((r) =>"
+        " r.violations.map((v) => v.id + ': ' + v.nodes.map((n) => n.html).join(' | ')))"
+    )
+    assert told == []
