@@ -123,6 +123,11 @@ def followed(case: Case) -> Case | None:
     return in_real_time(case, "memoryless") if alone else None
 
 
+def law_name(case: Case) -> str:
+    """What `Line.memoryless` is: the machine of that name for one row, a chain of springs for several."""
+    return "memoryless" if len(case.contacts) == 1 else "springs"
+
+
 def _ball(case: Case) -> Line:
     mass, gravity, law = case.number("mass"), case.number("gravity"), case.law
 

@@ -17,7 +17,7 @@ from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _scale, _settings
-from crossbody.engines._line import Line, followed, line
+from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import PeerRun, ended, sampled, why_not
 
 METHODS = ("DOPRI5", "DVERK6", "ODE23")
@@ -223,7 +223,7 @@ class Exudyn:
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
         scene = line(case)
         model = _build(scene, symbolic=profile == "matched")
-        extra = {"law": "memoryless"} if profile == "matched" else {"method": "GeneralizedAlpha"}
+        extra = {"law": law_name(case)} if profile == "matched" else {"method": "GeneralizedAlpha"}
         return PeerRun(
             engine=self.name, profile=profile, settings=used | extra, integrate=_integrator(case, scene, model, used),
             physics=_audit(case, scene, model), follows=followed(case) if profile == "matched" else None,

@@ -10,6 +10,8 @@ import pandas as pd
 
 FLOOR = 1e-13
 """Errors below this are rounding: no order is fitted there."""
+EXACT = 1e-11
+"""Where no error is above this there is nothing left to converge: closed forms, straight lines."""
 NEAR = 10.0
 """Errors within this factor of the smallest are near its floor (rounding, another law): no order is fitted there."""
 SLACK = 0.5
@@ -51,9 +53,13 @@ def orders(rows: pd.DataFrame) -> pd.DataFrame:
         best = order if math.isnan(early) else max(order, early)
         found.append(
             {"case": case, "engine": engine, "profile": profile, "knob": knob, "order": best, "promised": promised,
-             "says": says(best, promised)}
+             "says": "exact at every setting" if _exact(errors) else says(best, promised)}
         )  # fmt: skip
     return pd.DataFrame(found, columns=COLUMNS)
+
+
+def _exact(errors: Sequence[float]) -> bool:
+    return bool(np.all(np.asarray(errors, dtype=np.float64) <= EXACT))
 
 
 def says(order: float, promised: float) -> str:

@@ -94,6 +94,7 @@ def test_orders_are_held_against_promises(rows: pd.DataFrame) -> None:
     assert orders.loc["second", "says"] == "converges"
     assert orders.loc["liar", "says"] == "converges, but not with the promised order 4"
     assert orders.loc["fails", "says"] == "too few points above rounding"
+    assert orders.loc["compiled", "says"] == "exact at every setting"
 
 
 def test_every_engine_declares_what_it_promises() -> None:

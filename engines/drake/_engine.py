@@ -14,7 +14,7 @@ from pydrake.systems.framework import EventStatus
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _settings
-from crossbody.engines._line import Line, followed, line
+from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import PeerRun, ended, sampled, why_not
 from crossbody.engines.drake._plant import offsets, plant
 from crossbody.engines.drake._symbolic import system
@@ -185,8 +185,9 @@ class Drake:
             shift, physics = np.array(offsets(scene)), _read(scene, made)
         start = np.concatenate((scene.q0 + shift, scene.v0))
         sim = Sim(root, start, str(used.get("scheme", USUAL_SCHEME)), float(used.get("rtol", 0.0)))
+        law = {"law": law_name(case)} if profile == "matched" else {}
         return PeerRun(
-            engine=self.name, profile=profile, settings=used | ({"law": "memoryless"} if profile == "matched" else {}),
+            engine=self.name, profile=profile, settings=used | law,
             integrate=_runner(case, scene, sim, shift, int(used["max_steps"]), dt),
             physics={"gravity": scene.gravity, "q0": case.q0, "v0": case.v0} | physics,
             follows=followed(case) if profile == "matched" else None,
