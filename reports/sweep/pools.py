@@ -67,7 +67,7 @@ def _surviving(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]
 
 
 def _single(spec: Spec) -> Rows:
-    for _, rows in _surviving([(spec.index, [spec])], 1):
+    for _, rows in _surviving([(spec.index, [spec])], 2):  # 1 would be this process
         return rows
     return [crashed(spec, ENDED)]
 
