@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 PART = 0.25
 """Of the largest acceleration of the measurement: what is smaller is no impact."""
+CLEAR = 6.0
+"""Times the noise of the second difference."""
 TOGETHER = 0.05
 """Largest distance of impacts that are the same one, s."""
 
@@ -49,8 +51,12 @@ def impacts(t: Floats, y: Floats, least: float) -> Impacts:
 
 
 def least_of(t: Floats, y: Floats) -> float:
-    """An acceleration that only an impact of this measurement has, m/s^2."""
-    return PART * float(np.max(np.diff(np.diff(y) / np.diff(t)) / np.diff(0.5 * (t[1:] + t[:-1])), initial=0.0))
+    """An acceleration that only an impact of this measurement has, m/s^2: a part of the largest, above the noise."""
+    if len(t) < 3:
+        return np.inf
+    acceleration = np.diff(np.diff(y) / np.diff(t)) / np.diff(0.5 * (t[1:] + t[:-1]))
+    noise = 1.4826 * float(np.median(np.abs(acceleration - np.median(acceleration))))
+    return max(PART * float(np.max(acceleration, initial=0.0)), CLEAR * noise)
 
 
 def matched(one: Impacts, other: Impacts) -> tuple[Floats, Floats]:
