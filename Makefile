@@ -1,5 +1,6 @@
 # make run    set up and run the main job: the bouncing ball on every engine, judged, with a report
 # make test   set up and pass the tests
+# make docs   build the pages into build/docs; a broken link is an error
 PYTHON ?= $(firstword $(shell command -v python3.11 python3.12 python3.13 python3 2>/dev/null))
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -26,7 +27,7 @@ check: $(READY)
 	$(BIN)/mypy
 
 docs: $(VENV)/.docs
-	$(BIN)/mkdocs build --quiet --strict --site-dir out/docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 wheel-check:
 	PYTHON=$(PYTHON) .ci/wheel-check
@@ -39,7 +40,7 @@ format: $(READY)
 	$(BIN)/ruff format .
 
 $(VENV)/.docs: $(READY)
-	$(BIN)/python -m pip install --quiet '.[docs]'
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
 	touch $@
 
 $(READY): pyproject.toml

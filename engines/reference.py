@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
 from importlib.metadata import version
-from importlib.util import find_spec
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory
-from crossbody.cases._load import from_file
 from crossbody.engines import _settings
+from crossbody.engines._equations import builder, module, system_of
 from crossbody.engines._reference_audit import audit
 from crossbody.reference import Options, System, prepare
 from crossbody.reference._options import COLLISIONS, FSMS, TOLERANCES
 
-SYSTEMS = "crossbody.reference.systems"
 OF_THE_CASE = "case"
 _PADS = (
     "IDA loses its step here at tolerances below 1e-8, where rounding of a stiff pad's force on ten grams reaches that "
@@ -61,7 +55,7 @@ class ReferenceRun:
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""
-        listed = getattr(_module(self.case.mechanism), "listed", None)
+        listed = getattr(module(self.case.mechanism), "listed", None)
         return audit(self.system, self.case.q0, self.case.v0) | (listed(self.system.p) if listed else {})
 
 
@@ -87,7 +81,7 @@ class Reference:
         solver = _settings.profile_of(self.name, self.profiles, profile)
         if (case.mechanism, solver) in UNSUITED:
             return UNSUITED[case.mechanism, solver]
-        if _builder(case.mechanism) is None:
+        if builder(case.mechanism) is None:
             return f"The reference has no equations of the mechanism {case.mechanism!r}."
         if case.collisions not in COLLISIONS:
             return (
@@ -109,35 +103,21 @@ class Reference:
             CaseUnsupported: for a mechanism or a collision rule that is not there.
             InvalidValue: for a setting outside its range.
         """
-        reason, builder = self.why_not(case, profile), _builder(case.mechanism)
-        if reason is not None or builder is None:
-            raise CaseUnsupported(reason or "")
+        reason = self.why_not(case, profile)
+        if reason is not None:
+            raise CaseUnsupported(reason)
         solver = _settings.profile_of(self.name, self.profiles, profile)
         times = {k: v for k, v in settings.items() if k == "samples" and np.ndim(v)}
         numbers = {k: v for k, v in settings.items() if k not in times}
         used = _settings.chosen(self.name, solver, _known(solver), numbers)
         options = _options(case, solver, {**used, **times})
-        system = builder(case.parameters, case.law)
-        check = getattr(_module(case.mechanism), "check_start", None)
+        system = system_of(case)
+        check = getattr(module(case.mechanism), "check_start", None)
         if check is not None:
             check(case.parameters, case.q0, case.v0)
         inner = prepare(system, case.q0, case.v0, options)
         inner.warm()
         return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
-
-
-def _builder(mechanism: str) -> Callable[..., System] | None:
-    """What builds the equations of a mechanism; None where there are none."""
-    if mechanism.endswith(".py"):
-        return getattr(_module(mechanism), "system", None)
-    known = find_spec(f"{SYSTEMS}.{mechanism}") is not None
-    return getattr(_module(mechanism), "build", None) if known else None
-
-
-@cache
-def _module(mechanism: str) -> ModuleType:
-    own = mechanism.endswith(".py")
-    return from_file("mechanism", Path(mechanism)) if own else import_module(f"{SYSTEMS}.{mechanism}")
 
 
 def _known(solver: str) -> dict[str, Parameter]:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import UnknownName, Value
+from crossbody.engines._equations import system_of
 from crossbody.hw._lift import check_measured, lift
 from crossbody.hw._rk4 import march
-from crossbody.hw._system import system_of
 from crossbody.hw._windows import Window
 from crossbody.hw.models._contract import Model
 from crossbody.reference import System

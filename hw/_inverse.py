@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import SceneError, Value
+from crossbody.engines._equations import system_of
 from crossbody.hw import models
 from crossbody.hw._lift import check_measured, lift, rows_at
 from crossbody.hw._log import Log
 from crossbody.hw._rates import DEGREE, HALF, Floats, Rows, derivatives, felt
-from crossbody.hw._system import system_of
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.reference import System
 

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 from crossbody.cases import Case, Trajectory
-from crossbody.reference import System, simulate
-
-
-def system_of(case: Case) -> System:
-    """The mechanism with the law of its rows."""
-    system: System = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
-    return system
+from crossbody.engines._equations import system_of
+from crossbody.reference import simulate
 
 
 def run_once(case: Case, solver: str, **options: Any) -> Trajectory:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 import pandas as pd
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from crossbody import cases
 from crossbody.cases import Case, CaseUnsupported, InvalidValue, UnknownName, Value
+from crossbody.engines._equations import system_of
 from crossbody.reference import System, delta
 from crossbody.reference.delta import scene
 from crossbody.reference.linear import LinearModel, Trim, controllable, linearise, locus, modes, observable, poses, trim
@@ -43,8 +43,7 @@ class Place:
 
 def build(case: Case) -> System:
     """The mechanism of a case, without a sampled controller."""
-    made: System = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
-    return made
+    return system_of(case)
 
 
 def places(case: Case, at: Mapping[str, float] | None = None) -> tuple[Place, ...]:

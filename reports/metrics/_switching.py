@@ -13,7 +13,6 @@ is constant; where G depends on q lam does work besides, O(a0^-1/2) of it: a con
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from itertools import groupby
 from typing import Any
 
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.engines._equations import system_of
 from crossbody.reports.metrics._contacts import CLOSED
 
 
@@ -39,7 +39,7 @@ def made(run: Trajectory, case: Case) -> float | None:
         return None
     if not np.isfinite(run.q).all():
         return math.nan
-    system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, law)
+    system = system_of(case)
     total, on = 0.0, np.zeros(len(law.a0), dtype=bool)
     for t, events in groupby(run.events, key=lambda event: event.t):
         q = np.array([np.interp(t, run.t, column) for column in run.q.T])

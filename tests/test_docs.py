@@ -1,0 +1,107 @@
+"""Every code block of the documentation runs, page by page, in the order in which it stands there.
+
+Python and bash blocks run; a block with a title is a file and is written, one under `engines/`, `reports/metrics/` or
+`hw/formats/` into a folder that is added to that registry. In bash, `crossbody` and `pytest` lines run, each with the
+exit code that its comment names, 0 if none.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from crossbody.reports.cli import main
+
+DOCS = Path(__file__).parent.parent / "docs"
+PAGES = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
+BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+REGISTRIES = {
+    "engines": "crossbody.engines",
+    "reports/metrics": "crossbody.reports.metrics",
+    "hw/formats": "crossbody.hw.formats",
+}
+COMMENT = re.compile(r"#\s*exit code (\d)(?:: (.*))?$")
+
+
+@dataclass(frozen=True)
+class Block:
+    language: str
+    title: str
+    text: str
+
+
+def blocks(page: str) -> list[Block]:
+    found = BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
+    titled = re.compile(r'title="([^"]+)"')
+    return [Block(lang, m.group(1) if (m := titled.search(rest)) else "", text) for lang, rest, text in found]
+
+
+RUN = [page for page in PAGES if blocks(page)]
+
+
+def test_pages_have_blocks_and_no_unknown_language() -> None:
+    assert len(RUN) >= 10
+    assert {block.language for page in RUN for block in blocks(page)} == {"python", "bash", "toml"}
+
+
+@pytest.fixture
+def registered(tmp_path: Path) -> Iterator[None]:
+    """Folders of the page's own plug-ins beside those of the project."""
+    packages = {folder: import_module(name) for folder, name in REGISTRIES.items()}
+    known = set(sys.modules)
+    for folder, package in packages.items():
+        (tmp_path / folder).mkdir(parents=True)
+        package.__path__.append(str(tmp_path / folder))
+    yield
+    for folder, package in packages.items():
+        package.__path__.remove(str(tmp_path / folder))
+    for name in set(sys.modules) - known:
+        if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_every_block_runs(
+    page: str, registered: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scope: dict[str, Any] = {"__name__": "page", "__file__": str(tmp_path / "page.py")}
+    for i, block in enumerate(blocks(page)):
+        if block.title:
+            Path(block.title).write_text(block.text, encoding="utf-8")
+        elif block.language == "python":
+            source = tmp_path / f"block{i}.py"  # compiled kernels are kept by their file
+            source.write_text(block.text, encoding="utf-8")
+            exec(compile(block.text, str(source), "exec"), scope)
+        elif block.language == "bash":
+            for line in block.text.strip().splitlines():
+                bash(line, capsys)
+
+
+def bash(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    comment = COMMENT.search(line)
+    wanted, says = (int(comment.group(1)), comment.group(2) or "") if comment else (0, "")
+    program, *arguments = shlex.split(line, comments=True)
+    if program == "crossbody":
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        told = capsys.readouterr()
+        assert int(end.value.code or 0) == wanted, f"{line}\n{told.out}\n{told.err}"
+        assert says in told.err + told.out
+    else:
+        assert program == "pytest", f"{line} is not run by the tests"
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == wanted, f"{line}\n{done.stdout}\n{done.stderr}"
