@@ -59,10 +59,11 @@ def _sources(function: Callable[..., Any]) -> tuple[Path, ...]:
     return (own,) if own.is_file() else ()
 
 
-def compiled(function: Callable[..., Any], signatures: Any = None) -> Any:
+def compiled(function: Callable[..., Any], signatures: Any = None, *, nogil: bool = False) -> Any:
     """Compile a function and keep the code on disk; other users' numba functions keep their own places.
 
-    A function typed at a prompt has no file to stand beside: it is compiled for this process alone.
+    A function typed at a prompt has no file to stand beside: it is compiled for this process alone. With nogil, threads
+    may run it side by side.
     """
     sources = _sources(function)
     before = numba_config.CACHE_DIR
@@ -70,7 +71,7 @@ def compiled(function: Callable[..., Any], signatures: Any = None) -> Any:
     numba_config.CACHE_DIR = str(place) if place else before
     try:
         with _alone(place if signatures else None):
-            return numba.njit(signatures, cache=bool(sources), error_model="numpy")(function)
+            return numba.njit(signatures, cache=bool(sources), error_model="numpy", nogil=nogil)(function)
     finally:
         numba_config.CACHE_DIR = before
 

@@ -145,6 +145,8 @@ def _soft(case: Case, at: Mapping[str, float]) -> list[Place]:
     p, found = numbers(case.parameters), []
     for name, rows in (("grasp", [0, 1]), ("left finger", [0]), ("right finger", [1])):
         q, v = closed.grasp(p) if len(rows) == 2 else closed.touching(p)
+        if name == "left finger":
+            q[1:3] += 0.01
         steady = {"free": [0, 1, 2, 3, 4], "rates": [5, 6], "t": p["close_end"]}
         found.append(_place(case, name, rows, held=False, q=q, v=v, **steady))  # type: ignore[arg-type]
     return found

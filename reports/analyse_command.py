@@ -77,8 +77,8 @@ def analyse(
     tables = {
         "equilibria": work.equilibria(found, case), "poles": work.poles(found), "ranks": work.ranks(found)
     }  # fmt: skip
-    if bode:
-        tables["responses"] = work.responses(found, OMEGA)
+    if bode and len(rows := work.responses(found, OMEGA)):
+        tables["responses"] = rows
     if locus:
         parameter, values = parse_range(locus)
         tables["locus"] = work.root_locus(name, variant, overrides, place, parameter, values)

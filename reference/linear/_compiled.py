@@ -263,7 +263,7 @@ _F, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::
 _I, _B2 = types.int64[::1], types.int8[:, ::1]
 _C, _C2 = types.complex128[::1], types.complex128[:, ::1]
 _KERNELS = tuple(types.FunctionType(kernels.COMPLEX[name]) for name in ("dynamics", "rows"))
-TANGENTS = (
+_ARGUMENTS = (
     types.int64, types.float64, _F2, _C2, _C, _F2, _I, _I, types.int64, _B2, _F, _F2, _F2, _F3, _I,
 )  # fmt: skip
-tangents = compiled(tangents, [types.void(*_KERNELS, *TANGENTS)])
+tangents = compiled(tangents, [types.void(*_KERNELS, *_ARGUMENTS)], nogil=True)

@@ -6,13 +6,9 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
-from typing import Any
 
-import numba
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
@@ -107,13 +103,13 @@ def _evaluated(at: Point, X: Floats, pattern: Pattern, threads: int | None) -> t
     system, n, na = at.system, at.system.n, len(at.active)
     vd, lam = np.zeros((len(X), n)), np.zeros((len(X), na))
     derivative, codes = np.zeros((len(X), n + na, X.shape[1])), np.zeros(len(X), np.int64)
-    call = _entry(system.dynamics, system.rows)
     P, law = np.array(system.p, dtype=complex)[None], np.array(system.alpha[at.active], order="C")
 
     def part(a: int, b: int) -> None:
         scratch = np.zeros(system.scratch, dtype=complex)
-        call(
-            system.mass_block, at.t, X[a:b], P, scratch, law, at.active, pattern.colours, pattern.count,
+        _compiled.tangents(
+            system.dynamics, system.rows, system.mass_block, at.t,
+            X[a:b], P, scratch, law, at.active, pattern.colours, pattern.count,
             pattern.nonzero, pattern.probe, vd[a:b], lam[a:b], derivative[a:b], codes[a:b],
         )  # fmt: skip
 
@@ -136,14 +132,3 @@ def shared(part: Callable[[int, int], None], count: int, threads: int | None) ->
         return
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(lambda ends: part(*ends), pairwise(edges)))
-
-
-@cache
-def _entry(dynamics: Any, rows: Any) -> Any:
-    """The compiled derivatives with one system's kernels built in, without the interpreter's lock."""
-    inner = _compiled.tangents
-
-    def call(k, t, X, P, w, law, idx, colours, count, pattern, probe, vd, lam, out, codes):  # type: ignore[no-untyped-def]
-        inner(dynamics, rows, k, t, X, P, w, law, idx, colours, count, pattern, probe, vd, lam, out, codes)
-
-    return numba.njit([types.void(*_compiled.TANGENTS)], nogil=True)(call)

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
-import numba
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError
@@ -98,13 +94,14 @@ def _evaluated(
     u, lam, basis = X[:, 2 * n :].copy(), np.zeros((count, na)), np.zeros((count, n, m))
     A, codes = np.zeros((count, 2 * m, 2 * m)), np.zeros(count, np.int64)
     values = np.zeros((count, 2 * m), dtype=complex)
-    call, Q = _entry(system.dynamics, system.rows), np.ascontiguousarray(X[:, :n])
+    Q = np.ascontiguousarray(X[:, :n])
     P = np.array(system.p, dtype=complex)[None]
 
     def part(a: int, b: int) -> None:
         scratch = np.zeros(system.scratch, dtype=complex)
-        call(
-            system.mass_block, at.t, Q[a:b], P, scratch, at.active, hold, pattern.colours, pattern.count,
+        _held.held(
+            system.dynamics, system.rows, system.mass_block, at.t,
+            Q[a:b], P, scratch, at.active, hold, pattern.colours, pattern.count,
             pattern.nonzero, pattern.probe, u[a:b], lam[a:b], basis[a:b], A[a:b], codes[a:b],
         )  # fmt: skip
         bad = ~np.isfinite(A[a:b]).all(axis=(1, 2))
@@ -113,13 +110,3 @@ def _evaluated(
 
     shared(part, count, threads)
     return u, lam, basis, A, values, codes
-
-
-@cache
-def _entry(dynamics: Any, rows: Any) -> Any:
-    inner = _held.held
-
-    def call(k, t, Q, P, w, idx, hold, colours, count, pattern, probe, u, lam, basis, A, codes):  # type: ignore[no-untyped-def]
-        inner(dynamics, rows, k, t, Q, P, w, idx, hold, colours, count, pattern, probe, u, lam, basis, A, codes)
-
-    return numba.njit([types.void(*_held.HELD)], nogil=True)(call)

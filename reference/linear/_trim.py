@@ -89,7 +89,7 @@ def _balance(at: Point, x: Array) -> tuple[Array, Floats]:
     a0, _, a2 = at.system.alpha[at.active].T
     stiff = (a0 > 0.0) | (a2 > 0.0)
     forces = np.abs(f) + np.abs(lam) @ np.abs(H)
-    sizes = [np.full(n, forces.max(initial=1e-300)), np.full(int(stiff.sum()), np.abs(q).max(initial=1e-6))]
+    sizes = [np.full(n, forces.max(initial=0.0) or 1.0), np.full(int(stiff.sum()), np.abs(q).max(initial=1e-6))]
     sizes.append(np.full(len(lam), np.abs(v).max(initial=1e-6)))
     return np.concatenate([f + lam @ H, h[stiff], H @ v]), np.concatenate(sizes).real
 
@@ -108,6 +108,7 @@ def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float]:
     value, size = _balance(at, x)
     if not np.isfinite(value).all():
         return Outcome.NOT_FINITE, np.inf
+    least = size  # forces that vanish in equilibrium leave no scale of their own
     left = float(np.abs(value / size).max(initial=0.0))
     for _ in range(STEPS):
         if left <= SETTLED:
@@ -120,7 +121,7 @@ def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float]:
         if not np.isfinite(J).all():
             return Outcome.ILL_POSED, left
         step = np.linalg.lstsq(J / size[:, None], -value / size, rcond=1e-12)[0]
-        better = _searched(at, x, unknown, step, left)
+        better = _searched(at, x, unknown, step, left, least)
         if better is None:
             break
         value, size, left = better
@@ -128,7 +129,7 @@ def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float]:
 
 
 def _searched(
-    at: Point, x: Floats, unknown: Index, step: Floats, left: float
+    at: Point, x: Floats, unknown: Index, step: Floats, left: float, least: Floats
 ) -> tuple[Floats, Floats, float] | None:  # fmt: skip
     """Go along a step as far as it improves, x in place; None if it does not."""
     before = x[unknown].copy()
@@ -136,6 +137,7 @@ def _searched(
         x[unknown] = before + 0.5**halving * step
         with np.errstate(over="ignore", invalid="ignore"):
             value, size = _balance(at, x)
+        size = np.maximum(size, least)
         now = float(np.abs(value / size).max(initial=0.0)) if np.isfinite(value).all() else np.inf
         if now < left:
             return value.real, size, now
