@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from crossbody.reports.cli import main
+from crossbody.reports.cli import cli, main
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
@@ -51,6 +51,11 @@ RUN = [page for page in PAGES if blocks(page)]
 def test_pages_have_blocks_and_no_unknown_language() -> None:
     assert len(RUN) >= 10
     assert {block.language for page in RUN for block in blocks(page)} == {"python", "bash", "toml"}
+
+
+def test_every_command_is_in_the_reference() -> None:
+    named = set(re.findall(r"^\| `crossbody (\w+)", (DOCS / "reference/commands.md").read_text(), re.MULTILINE))
+    assert named == set(cli.commands)
 
 
 @pytest.fixture
