@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from crossbody.hw._finding import Finding
     from crossbody.hw._fit import Estimate, Fit
     from crossbody.hw._identify import identify
-    from crossbody.hw._inverse import estimate_force, inverse
+    from crossbody.hw._inverse import Inferred, estimate_force, inverse
     from crossbody.hw._log import Channel, Log, Provenance, Repair
     from crossbody.hw._read import Scan, check, parts, read, scan
     from crossbody.hw._replay import replay
@@ -38,7 +38,7 @@ _HOMES = {
     "_finding": ("Finding",),
     "_fit": ("Estimate", "Fit"),
     "_identify": ("identify",),
-    "_inverse": ("estimate_force", "inverse"),
+    "_inverse": ("Inferred", "estimate_force", "inverse"),
     "_log": ("Channel", "Log", "Provenance", "Repair"),
     "_read": ("Scan", "check", "parts", "read", "scan"),
     "_replay": ("replay",),
@@ -59,6 +59,7 @@ __all__ = [
     "Finding",
     "Fit",
     "GroupSurvey",
+    "Inferred",
     "Log",
     "Plant",
     "Prediction",

@@ -29,7 +29,7 @@ from crossbody.reference import System
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Estimate:
+class Inferred:
     """Something that was not measured, and how well it is known.
 
     Attributes:
@@ -62,7 +62,7 @@ class _Balance:
 def inverse(
     log: Log, model: str | Model, *, parameters: Mapping[str, Value] | None = None, delay: float = 0.0,
     half: int = HALF, degree: int = DEGREE, stride: int = 1,
-) -> Estimate:  # fmt: skip
+) -> Inferred:  # fmt: skip
     """Torques that the model needs for the recorded motion, beside the recorded ones.
 
     Args:
@@ -92,7 +92,7 @@ def inverse(
 def estimate_force(
     log: Log, model: str | Model, *, parameters: Mapping[str, Value] | None = None, delay: float = 0.0,
     half: int = HALF, degree: int = DEGREE, stride: int = 1,
-) -> Estimate:  # fmt: skip
+) -> Inferred:  # fmt: skip
     """The force that acts on the mechanism besides the recorded torques, from motion and torque.
 
     Args and errors as for `inverse`; the model must have inputs for such a force (`Model.forces`).
@@ -120,11 +120,11 @@ def _felt(log: Log, model: Model, delay: float, half: int, degree: int, rows: Ro
 
 def _solved(
     balance: _Balance, B: Floats, left: Floats, names: tuple[str, ...], unit: str, recorded: Floats
-) -> Estimate:
-    value: Floats = np.linalg.solve(B, left[:, :, None])[:, :, 0]
+) -> Inferred:
+    value = np.asarray(np.linalg.solve(B, left[:, :, None])[:, :, 0], dtype=np.float64)
     gain = np.linalg.solve(B, balance.mass)
     std: Floats = np.sqrt(np.einsum("nij,nj->ni", gain**2, balance.noise**2))
-    return Estimate(t=balance.t, names=names, unit=unit, value=value, std=std, recorded=recorded)
+    return Inferred(t=balance.t, names=names, unit=unit, value=value, std=std, recorded=recorded)
 
 
 def _balance(

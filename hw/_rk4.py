@@ -99,18 +99,31 @@ def _accelerate(
             out[n + i] += W[j, i] * lam[j]
 
 
+@kernels.helper
+def _step(
+    dynamics: Any, rows: Any, t: float, step: float, y: Array, u: Array, p: Array, law: Floats, idx: Any, k: int,
+    work: Any, stages: Array,
+) -> None:  # fmt: skip
+    """Carry y on by one step in place; stages (3, 2 n) is scratch."""
+    z, slope, total = stages[0], stages[1], stages[2]
+    total[:] = 0.0
+    slope[:] = 0.0
+    for stage in range(4):
+        reach = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+        weight = 1.0 if stage == 0 or stage == 3 else 2.0
+        for i in range(len(y)):
+            z[i] = y[i] + reach * step * slope[i]
+        _accelerate(dynamics, rows, t + reach * step, z, u, p, law, idx, k, work, slope)
+        for i in range(len(y)):
+            total[i] += weight * slope[i]
+    for i in range(len(y)):
+        y[i] += step / 6.0 * total[i]
+
+
 def march(
-    dynamics: Any,
-    rows: Any,
-    times: Floats,
-    parts: int,
-    u: Array,
-    p: Array,
-    law: Floats,
-    k: int,
-    scratch: int,
+    dynamics: Any, rows: Any, times: Floats, parts: int, u: Array, p: Array, law: Floats, k: int, scratch: int,
     out: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Fill out[1:] from out[0], `parts` steps between two times; u[i] acts from times[i] on.
 
     Args:
@@ -125,32 +138,17 @@ def march(
         scratch: length of w.
         out (m, 2 n): positions and velocities; the first line is the start.
     """
-    n, nc = out.shape[1] // 2, len(law)
-    c = np.complex128
+    n, nc, c = out.shape[1] // 2, len(law), np.complex128
     work = (
         np.zeros((n, k), c), np.zeros(n, c), np.zeros(scratch, c), np.zeros((nc, n), c), np.zeros(nc, c),
         np.zeros(nc, c), np.zeros((nc, n), c), np.zeros((nc, nc), c), np.zeros(nc, c),
     )  # fmt: skip
-    idx = np.arange(nc)
-    y, z, slope, total = out[0].copy(), np.zeros(2 * n, c), np.zeros(2 * n, c), np.zeros(2 * n, c)
+    idx, y, stages = np.arange(nc), out[0].copy(), np.zeros((3, 2 * n), c)
     for m in range(len(times) - 1):
         step = (times[m + 1] - times[m]) / parts
         for part in range(parts):
-            t = times[m] + part * step
-            total[:] = 0.0
-            slope[:] = 0.0
-            for stage in range(4):
-                reach = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-                weight = 1.0 if stage == 0 or stage == 3 else 2.0
-                for i in range(2 * n):
-                    z[i] = y[i] + reach * step * slope[i]
-                _accelerate(dynamics, rows, t + reach * step, z, u[m], p, law, idx, k, work, slope)
-                for i in range(2 * n):
-                    total[i] += weight * slope[i]
-            for i in range(2 * n):
-                y[i] += step / 6.0 * total[i]
-        for i in range(2 * n):
-            out[m + 1, i] = y[i]
+            _step(dynamics, rows, times[m] + part * step, step, y, u[m], p, law, idx, k, work, stages)
+        out[m + 1] = y
 
 
 march = compiled(
