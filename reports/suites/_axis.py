@@ -44,7 +44,7 @@ class Log:
 
     def at(self, u: float) -> Value:
         """The value at u in [0, 1)."""
-        return self.low * (self.high / self.low) ** u
+        return float(self.low * (self.high / self.low) ** u)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from crossbody.reports.suites._axis import Linear, Log
+from crossbody.reports.suites._axis import Axis, Linear, Log
 from crossbody.reports.suites._contract import Family, Suite
 
-_FALL = {
+_FALL: dict[str, Axis] = {
     "drop": Log(1e-5, 1e-1), "tilt": Linear(-0.6, 0.6), "spin": Linear(-5.0, 5.0), "speed_x": Linear(-1.0, 1.0),
     "speed_y": Linear(-2.0, 0.0), "mass": Log(1e-1, 1e1), "slab_tilt": Linear(-0.05, 0.05),
 }  # fmt: skip
-_RATIOS = {"zeta3": Linear(0.0, 2.0), "zeta4": Linear(0.0, 2.0), "zeta5": Linear(0.0, 2.0)}
+_RATIOS: dict[str, Axis] = {"zeta3": Linear(0.0, 2.0), "zeta4": Linear(0.0, 2.0), "zeta5": Linear(0.0, 2.0)}
 
 SUITE = Suite(
     families=(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from crossbody.reports.suites._axis import Levels, Linear, Log, Whole
+from crossbody.reports.suites._axis import Axis, Levels, Linear, Log, Whole
 from crossbody.reports.suites._contract import Family, Suite
 
-_ANY = {"angle": Linear(-0.6, 0.6), "theta": Linear(0.0, 2.0 * math.pi), "rings": Whole(1, 50)}
+_ANY: dict[str, Axis] = {"angle": Linear(-0.6, 0.6), "theta": Linear(0.0, 2.0 * math.pi), "rings": Whole(1, 50)}
 
 SUITE = Suite(
     families=(

@@ -7,7 +7,7 @@ so a longer sweep begins with the shorter one, and neither workers nor engines c
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -99,7 +99,7 @@ def _grid(family: Family, point: int) -> tuple[dict[str, Value], int]:
 
 
 def specs(
-    suites: Sequence[tuple[str, Suite]], engines: dict[str, Sequence[Pick]], runs: int | None, seed: int, share: bool
+    suites: Sequence[tuple[str, Suite]], engines: Mapping[str, Sequence[Pick]], runs: int | None, seed: int, share: bool
 ) -> list[Spec]:
     """Every run of a sweep, in the order of its table.
 

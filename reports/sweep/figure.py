@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
+from typing import Any
 
 import pandas as pd
 import plotly.graph_objects as go
@@ -63,6 +65,6 @@ def _colour(error: float) -> float | None:
     return WORST if math.isinf(error) else math.log10(max(error, 10.0**BEST))
 
 
-def _words(row: dict[str, object]) -> str:
+def _words(row: dict[Hashable, Any]) -> str:
     told = f"{row['finished']} of {row['runs']} finished, worst error {row['worst_error']}"
     return f"{told}; {row['outcomes']}" if row["outcomes"] else told

@@ -6,14 +6,13 @@ import time
 import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from crossbody import cases
 from crossbody.cases import Case, CrossbodyError, Outcome, Trajectory
-from crossbody.engines.reference import SYSTEMS
+from crossbody.engines._equations import system_of
 from crossbody.reference import System
 from crossbody.reports.sweep.execute import EXCEPTION, REFUSED, Tried, row
 from crossbody.reports.sweep.measure import Error, at_the_end
@@ -36,7 +35,7 @@ def together(specs: Iterable[Spec]) -> list[dict[str, Any]]:
             continue
         try:
             case = cases.load(spec.case, spec.variant, **spec.parameters)
-            system = import_module(f"{SYSTEMS}.{case.mechanism}").build(case.parameters, case.law)
+            system = system_of(case)
         except CrossbodyError as error:
             rows.append(row(spec, Tried(outcome=REFUSED, message=str(error)), Error(), []))
             continue
@@ -51,8 +50,7 @@ def together(specs: Iterable[Spec]) -> list[dict[str, Any]]:
 
 
 def _key(spec: Spec, case: Case, system: System) -> Any:
-    named = isinstance(system.parameters, Mapping)
-    own = tuple(system.parameters) if named else system.p.tobytes()
+    own: Any = tuple(system.parameters) if isinstance(system.parameters, Mapping) else system.p.tobytes()
     settings = tuple(sorted(spec.knobs.items()))
     return case.mechanism, system.n, case.t_end, case.fsm, case.collisions, spec.max_steps, settings, own
 
