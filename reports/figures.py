@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.reports.filled import filled
 from crossbody.reports.metrics._impulse import cumulative
+from crossbody.reports.section import Figure
+from crossbody.reports.sheet import Sheet
 from crossbody.reports.store import Trace
 from crossbody.reports.strips import modes
 from crossbody.reports.styles import COLOURS, DASHES, TRUTH, label, style
-from crossbody.reports.thin import POINTS, keep
+from crossbody.reports.thin import POINTS
 
 SAMPLE = 15
 """Room of one sample of one line on a page, bytes (time and value as base64)."""
 FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
-FINE = 2e-5
-"""Distance of samples over the horizon below which times are written in double precision."""
 
 __all__ = ["COLOURS", "DASHES", "FIGURES", "TRUTH", "label", "note", "points_for", "style", "suits"]
 
@@ -39,58 +36,6 @@ def points_for(traces: Sequence[Trace], room: int) -> int:
     coordinates, contacts = (len(drawn(len(traces[0].about[name]))) for name in ("coordinates", "contacts"))
     lines = len(traces) * (2 * coordinates + 4 * contacts + 4)
     return int(np.clip(room / (SAMPLE * lines), FEWEST, POINTS))
-
-
-class _Sheet:
-    """Stacked plots over one time axis, with the lines of every engine."""
-
-    def __init__(self, rows: Sequence[str], title: str, points: int) -> None:
-        self.points = points
-        gap = min(0.06, 0.3 / len(rows))
-        self.figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=gap)
-        self.data: list[dict[str, Any]] = []
-        for i, name in enumerate(rows, start=1):
-            self.figure.update_yaxes(
-                title_text=name, title_standoff=4, title_font_size=12, exponentformat="power", row=i, col=1
-            )
-        self.figure.update_xaxes(title_text="time [s]", row=len(rows), col=1)
-        self.figure.update_layout(title_text=title, height=130 + 170 * len(rows), showlegend=False)
-
-    def logarithmic(self, *rows: int) -> None:
-        for row in rows:
-            self.figure.update_yaxes(type="log", nticks=5, row=row, col=1)
-
-    def line(self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, **more: Any) -> None:
-        """One line of one engine into plot `row`, thinned; what is not finite is a gap."""
-        t = trace.run.t if t is None else t
-        if not len(t) or not np.isfinite(y).any():
-            return
-        at = keep(t, y, _instants(trace), self.points)
-        look = style(trace, i)
-        name = "" if row == 1 else str(row)
-        self.data.append(
-            {
-                "type": "scatter", "x": _times(t[at]), "y": y[at].astype(np.float32), "name": label(trace),
-                "meta": label(trace), "mode": "lines", "xaxis": f"x{name}", "yaxis": f"y{name}",
-                "line": {key: look[key] for key in ("color", "dash", "width")} | more,
-                "opacity": 0.65 if label(trace) == TRUTH else 1.0,
-            }
-        )  # fmt: skip
-
-    def done(self) -> go.Figure:
-        return go.Figure({"data": self.data, "layout": self.figure.layout}, skip_invalid=True)
-
-
-def _instants(trace: Trace, most: int = 40) -> Floats:
-    """Events around which all samples stay: the first of them where there are very many."""
-    return np.unique([e.t for e in trace.run.events])[:most]
-
-
-def _times(t: Floats) -> Floats:
-    """Times in single precision where nobody can see it."""
-    apart = np.diff(t)
-    smallest = np.min(apart[apart > 0.0], initial=np.inf)
-    return t.astype(np.float32) if smallest > FINE * abs(t[-1]) else t
 
 
 def floor_of(truth: Floats) -> float:
@@ -111,13 +56,13 @@ def _floors(traces: Sequence[Trace], units: Sequence[str]) -> dict[str, float]:
     return {unit: floor_of(q[:, [k for k, u in enumerate(units) if u == unit]]) for unit in units}
 
 
-def motion(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
+def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Every coordinate of every engine, and under it log |difference to the truth|, impacts matched."""
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
     floors = _floors(traces, [unit for _, unit in names])
     shown = drawn(len(names))
-    rows = [text for k in shown for text in ("{}<br>[{}]".format(*names[k]), f"|error|<br>[{names[k][1]}]")]
-    sheet = _Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points)
+    rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
+    sheet = Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points)
     for i, trace in enumerate(traces):
         t, q = filled(trace.run)
         for place, k in enumerate(shown):
@@ -129,13 +74,13 @@ def motion(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     return sheet.done()
 
 
-def force(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
+def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
     shown = drawn(len(contacts))
-    each = ("lam {}<br>[N]", "impulse<br>[N s]", "|error|<br>[N s]")
+    each = ("lam {}\n[N]", "impulse\n[N s]", "|error|\n[N s]")
     rows = [text.format(contacts[k]) for k in shown for text in each]
-    sheet = _Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points)
+    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points)
     summed = [cumulative(trace.run) for trace in traces]
     floor = floor_of(summed[0])
     true = [None if trace.truth is None else cumulative(trace.truth) for trace in traces]
@@ -152,10 +97,10 @@ def force(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     return sheet.done()
 
 
-def energy(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
+def energy(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Total energy, work of the contacts, and what neither they nor inputs nor damping explain."""
-    rows = ["total energy<br>[J]", "work of contacts<br>[J]", "|unexplained|<br>[J]"]
-    sheet = _Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points)
+    rows = ["total energy\n[J]", "work of contacts\n[J]", "|unexplained|\n[J]"]
+    sheet = Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points)
     floor = floor_of(traces[0].run.energy)
     for i, trace in enumerate(traces):
         run = trace.run
@@ -170,13 +115,13 @@ def energy(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     return sheet.done()
 
 
-def penetration(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
+def penetration(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Depth of every contact below its surface; |gap| of a row that is always on."""
     contacts = traces[0].about["contacts"]
     shown = drawn(len(contacts))
     always = [bool((traces[0].run.mode[:, k] == Mode.BILATERAL).all()) for k in shown]
-    rows = [f"{'|gap|' if on else 'depth'} {contacts[k]}<br>[m]" for k, on in zip(shown, always, strict=True)]
-    sheet = _Sheet(rows, "Penetration, and drift of rows that are always on", points)
+    rows = [f"{'|gap|' if on else 'depth'} {contacts[k]}\n[m]" for k, on in zip(shown, always, strict=True)]
+    sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points)
     for row, (k, on) in enumerate(zip(shown, always, strict=True), start=1):
         for i, trace in enumerate(traces):
             gap = trace.run.gap[:, k]
@@ -186,9 +131,9 @@ def penetration(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
     return sheet.done()
 
 
-def steps(traces: Sequence[Trace], points: int = POINTS) -> go.Figure:
+def steps(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Length of every step at its start: small while a collision lasts, large again when it is over."""
-    sheet = _Sheet(["step size [s]"], "Step size of each engine", points)
+    sheet = Sheet(["step size [s]"], "Step size of each engine", points)
     for i, trace in enumerate(traces):
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
         sheet.line(trace, i, 1, lengths, starts, shape="hv")
@@ -217,7 +162,7 @@ NOTES = {
     ),
     "force": "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that.",
 }
-FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int], go.Figure]]] = {
+FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int], Figure]]] = {
     "motion": ("Motion", motion),
     "force": ("Contact force", force),
     "energy": ("Energy", energy),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -11,12 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import plotly.graph_objects as go
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from crossbody.reports.section import Kind, Section
+from crossbody.reports.section import Figure, Kind, Section
 
 TEMPLATES = Path(__file__).parent / "templates"
 PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
@@ -113,11 +113,13 @@ def json_text(value: Any) -> Markup:
     return Markup(str(value).replace("<", "\\u003c"))
 
 
-def plot(figure: go.Figure) -> dict[str, Any]:
+def plot(figure: Figure) -> dict[str, Any]:
     """A figure as JSON, with its title and height taken out of it; the page gives it its colours."""
-    title, height = figure.layout.title.text, figure.layout.height
-    figure.update_layout(title_text="", template=None, margin={"l": 76, "r": 14, "t": 34, "b": 50})
-    return {"title": title, "height": height, "json": json_text(figure.to_json(engine="json"))}
+    made: dict[str, Any] = figure if isinstance(figure, dict) else json.loads(figure.to_json(engine="json"))
+    layout = {key: value for key, value in made["layout"].items() if key not in ("title", "template")}
+    layout["margin"] = {"l": 76, "r": 14, "t": 34, "b": 50}
+    text = json.dumps({"data": made["data"], "layout": layout}, separators=(",", ":"))
+    return {"title": made["layout"]["title"]["text"], "height": layout["height"], "json": json_text(text)}
 
 
 def file_name(label: str) -> str:

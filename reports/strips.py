@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from crossbody.cases import Mode, Trajectory
+from crossbody.reports.section import Figure
+from crossbody.reports.sheet import plain
 from crossbody.reports.store import Trace
 from crossbody.reports.styles import label
 
@@ -21,7 +22,7 @@ LONGEST = 150
 MOST_CONTACTS = 8
 
 
-def modes(traces: Sequence[Trace], points: int = LONGEST) -> go.Figure:
+def modes(traces: Sequence[Trace], points: int = LONGEST) -> Figure:
     """One strip a contact and engine."""
     contacts = list(enumerate(traces[0].about["contacts"][:MOST_CONTACTS]))
     shown: set[int] = set()
@@ -32,21 +33,21 @@ def modes(traces: Sequence[Trace], points: int = LONGEST) -> go.Figure:
                 name = label(trace) if len(contacts) == 1 else f"{contact}, {label(trace)}"
                 bars.append(_bar(trace, name, mode, spans[:LONGEST]) | {"showlegend": mode not in shown})
                 shown.add(mode)
-    figure = go.Figure({"data": bars}, skip_invalid=True)
-    height = 150 + 22 * len({bar["y"][0] for bar in bars})
-    figure.update_layout(
-        title_text="Modes of the state machine", barmode="overlay", height=height, bargap=0.25,
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom"},
-    )  # fmt: skip
-    figure.update_xaxes(title_text="time [s]", range=[0.0, float(traces[0].run.t[-1])])
-    figure.update_yaxes(automargin=True, tickfont={"size": 10})
-    return figure
+    layout = {
+        "title": {"text": "Modes of the state machine"}, "barmode": "overlay", "bargap": 0.25,
+        "height": 150 + 22 * len({bar["y"][0] for bar in bars}),
+        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
+        "xaxis": {"title": {"text": "time [s]"}, "range": [0.0, float(traces[0].run.t[-1])]},
+        "yaxis": {"automargin": True, "tickfont": {"size": 10}},
+    }  # fmt: skip
+    return {"data": bars, "layout": layout}
 
 
 def _bar(trace: Trace, name: str, mode: Mode, spans: Sequence[tuple[float, float]]) -> dict[str, Any]:
     starts, widths = np.array(spans).T
     return {
-        "type": "bar", "y": [name] * len(starts), "base": starts, "x": widths, "orientation": "h",
+        "type": "bar", "y": [plain(name)] * len(starts), "base": starts.tolist(), "x": widths.tolist(),
+        "orientation": "h",
         "marker": {"color": MODE_COLOURS[mode], "line": {"width": 0}}, "name": mode.name, "legendgroup": mode.name,
         "meta": label(trace),
         "hovertemplate": f"{mode.name} from %{{base:.9g}} s for %{{x:.6g}} s<extra></extra>",
