@@ -144,7 +144,7 @@ def stability(wanted: tuple[str, ...], out: Path) -> int:
 @cli.command()
 @click.argument("names", metavar="[SUITE]...", nargs=-1)
 @click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
-@click.option("--runs", type=int, metavar="N", help="Runs of the first engine in each suite.")
+@click.option("--runs", type=int, metavar="N", help="Runs of the first engine over all suites.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of every draw.")
 @click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")

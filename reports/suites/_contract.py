@@ -105,7 +105,7 @@ class Suite:
     Attributes:
         families: they share the runs evenly.
         engines: what runs it unless the user says otherwise; the first makes every run, the others a share.
-        runs: how many of the reference if nothing is said; at least one complete grid.
+        runs: of the first engine if nothing is said; also its share in a number for several suites: cheap scenes more.
     """
 
     families: tuple[Family, ...]

@@ -21,5 +21,5 @@ SUITE = Suite(
             fixed={"collisions": "resolved", "gap": 5e-3},
         ),
     ),
-    runs=90,
+    runs=24,
 )  # fmt: skip

@@ -31,5 +31,5 @@ SUITE = Suite(
         ),
     ),
     engines=("reference:compiled",),
-    runs=20,
+    runs=4,
 )  # fmt: skip

@@ -26,5 +26,5 @@ SUITE = Suite(
             axes={"a0": Log(1.0, 1e12), "zeta": Linear(0.0, 2.0), "height": Linear(-0.1, 0.0), "speed": Linear(-1, 1)},
         ),
     ),
-    runs=300,
+    runs=600,
 )  # fmt: skip

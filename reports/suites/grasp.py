@@ -15,5 +15,5 @@ SUITE = Suite(
             },
         ),
     ),
-    runs=30,
+    runs=20,
 )  # fmt: skip

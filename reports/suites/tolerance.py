@@ -38,5 +38,5 @@ SUITE = Suite(
             second=10,
         ),
     ),
-    runs=210,
+    runs=70,
 )  # fmt: skip

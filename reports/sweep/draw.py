@@ -106,7 +106,7 @@ def specs(
     Args:
         suites: names and suites.
         engines: name of a suite -> who runs it, the first of them all of it.
-        runs: of each suite; its own number if not given.
+        runs: of the first engine over all suites, shared as their own numbers are; these, if not given.
         seed: of the sweep.
         share: whether the engines behind the first make one run in `SHARE` only.
 
@@ -116,8 +116,10 @@ def specs(
     if runs is not None and runs < 1:
         raise InvalidValue(f"--runs is {runs}; a sweep needs at least 1.")
     found, number = [], count()
+    whole = sum(suite.runs for _, suite in suites)
     for name, suite in suites:
-        each = -(-(suite.runs if runs is None else runs) // len(suite.families))
+        own = suite.runs if runs is None else -(-runs * suite.runs // whole)
+        each = -(-own // len(suite.families))
         for place, family in enumerate(suite.families):
             drawn = list(scenes(name, family, place, each, seed))
             for i, pick in enumerate(engines[name]):

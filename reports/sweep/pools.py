@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -13,7 +14,7 @@ from crossbody.reports.sweep.spec import Spec
 
 Rows = list[dict[str, Any]]
 Chunk = tuple[int, Sequence[Spec]]
-ANSWER = 10.0
+ANSWER = 8.0
 """Time that a scheduler has to answer, s."""
 ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
 
@@ -86,7 +87,7 @@ def connect(address: str) -> Any:
     """A client of a dask.distributed cluster.
 
     Raises:
-        SchedulerUnavailable: if the package is not installed, or nothing answers at the address within 10 s.
+        SchedulerUnavailable: if the package is not installed, or nothing answers at the address in time.
     """
     try:
         from distributed import Client
@@ -95,6 +96,7 @@ def connect(address: str) -> Any:
             "--scheduler needs the package 'distributed', which is not installed: pip install 'crossbody[cluster]'."
         ) from None
     try:
+        asyncio.run(_greet(address))
         return Client(address, timeout=ANSWER, set_as_default=False)
     except (TimeoutError, OSError, ValueError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
@@ -102,6 +104,14 @@ def connect(address: str) -> Any:
             f"No dask scheduler answers at {address!r} within {ANSWER:g} s ({said}); "
             "start one with `dask scheduler`, and name it as tcp://HOST:PORT."
         ) from None
+
+
+async def _greet(address: str) -> None:
+    """Shake hands once: a client waits for ever for one that listens and says nothing."""
+    from distributed.comm import connect as reach
+
+    comm = await asyncio.wait_for(reach(address, timeout=ANSWER), ANSWER)
+    await comm.close()
 
 
 def cluster(chunks: Sequence[Chunk], client: Any) -> Iterator[tuple[int, Rows]]:
