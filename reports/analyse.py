@@ -260,7 +260,7 @@ def root_locus(
 
 
 def workspace(
-    case: Case, points: int = 61, depths: Sequence[float] = (0.30, 0.75), reach: float = 0.30
+    case: Case, points: int = 61, depths: tuple[float, float] = (0.30, 0.75), reach: float = 0.30
 ) -> pd.DataFrame:
     """Open-loop stability of the delta robot over the plane y = 0 of its workspace, held by constant torques.
 
@@ -280,7 +280,10 @@ def workspace(
     if case.mechanism != "delta":
         raise CaseUnsupported(f"There is a map of the workspace for the delta robot, not for {case.mechanism!r}.")
     robot = scene.robot_of(case.parameters)
-    x, z = (grid.ravel() for grid in np.meshgrid(np.linspace(-reach, reach, points), np.linspace(*depths, points)))
+    x, z = (
+        grid.ravel()
+        for grid in np.meshgrid(np.linspace(-reach, reach, points), np.linspace(depths[0], depths[1], points))
+    )
     q, there = delta.inverses(robot, np.column_stack([x, 0.0 * x, z]))
     growth, count = np.full(len(x), np.nan), np.zeros(len(x), dtype=int)
     found = poses(delta.system(robot, p=case.number("p")), q[there], [0, 1, 2])

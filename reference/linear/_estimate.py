@@ -106,7 +106,7 @@ def balanced(
     for k in range(len(Q)):
         at = record.at(k, Q[k], V[k])
         E, e, M = _imbalance(at, record, VD[k])
-        first = np.linalg.lstsq(E, e, rcond=None)[0]
+        first: Floats = np.linalg.lstsq(E, e, rcond=None)[0].astype(np.float64)
         J = _noise_paths(at, record, VD[k], first, M)
         W = J * np.concatenate([spread, inputs])
         left, size, _ = np.linalg.svd(W @ W.T)

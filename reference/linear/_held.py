@@ -18,7 +18,7 @@ from numba import types
 from crossbody.reference import kernels
 from crossbody.reference._cache import compiled
 from crossbody.reference._kinds import Array, Bytes, Floats, Index
-from crossbody.reference.linear._compiled import AGREE, FOUND, ILL_POSED, MISSED, STEP, spread, steps
+from crossbody.reference.linear._compiled import FOUND, ILL_POSED, MISSED, STEP, agrees, spread, steps
 
 
 @compiled
@@ -172,13 +172,8 @@ def held(
                     total += H[a, i].imag * lam[s, a]
                 packed[c, i] = total / STEP
         spread(packed, colours, pattern, F)
-        for i in range(n):
-            total, size = 0.0, 0.0
-            for j in range(2 * n):
-                total += F[i, j] * probe[j]
-                size += abs(F[i, j] * probe[j])
-            if not abs(total - packed[count, i]) <= AGREE * (size + abs(packed[count, i])):
-                codes[s] = MISSED
+        if not agrees(F, probe, packed[count]):
+            codes[s] = MISSED
         for part in range(3):
             projected(T, mass if part == 0 else F[:, (part - 1) * n : part * n].copy(), small)
             for a in range(m):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,7 +65,7 @@ class LinearModel:
             EngineUnavailable: if the package `control` is not installed.
         """
         try:
-            import control
+            control = import_module("control")
         except ImportError:
             raise EngineUnavailable("python-control is not installed: pip install control.") from None
         names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}

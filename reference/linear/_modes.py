@@ -83,13 +83,13 @@ def _span(columns: Floats, known: Floats, scale: float, tolerance: float) -> Flo
 def controllable(model: LinearModel, tolerance: float = RANK) -> int:
     """Number of states that the inputs reach; states are scaled to like sizes first."""
     scale = _scales(model.A)
-    return reached(model.A * scale / scale[:, None], model.B / scale[:, None], tolerance).shape[1]
+    return int(reached(model.A * scale / scale[:, None], model.B / scale[:, None], tolerance).shape[1])
 
 
 def observable(model: LinearModel, tolerance: float = RANK) -> int:
     """Number of states that the outputs show."""
     scale = _scales(model.A)
-    return reached((model.A * scale / scale[:, None]).T, (model.C * scale).T, tolerance).shape[1]
+    return int(reached((model.A * scale / scale[:, None]).T, (model.C * scale).T, tolerance).shape[1])
 
 
 def _scales(A: Floats) -> Floats:

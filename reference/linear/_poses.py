@@ -12,7 +12,7 @@ from crossbody.cases import SceneError
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear import _held
-from crossbody.reference.linear._compiled import FOUND, MISSED
+from crossbody.reference.linear._compiled import FOUND, ILL_POSED, MISSED
 from crossbody.reference.linear._derivatives import Point
 from crossbody.reference.linear._many import first, shared, states
 from crossbody.reference.linear._pattern import Pattern, coloured, dense, observed
@@ -105,7 +105,7 @@ def _evaluated(
             pattern.nonzero, pattern.probe, u[a:b], lam[a:b], basis[a:b], A[a:b], codes[a:b],
         )  # fmt: skip
         bad = ~np.isfinite(A[a:b]).all(axis=(1, 2))
-        codes[a:b][bad], A[a:b][bad] = _held.ILL_POSED, 0.0
+        codes[a:b][bad], A[a:b][bad] = ILL_POSED, 0.0
         values[a:b] = np.linalg.eigvals(A[a:b])
 
     shared(part, count, threads)

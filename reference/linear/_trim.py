@@ -120,7 +120,7 @@ def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float]:
             J[:, k] = _balance(at, moved)[0].imag / STEP
         if not np.isfinite(J).all():
             return Outcome.ILL_POSED, left
-        step = np.linalg.lstsq(J / size[:, None], -value / size, rcond=1e-12)[0]
+        step: Floats = np.linalg.lstsq(J / size[:, None], -value / size, rcond=1e-12)[0].astype(np.float64)
         better = _searched(at, x, unknown, step, left, least)
         if better is None:
             break

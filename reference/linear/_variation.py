@@ -108,12 +108,14 @@ def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
 
     def elastic(here: Point, q: Array, v: Array) -> Array:
         h = gaps(here, q, v)[[i, i + at.system.nc]]
-        return b0 * signs[0] * h[:1] + b1 * signs[1] * h[1:]
+        part: Array = b0 * signs[0] * h[:1] + b1 * signs[1] * h[1:]
+        return part
 
     def mobility(here: Point, q: Array, v: Array) -> Array:
         blocks, _, H, _, _ = terms(here, q, v, at.u)
         G = H @ np.linalg.solve(dense(blocks), H.T)
-        return 1.0 / np.linalg.inv(G)[j, j : j + 1]
+        share: Array = 1.0 / np.linalg.inv(G)[j, j : j + 1]
+        return share
 
     share = mobility(at, at.q, at.v)[0].real
     change = gradient(elastic, at, over)[0] - HANDOVER * lam[j] * gradient(mobility, at, over)[0]
