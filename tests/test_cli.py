@@ -179,6 +179,6 @@ def test_bench_times_every_rung(capsys: pytest.CaptureFixture[str]) -> None:
     assert (rows["repeats"] == 2).all()
     assert (rows["median_ms"] > 0).all()
     orders = pd.read_parquet("out/orders.parquet").set_index("profile")["says"]
-    assert orders["exact"] == "too few points above rounding"
+    assert orders["exact"] == "exact at every setting"
     assert orders["off"] == "does not converge to the truth of the case"
     assert "work-precision" in Path("out/index.html").read_text()
