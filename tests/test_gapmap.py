@@ -103,7 +103,7 @@ def test_the_command_writes_table_and_page(tmp_path: Path, capsys: pytest.Captur
     assert len(table) == 8
     assert len(pd.read_csv(out / "gapmap.csv")) == 8
     page = (out / "index.html").read_text(encoding="utf-8")
-    assert 'id="gapmap"' in page
+    assert 'id="index--gapmap"' in page
     assert "Gap map" in page
 
 

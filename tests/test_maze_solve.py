@@ -190,7 +190,7 @@ def test_map_is_a_command_with_a_section_of_the_page(tmp_path, monkeypatch, caps
     said = capsys.readouterr().out
     assert "outside: reference:compiled t_end = 2: solved expected." in said
     page = (tmp_path / "out" / "index.html").read_text()
-    assert 'id="stability"' in page
+    assert 'id="index--stability"' in page
     assert "omega = 0.8" in page
     kept = json.loads((tmp_path / "out" / "stability.json").read_text())["rows"]
     assert [row["arrived"] for row in kept] == [True, True, False]
