@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import numpy as np
@@ -194,8 +195,11 @@ def test_step_size_recovers_after_each_transient() -> None:
 def test_the_report_draws_the_step_size() -> None:
     found = run(load("red_body"))
     about = {"engine": "reference", "profile": "compiled", "steps": _steps(found.t)}
-    figure = FIGURES["steps"]([Trace(about=about, run=found)])
-    (line,) = figure.data
-    starts, lengths = np.array(line.x), np.array(line.y)
-    np.testing.assert_allclose(starts + lengths, np.unique(found.t)[1:], rtol=1e-12)
-    assert figure.layout.yaxis.type == "log"
+    title, draw = FIGURES["steps"]
+    figure = draw([Trace(about=about, run=found)], len(found.t))
+    (line,) = figure["data"]
+    starts, lengths = (np.frombuffer(base64.b64decode(line[axis]["bdata"]), line[axis]["dtype"]) for axis in "xy")
+    assert title == "Step size"
+    np.testing.assert_allclose(starts, np.unique(found.t)[:-1], rtol=1e-7)
+    np.testing.assert_allclose(lengths, np.diff(np.unique(found.t)), rtol=1e-7)
+    assert figure["layout"]["yaxis"]["type"] == "log"
