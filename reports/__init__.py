@@ -6,10 +6,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from crossbody.reports.comparison import Entry, compare
-    from crossbody.reports.truth import Truth, truth_of
+    from crossbody.reports.judging.comparison import Entry, compare
+    from crossbody.reports.judging.truth import Truth, truth_of
 
-_LAZY = {"compare": "comparison", "Entry": "comparison", "Truth": "truth", "truth_of": "truth"}
+_LAZY = {
+    "compare": "judging.comparison",
+    "Entry": "judging.comparison",
+    "Truth": "judging.truth",
+    "truth_of": "judging.truth",
+}
 
 __all__ = ["Entry", "Truth", "compare", "truth_of"]
 

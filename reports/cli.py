@@ -16,7 +16,7 @@ from typing import TypeVar
 import click
 
 from crossbody.cases import CrossbodyError
-from crossbody.reports.replay_cli import identify, replay
+from crossbody.reports.replay.cli import identify, replay
 from crossbody.reports.voice import as_json, quiet, speaks
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
@@ -102,7 +102,7 @@ def bench(
 
     With --against the exit code is 1 if accuracy or a ratio of run times was lost.
     """
-    from crossbody.reports import bench_command as work
+    from crossbody.reports.bench import command as work
 
     if what is not None:
         return work.alone(what, (names, wanted, variant, pairs, full, against), repeats, out, _command())
@@ -173,7 +173,7 @@ def stress(
 @speaks
 def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
     """Frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
-    from crossbody.reports.bode_command import bode as work
+    from crossbody.reports.analysis.bode_command import bode as work
 
     return work(name, pairs, out, _command())
 
@@ -193,7 +193,7 @@ def analyse(
     mapped: bool, out: Path | None,
 ) -> int:  # fmt: skip
     """Equilibria of a case, their linear models, poles, ranks, responses and maps."""
-    from crossbody.reports.analyse_command import analyse as work
+    from crossbody.reports.analysis.command import analyse as work
 
     return work(
         name, variant, pairs, at, bode=bode, locus=locus, mapped=mapped, out=out, command=_command()
@@ -207,7 +207,7 @@ def analyse(
 @speaks
 def report(folder: Path, single_file: bool, against: Path | None) -> int:
     """Make the pages of an earlier run again."""
-    from crossbody.reports import page
+    from crossbody.reports.pages import site as page
 
     made = page.write(folder, single_file=single_file, against=against).absolute()
     if as_json():
@@ -234,7 +234,7 @@ def log() -> None:
 @speaks
 def log_info(path: Path, columns: str | None, part: int | None, draft: bool) -> int:
     """Show channels, rates, gaps and ranges of LOG, what is wrong with it, and a draft of a column map."""
-    from crossbody.reports.log import info
+    from crossbody.reports.replay.log import info
 
     return info(path, columns, part, draft)
 

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from crossbody import engines
 from crossbody.cases import Case, InvalidValue
-from crossbody.reports import jobs, output, page, study, voice
-from crossbody.reports.audit import SEED
-from crossbody.reports.provenance import provenance
-from crossbody.reports.verdict import Word, exit_code
+from crossbody.reports import voice
+from crossbody.reports.judging.audit import SEED
+from crossbody.reports.judging.verdict import Word, exit_code
+from crossbody.reports.pages import site as page
+from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.voice import progress
 
 if TYPE_CHECKING:
@@ -55,7 +57,7 @@ def run(
 
 def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
     """Run the sliders over all gaps; writes the table and the page."""
-    from crossbody.reports import gapmap
+    from crossbody.reports.maps import gapmap
 
     picks = jobs.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
     output.check(out)
@@ -73,7 +75,7 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
 
 def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     """Run the closed-loop maze with one thing changed at a time; writes the table and the page."""
-    from crossbody.reports import stability
+    from crossbody.reports.maps import stability
 
     picks = jobs.picks(wanted) if wanted else (stability.DEFAULT,)
     output.check(out)

@@ -23,7 +23,7 @@ from crossbody.reference.linear import (
     tangents,
     trim,
 )
-from crossbody.reports import analyse
+from crossbody.reports.analysis import numbers as analyse
 
 RNG = np.random.default_rng(27)
 
@@ -292,7 +292,7 @@ def test_every_place_of_a_case_is_an_equilibrium(name, variant):
 
 
 def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
-    from crossbody.reports.analyse_command import analyse as command
+    from crossbody.reports.analysis.command import analyse as command
 
     out = tmp_path / "out"
     common = {"bode": True, "mapped": False, "out": out, "command": "crossbody analyse"}

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, Trajectory
+from crossbody.reports.judging.truth import sample_times
 from crossbody.reports.testing import Baseline, assert_agrees, assert_energy
 from crossbody.reports.testing._baseline import place
-from crossbody.reports.truth import sample_times
 
 Floats = NDArray[np.float64]
 BALL = cases.load("bouncing_ball", variant="linear", t_end=1.5)

@@ -13,15 +13,15 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, OutputError, Trajectory
-from crossbody.reports import bench_against
-from crossbody.reports.bench import COLUMNS, Effort, bench, joined
-from crossbody.reports.bench_headline import headline
-from crossbody.reports.bench_order import says
-from crossbody.reports.bench_scenes import DROP, QUICK
-from crossbody.reports.bench_throughput import best_pair
+from crossbody.reports.bench import against as bench_against
+from crossbody.reports.bench.headline import headline
+from crossbody.reports.bench.ladder import COLUMNS, Effort, bench, joined
+from crossbody.reports.bench.order import says
+from crossbody.reports.bench.scenes import DROP, QUICK
+from crossbody.reports.bench.throughput import best_pair
 from crossbody.reports.cli import main
-from crossbody.reports.jobs import Pick
-from crossbody.reports.truth import truth_of
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.runs.jobs import Pick
 
 ORDERS = {"second": 2.0, "liar": 4.0, "fails": 1.0}
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from crossbody.reports import bench_skip, bench_throughput
-from crossbody.reports.bench import Effort, bench
-from crossbody.reports.bench_headline import headline
-from crossbody.reports.bench_scenes import DROP, PAIR, picks
+from crossbody.reports.bench import skip as bench_skip
+from crossbody.reports.bench import throughput as bench_throughput
+from crossbody.reports.bench.headline import headline
+from crossbody.reports.bench.ladder import Effort, bench
+from crossbody.reports.bench.scenes import DROP, PAIR, picks
 
 pytestmark = pytest.mark.bench
 FASTER = 30.0

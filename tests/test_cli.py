@@ -16,7 +16,7 @@ import pytest
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory, UnknownName
 from crossbody.reports.cli import main
-from crossbody.reports.truth import truth_of
+from crossbody.reports.judging.truth import truth_of
 
 
 @dataclass
@@ -89,7 +89,7 @@ def test_an_engine_without_its_package_is_skipped_with_its_sentence(capsys: pyte
 
 
 def test_a_case_that_an_engine_cannot_do_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("crossbody.reports.jobs.truth_of", lambda case: truth_of(replace(case, closed_form=LAW)))
+    monkeypatch.setattr("crossbody.reports.runs.jobs.truth_of", lambda case: truth_of(replace(case, closed_form=LAW)))
     assert call("run", "--variant", "listing", "-e", "fake:exact") == 0
     rows = pd.read_parquet("out/verdicts.parquet")
     assert rows["why"].tolist() == ["The fake engine knows closed forms only."]

@@ -10,7 +10,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode
 from crossbody.engines._cradle import in_real_time
-from crossbody.reports.audit import audit
+from crossbody.reports.judging.audit import audit
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pinocchio")

@@ -10,8 +10,8 @@ import pytest
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
 from crossbody.cases._cradle_rules import answer
 from crossbody.reports import metrics
+from crossbody.reports.judging.truth import from_run
 from crossbody.reports.metrics._cradle import row
-from crossbody.reports.truth import from_run
 
 PATTERNS = {
     "pattern_distance": "sequential", "pattern_simultaneous": "simultaneous", "pattern_linear": "linear",

@@ -22,10 +22,10 @@ from crossbody.engines import load as engine
 from crossbody.reference import Options, prepare
 from crossbody.reference.systems import sliders
 from crossbody.reports import metrics
-from crossbody.reports.gapmap import over
+from crossbody.reports.judging.truth import PARTED, from_run, truth_of
+from crossbody.reports.maps.gapmap import over
 from crossbody.reports.metrics._cradle import row
 from crossbody.reports.metrics._switching import made
-from crossbody.reports.truth import PARTED, from_run, truth_of
 
 
 def run(case: Case, **settings: Any) -> Trajectory:

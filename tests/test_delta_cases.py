@@ -16,9 +16,9 @@ from crossbody.reference.delta.kinematics import tips
 from crossbody.reference.delta.singularity import hanging_pose
 from crossbody.reference.delta.statics import closure_jacobian, gravity_gradient
 from crossbody.reports.cli import main
-from crossbody.reports.comparison import compare
+from crossbody.reports.judging.comparison import compare
+from crossbody.reports.judging.truth import from_run
 from crossbody.reports.metrics import load as metric
-from crossbody.reports.truth import from_run
 
 REFERENCE = engines.load("reference")
 each_impulse = pytest.mark.parametrize("variant", cases.variants("delta_impulse"))
@@ -182,7 +182,7 @@ def test_sampled_control_is_the_same_in_every_engine() -> None:
 
 
 def test_truth_of_a_chaotic_fall_is_trusted_until_its_sources_part() -> None:
-    from crossbody.reports.truth import truth_of
+    from crossbody.reports.judging.truth import truth_of
 
     case = load("delta_free", "undamped")
     truth = truth_of(case)

@@ -11,10 +11,10 @@ import pytest
 
 from crossbody import engines
 from crossbody.cases import EngineUnavailable
-from crossbody.reports import gapmap
 from crossbody.reports.cli import main
-from crossbody.reports.gapmap_figure import gap_map as figure
-from crossbody.reports.jobs import Pick, picks
+from crossbody.reports.maps import gapmap
+from crossbody.reports.maps.gapmap_figure import gap_map as figure
+from crossbody.reports.runs.jobs import Pick, picks
 
 REFERENCE = Pick(engine="reference", profile="compiled")
 

@@ -13,7 +13,7 @@ from crossbody.engines._maze_machine import MazeMachine
 from crossbody.engines._maze_rows import MazeRows, Place
 from crossbody.engines._maze_scene import ball_maze
 from crossbody.reports import metrics
-from crossbody.reports.audit import audit
+from crossbody.reports.judging.audit import audit
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pinocchio")

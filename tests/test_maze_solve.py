@@ -14,7 +14,9 @@ from crossbody.cases import _closed_forms as cf
 from crossbody.cases import _maze_closed_forms as maze_forms
 from crossbody.reference import simulate
 from crossbody.reference.systems import maze
-from crossbody.reports import commands, jobs, metrics, stability
+from crossbody.reports import commands, metrics
+from crossbody.reports.maps import stability
+from crossbody.reports.runs import jobs
 
 CHANNEL, LOWER, UPPER, MODE = range(4)
 BALANCE, SNATCH, CENTRE = 1, 2, 3

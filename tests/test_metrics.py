@@ -9,9 +9,9 @@ import pytest
 
 from crossbody.cases import Case, Ledger, Tier, Trajectory, load
 from crossbody.reports import metrics
+from crossbody.reports.judging.truth import Truth, from_run, sample_times, truth_of
 from crossbody.reports.metrics._align import clock
 from crossbody.reports.metrics._contacts import contacts
-from crossbody.reports.truth import Truth, from_run, sample_times, truth_of
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from crossbody.cases import OutputError, load
-from crossbody.reports.output import MARKER, check, folder, replace_text
-from crossbody.reports.store import Trace, save
-from crossbody.reports.store import load as load_trace
-from crossbody.reports.truth import truth_of
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.runs.output import MARKER, check, folder, replace_text
+from crossbody.reports.runs.store import Trace, save
+from crossbody.reports.runs.store import load as load_trace
 
 
 def names(path: Path) -> list[str]:

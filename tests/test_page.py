@@ -19,17 +19,19 @@ import plotly.graph_objects as go
 import pytest
 
 from crossbody.cases import OutputError, load
-from crossbody.reports import figures, page, study
-from crossbody.reports.bench import observed_order
-from crossbody.reports.comparison import Entry, table
-from crossbody.reports.filled import filled
-from crossbody.reports.html import file_name
-from crossbody.reports.jobs import CaseResult
-from crossbody.reports.output import folder
-from crossbody.reports.section import Kind, Plot, Section, Table, columns
-from crossbody.reports.thin import keep
-from crossbody.reports.truth import truth_of
-from crossbody.reports.verdict import Verdict, Word
+from crossbody.reports.bench.order import observed_order
+from crossbody.reports.judging.comparison import Entry, table
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.pages import figures
+from crossbody.reports.pages import site as page
+from crossbody.reports.pages.filled import filled
+from crossbody.reports.pages.html import file_name
+from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns
+from crossbody.reports.pages.thin import keep
+from crossbody.reports.runs import study
+from crossbody.reports.runs.jobs import CaseResult
+from crossbody.reports.runs.output import folder
 
 HOSTILE = "<script>alert(1)</script>"
 LIMIT = 1.5e6
@@ -278,7 +280,7 @@ def test_results_of_another_version_are_told(tmp_path: Path, result: CaseResult)
 
 def test_a_page_needs_no_engine(out: Path) -> None:
     code = (
-        "import sys; from pathlib import Path; from crossbody.reports import page; page.write(Path(sys.argv[1])); "
+        "import sys; from pathlib import Path; from crossbody.reports.pages import site; site.write(Path(sys.argv[1])); "
         "print(sorted({'mujoco', 'pinocchio', 'sksundae', 'numba'} & set(sys.modules)))"
     )
     said = subprocess.run([sys.executable, "-c", code, str(out)], capture_output=True, text=True, check=True).stdout

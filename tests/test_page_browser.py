@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from crossbody.cases import load
-from crossbody.reports import page, study
-from crossbody.reports.comparison import Entry
-from crossbody.reports.jobs import CaseResult
-from crossbody.reports.output import folder
-from crossbody.reports.truth import truth_of
+from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.pages import site as page
+from crossbody.reports.runs import study
+from crossbody.reports.runs.jobs import CaseResult
+from crossbody.reports.runs.output import folder
 
 pytestmark = [
     pytest.mark.browser,

@@ -10,9 +10,10 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import Case, Trajectory
-from crossbody.reports import scenes, study
-from crossbody.reports.playback import chosen, packed, peaks, playback
-from crossbody.reports.store import Trace
+from crossbody.reports import scenes
+from crossbody.reports.pages.playback import chosen, packed, peaks, playback
+from crossbody.reports.runs import study
+from crossbody.reports.runs.store import Trace
 
 CASES = (
     ("bouncing_ball", "listing"), ("newtons_cradle", "sliders"), ("newtons_cradle", "pendulums"),

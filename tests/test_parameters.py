@@ -8,7 +8,7 @@ import pytest
 
 from crossbody.cases import InvalidValue
 from crossbody.cases._parameters import NumberOrWord, Numbers, spread
-from crossbody.reports.jobs import parse_settings
+from crossbody.reports.runs.jobs import parse_settings
 
 MASSES = Numbers(default="0.1", unit="kg", low=0.0, open_low=True)
 HORIZON = NumberOrWord(default="auto", unit="s", low=0.0, open_low=True, choices=("auto",))

@@ -13,8 +13,8 @@ from crossbody.cases import CaseUnsupported, EngineUnavailable, Mode, Outcome
 from crossbody.engines._line import line
 from crossbody.engines._peer import ended, sampled
 from crossbody.reports import metrics
-from crossbody.reports.audit import audit
-from crossbody.reports.truth import law_of
+from crossbody.reports.judging.audit import audit
+from crossbody.reports.judging.truth import law_of
 
 PACKAGES = {"exudyn": "exudyn", "drake": "pydrake", "dart": "dartpy", "pymunk": "pymunk"}
 LAW = ("exudyn", "drake")

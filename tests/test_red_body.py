@@ -12,9 +12,9 @@ from crossbody import cases
 from crossbody.cases import InvalidValue, Mode, SceneError, Trajectory, load
 from crossbody.cases._red_body_order import LEFT, RIGHT, Fall
 from crossbody.reference import System
-from crossbody.reports.comparison import compare
+from crossbody.reports.judging.comparison import compare
+from crossbody.reports.judging.truth import from_run
 from crossbody.reports.metrics import load as metric
-from crossbody.reports.truth import from_run
 
 TINY = 1e-30
 

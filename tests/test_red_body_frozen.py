@@ -13,9 +13,9 @@ from crossbody.cases import Case, Mode, Trajectory, load
 from crossbody.cases._red_body_order import LEFT, RIGHT, Fall, stages_in_order
 from crossbody.reference import System, simulate
 from crossbody.reference.systems import red_body as kernels
-from crossbody.reports.figures import FIGURES
-from crossbody.reports.store import Trace
-from crossbody.reports.study import _steps
+from crossbody.reports.pages.figures import FIGURES
+from crossbody.reports.runs.store import Trace
+from crossbody.reports.runs.study import _steps
 
 
 def test_frozen_run_is_the_closed_form_of_the_box_alone() -> None:

@@ -10,7 +10,7 @@ import pytest
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, Mode, Outcome
 from crossbody.engines import load
-from crossbody.reports.audit import audit
+from crossbody.reports.judging.audit import audit
 
 PROBED = {"probe": 0.01, "probe_rate": 20.0, "release": 3.5, "rate_share": 0.5, "t_end": 4.0}
 QUICK = {"close_start": 0.1, "close_end": 0.5, "release": 0.7, "release_time": 0.3, "t_end": 1.0}

@@ -13,7 +13,7 @@ from crossbody.cases import _soft_closed_forms as closed
 from crossbody.cases._soft_scene import numbers
 from crossbody.reference import simulate
 from crossbody.reference.systems import soft_contact as mechanism
-from crossbody.reports import bode
+from crossbody.reports.analysis import bode
 
 W = [0.5, 2.0, 10.0, 30.0, 60.0, 300.0, 2000.0]
 FORCE = {
@@ -167,7 +167,7 @@ def test_linear_stability_does_not_show_a_stable_approach():
 
 
 def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
-    from crossbody.reports.bode_command import bode as command
+    from crossbody.reports.analysis.bode_command import bode as command
 
     out = tmp_path / "out"
     assert command("soft_contact", ["ks=50"], out, "crossbody bode soft_contact") == 0

@@ -18,7 +18,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, InvalidValue, Outcome, SceneError, Trajectory, UnknownName
 from crossbody.reports import suites
-from crossbody.reports.jobs import Pick
+from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.suites._axis import Levels, Linear, Log, Whole, decades
 from crossbody.reports.suites._contract import Family, Ladder, Suite
 from crossbody.reports.sweep import draw

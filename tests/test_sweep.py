@@ -142,7 +142,7 @@ def balls(runs: int, **changed: Any) -> list[Spec]:
 
 
 def plan_picks() -> Any:
-    from crossbody.reports.jobs import picks
+    from crossbody.reports.runs.jobs import picks
 
     return picks(["reference:compiled"])
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
-from crossbody.reports.audit import audit, difference
-from crossbody.reports.comparison import Entry, compare
-from crossbody.reports.truth import truth_of
-from crossbody.reports.verdict import Word, exit_code, judge, limit_for
+from crossbody.reports.judging.audit import audit, difference
+from crossbody.reports.judging.comparison import Entry, compare
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Word, exit_code, judge, limit_for
 
 LIMIT = Limit(metric="position", value=1e-3, why="because")
 KNOWN = replace(LIMIT, known="it is known to do that")

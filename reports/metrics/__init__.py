@@ -15,7 +15,7 @@ from crossbody.cases import _registry
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 
 class Metric(Protocol):

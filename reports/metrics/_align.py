@@ -17,7 +17,7 @@ from crossbody.cases._trajectory import Trajectory
 from crossbody.reports.metrics._contacts import Contact, contacts
 
 if TYPE_CHECKING:
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 _Pairs = list[tuple[Contact, Contact]]
 

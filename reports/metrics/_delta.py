@@ -9,7 +9,7 @@ from crossbody.reports.metrics._align import aligned
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 
 def is_delta(case: Case) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.reports._between import between
+from crossbody.reports.judging._between import between
 
 if TYPE_CHECKING:
     from crossbody.cases import Trajectory

@@ -8,7 +8,7 @@ from crossbody.reports.metrics._soft import imbalance
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 UNIT = "N"
 CLAIMED = True

@@ -10,7 +10,7 @@ from crossbody.reports.metrics._align import matched
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 UNIT = "s"
 CLAIMED = False

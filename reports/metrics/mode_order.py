@@ -8,7 +8,7 @@ from crossbody.cases._red_body_order import stages_in_order
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 UNIT = "1"
 CLAIMED = True

@@ -8,7 +8,7 @@ from crossbody.reports.metrics._cradle import distance
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

@@ -10,7 +10,7 @@ from crossbody.reports.metrics._align import aligned
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

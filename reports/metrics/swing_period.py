@@ -12,7 +12,7 @@ from crossbody.reports.metrics._maze import is_maze
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 UNIT = "s"
 CLAIMED = True

@@ -10,7 +10,7 @@ from crossbody.reports.metrics._soft import invariant, is_soft
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.truth import Truth
+    from crossbody.reports.judging.truth import Truth
 
 UNIT = "m"
 CLAIMED = True

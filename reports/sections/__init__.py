@@ -5,7 +5,7 @@ A module has a docstring whose first line says what it shows, and the public nam
     TITLE                           heading of its page and of the link to it
     sections(out)                   tuple of `Section`; empty where the folder has no such data
 
-It reads tables only (`crossbody.reports.study.read_json`), never an engine: a page can be made again years later.
+It reads tables only (`crossbody.reports.runs.study.read_json`), never an engine: a page can be made again years later.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from crossbody.cases import _registry
-from crossbody.reports.section import Section
+from crossbody.reports.pages.section import Section
 
 
 class Study(Protocol):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.study import read_json
+from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
 
 TITLE = "Equilibria and linear models"
 TEXT = (
@@ -26,7 +26,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     """One section, if there is an analysis."""
     if not (out / f"{PREFIX}ranks.json").is_file():
         return ()
-    from crossbody.reports import analyse_figure as draw
+    from crossbody.reports.analysis import figure as draw
 
     drawn = {
         "poles": draw.pole_figure, "locus": draw.locus_figure, "responses": draw.response_figure,

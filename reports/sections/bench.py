@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.study import read_json
+from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
 
 TITLE = "Run time"
 TEXT = (
@@ -35,7 +35,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     """One section, if anything was timed."""
     if not (out / "bench.json").is_file():
         return ()
-    from crossbody.reports.bench_figure import work_precision
+    from crossbody.reports.bench.figure import work_precision
 
     rows, orders = (_named(pd.DataFrame(read_json(out / f"{name}.json")["rows"])) for name in ("bench", "orders"))
     tables = (

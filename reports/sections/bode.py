@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.study import read_json
+from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
 
 TITLE = "Frequency responses"
 TEXT = (
@@ -24,8 +24,8 @@ def sections(out: Path) -> tuple[Section, ...]:
     """One section, if there are responses."""
     if not (out / "bode.json").is_file():
         return ()
-    from crossbody.reports.bode import growths
-    from crossbody.reports.bode_figure import bode
+    from crossbody.reports.analysis.bode import growths
+    from crossbody.reports.analysis.bode_figure import bode
 
     rows, poles = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("bode", "poles"))
     table = Table(title="Poles of the soft contact", columns=COLUMNS, rows=records(growths(poles)), file="poles.csv")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.study import read_json
+from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
 
 TITLE = "Gap map"
 TEXT = (
@@ -26,8 +26,8 @@ def sections(out: Path) -> tuple[Section, ...]:
     """One section, if there is a map."""
     if not (out / "gapmap.json").is_file():
         return ()
-    from crossbody.reports.gapmap import summary
-    from crossbody.reports.gapmap_figure import gap_map
+    from crossbody.reports.maps.gapmap import summary
+    from crossbody.reports.maps.gapmap_figure import gap_map
 
     rows = pd.DataFrame(read_json(out / "gapmap.json")["rows"])
     lines = summary(rows)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.section import Kind, Section, Table, columns, records
-from crossbody.reports.study import read_json
+from crossbody.reports.pages.section import Kind, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
 
 TITLE = "Identification"
 ESTIMATES = columns(

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.study import read_json
+from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
 
 TITLE = "Replay"
 TEXT = (
@@ -27,7 +27,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     """One section, if a log was replayed."""
     if not (out / "replay.json").is_file():
         return ()
-    from crossbody.reports.replay_figure import correlation, residual
+    from crossbody.reports.replay.figure import correlation, residual
 
     metrics, found, left, correlated = (
         pd.DataFrame(read_json(out / f"{name}.json")["rows"])

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.study import read_json
+from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
 
 TITLE = "Stability map"
 TEXT = (
@@ -24,7 +24,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     """One section, if there is a map."""
     if not (out / "stability.json").is_file():
         return ()
-    from crossbody.reports.stability_figure import stability
+    from crossbody.reports.maps.stability_figure import stability
 
     rows = pd.DataFrame(read_json(out / "stability.json")["rows"])
     plot = Plot(name="stability-map", figure=stability(rows))

@@ -14,15 +14,17 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from crossbody.cases import InvalidValue, OutputError
-from crossbody.reports import jobs, page, study, suites, voice
-from crossbody.reports.provenance import provenance
+from crossbody.reports import suites, voice
+from crossbody.reports.judging.verdict import exit_code
+from crossbody.reports.pages import site as page
+from crossbody.reports.runs import jobs, study
+from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.suites._contract import Suite
 from crossbody.reports.sweep import draw, pools
 from crossbody.reports.sweep.map import STABILITY, stability_map, summary
 from crossbody.reports.sweep.minimise import failures, reproducers
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.store import SWEEP, Store, identity
-from crossbody.reports.verdict import exit_code
 
 if TYPE_CHECKING:
     from collections.abc import Callable

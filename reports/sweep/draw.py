@@ -16,7 +16,7 @@ from scipy.stats import qmc
 
 from crossbody.cases import InvalidValue, UnknownName, Value
 from crossbody.cases._load import module
-from crossbody.reports.jobs import Pick
+from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.suites._contract import Family, Suite
 from crossbody.reports.sweep.spec import Spec
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, EngineUnavailable, Outcome, Trajectory, UnknownName
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.bounds import Overdue, bounded, killed, overheard
 from crossbody.reports.sweep.measure import Error, against_closed_form, against_second, instants, residual
 from crossbody.reports.sweep.spec import Spec
-from crossbody.reports.verdict import Word
 
 ACCOUNT = 10.0
 """The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""

@@ -9,8 +9,8 @@ from typing import Any
 import pandas as pd
 
 from crossbody.cases import Outcome
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.execute import REFUSED, SKIPPED
-from crossbody.reports.verdict import Word
 
 STABILITY = "stiffness"
 """The suite whose grid is the map."""

@@ -11,8 +11,8 @@ from crossbody import engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
+from crossbody.reports.judging.truth import PARTED, Truth, from_run
 from crossbody.reports.metrics._contacts import contacts
-from crossbody.reports.truth import PARTED, Truth, from_run
 
 SHARES = (33, 49)
 """How many instants of a run are looked at, evenly and from 1e-12 of the horizon on by their logarithm."""

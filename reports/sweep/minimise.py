@@ -12,9 +12,9 @@ import pandas as pd
 
 from crossbody.cases import Outcome, Value
 from crossbody.cases._load import module
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.execute import CRASHED, REFUSED, SKIPPED, execute
 from crossbody.reports.sweep.spec import Spec
-from crossbody.reports.verdict import Word
 
 TRIES = 60
 """Runs that one failure may cost."""

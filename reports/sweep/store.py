@@ -18,7 +18,7 @@ import crossbody.cases
 import crossbody.engines
 import crossbody.reference
 from crossbody.cases import OutputError
-from crossbody.reports import output
+from crossbody.reports.runs import output
 from crossbody.reports.sweep.execute import COLUMNS, TIMES
 from crossbody.reports.sweep.spec import Spec
 

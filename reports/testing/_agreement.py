@@ -10,10 +10,10 @@ import numpy as np
 
 from crossbody.cases import InvalidValue, Tier, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._contacts import contacts
 from crossbody.reports.testing._offence import Signal, fail_if_any
-from crossbody.reports.truth import Truth, from_run
 
 if TYPE_CHECKING:
     from crossbody.engines import Run

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import InvalidValue
-from crossbody.reports.output import replace_text
+from crossbody.reports.runs.output import replace_text
 
 if TYPE_CHECKING:
-    from crossbody.reports.verdict import Verdict
+    from crossbody.reports.judging.verdict import Verdict
 
 FOLDER = "baselines"
 _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}

@@ -13,12 +13,12 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.engines import Run
-from crossbody.reports import jobs
-from crossbody.reports.comparison import Entry, verdicts
-from crossbody.reports.jobs import Pick
+from crossbody.reports.judging.comparison import Entry, verdicts
+from crossbody.reports.judging.truth import Truth, truth_of
+from crossbody.reports.judging.verdict import Verdict
+from crossbody.reports.runs import jobs
+from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.testing._parameters import Scene
-from crossbody.reports.truth import Truth, truth_of
-from crossbody.reports.verdict import Verdict
 
 _Made = TypeVar("_Made")
 

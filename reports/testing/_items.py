@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from crossbody.cases import Case, CrossbodyError
-from crossbody.reports.jobs import Pick
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.testing import plugin
 from crossbody.reports.testing._bench import Bench
 from crossbody.reports.testing._parameters import Named, Scene, picks, scenes
-from crossbody.reports.verdict import Verdict, Word
 
 ALWAYS = ("finished", "audit")
 RUN = "run"

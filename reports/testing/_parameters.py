@@ -11,8 +11,8 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import CrossbodyError
-from crossbody.reports import jobs
-from crossbody.reports.jobs import Pick
+from crossbody.reports.runs import jobs
+from crossbody.reports.runs.jobs import Pick
 
 NONE = (
     "No case is named: use --crossbody-case CASE, crossbody_cases in the configuration, or the mark "

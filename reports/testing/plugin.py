@@ -14,12 +14,12 @@ import pytest
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.jobs import Pick
+    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.judging.verdict import Verdict
+    from crossbody.reports.runs.jobs import Pick
     from crossbody.reports.testing._baseline import Baseline
     from crossbody.reports.testing._bench import Bench, Chosen
     from crossbody.reports.testing._parameters import Named, Scene
-    from crossbody.reports.truth import Truth
-    from crossbody.reports.verdict import Verdict
 
 MARKER = "crossbody"
 _SCENE, _PICK = "_crossbody_scene", "_crossbody_pick"

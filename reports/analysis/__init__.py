@@ -1,0 +1,1 @@
+"""Linear models as tables and figures: poles, frequency responses, loci, regions."""

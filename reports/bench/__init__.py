@@ -1,0 +1,1 @@
+"""Run time against error: ladders, orders, headline ratios, what is skipped, throughput."""

@@ -1,0 +1,124 @@
+"""What the command `bench` does: time, compare, write, show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from crossbody.cases import CrossbodyError, InvalidValue
+from crossbody.reports import voice
+from crossbody.reports.bench import against as bench_against
+from crossbody.reports.bench import ladder, scenes
+from crossbody.reports.bench.headline import headline
+from crossbody.reports.commands import where
+from crossbody.reports.pages import site as page
+from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.voice import progress
+
+SHOWN = {
+    "bench": ["case", "engine", "profile", "knob", "setting", "error", "honesty", "median_ms", "iqr_ms", "call_ms",
+              "outcome"],
+    "orders": ["case", "engine", "profile", "knob", "order", "promised", "says"],
+    "headline": ["case", "engine", "profile", "tier", "best_error", "engine_ms", "reference_ms", "ratio",
+                 "ratio_call", "least_ratio", "says"],
+}  # fmt: skip
+
+
+def run(
+    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
+    repeats: int | None, full: bool, against: Path | None, command: str,
+) -> int:  # fmt: skip
+    """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is run.
+    """
+    cases = scenes.chosen(names, variant, jobs.parse_settings(pairs), full)
+    picks = scenes.picks(wanted)
+    base = None if against is None else bench_against.read(against)
+    effort = scenes.FULL_EFFORT if full else scenes.QUICK_EFFORT
+    effort = effort if repeats is None else replace(effort, repeats=repeats)
+    if names or variant or pairs:
+        effort = replace(effort, every=1)
+    output.check(out)
+    with progress(len(cases) * len(picks)) as tell:
+        found = [ladder.bench(case, picks, effort, tell) for case in cases]
+    rows, orders = ladder.joined(found)
+    if not len(rows):
+        raise InvalidValue(_nothing(picks))
+    tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
+    losses = None if base is None else bench_against.lost(rows, tables["headline"], *base)
+    write(out, tables | ({} if losses is None else {"lost": losses}), provenance(command, repeats=effort.repeats))
+    show(tables | ({} if losses is None or not voice.as_json() else {"lost": losses}), out)
+    return 0 if losses is None else tell_losses(losses, against)
+
+
+def _nothing(picks: Sequence[jobs.Pick]) -> str:
+    absent = " ".join(pick.skipped for pick in picks if pick.skipped)
+    return f"No engine asked for can run a case asked for. {absent}".strip()
+
+
+def write(out: Path, tables: Mapping[str, pd.DataFrame], told: Mapping[str, object]) -> None:
+    """Tables (Parquet, CSV, JSON) and the page, all or nothing."""
+    with output.folder(out) as made:
+        study.write(made, [], study.judge([], {}), told)
+        for name, table in tables.items():
+            study.write_table(made / name, table, told)
+        page.write(made)
+
+
+def show(tables: Mapping[str, pd.DataFrame], out: Path) -> None:
+    """The tables in the terminal, and where the page is."""
+    for name, table in tables.items() if not voice.told_as_json(tables) and not voice.quiet() else ():
+        print(f"\n{name}")
+        shown = table[SHOWN[name]] if name in SHOWN else table
+        print(shown.to_string(index=False, float_format=lambda x: "-" if math.isnan(x) else f"{x:.3g}"))
+    where(out)
+
+
+def tell_losses(losses: pd.DataFrame, against: Path | None) -> int:
+    """Every loss with its reason; 1 if there is one."""
+    for loss in losses.to_dict(orient="records") if not voice.as_json() else ():
+        print(f"lost {loss['what']}: {loss['case']} {loss['engine']}:{loss['profile']}: {loss['why']}.")
+    if not voice.silent():
+        print(f"Against {against}: {len(losses)} lost.")
+    return int(len(losses) > 0)
+
+
+def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequence[str] = ()) -> int:
+    """Write and show one table of its own; 1 if something in it failed."""
+    if not len(rows):
+        raise CrossbodyError(f"The table {name} has no rows.")
+    write(out, {name: rows}, provenance(command))
+    show({name: rows}, out)
+    for line in failed if not voice.as_json() else ():
+        print(f"outside: {line}")
+    return int(bool(failed))
+
+
+def alone(
+    what: str, asked: tuple[object, ...], repeats: int | None, out: Path, command: str
+) -> int:  # fmt: skip
+    """The table of what is skipped, or of the throughput of many runs; the exit code.
+
+    Raises:
+        InvalidValue: if something was asked for that these do not have: they have their own scenes.
+    """
+    if any(asked):
+        raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
+    output.check(out)
+    if what == "skip":
+        from crossbody.reports.bench import skip as bench_skip
+
+        rows = bench_skip.measure(repeats or 5)
+    else:
+        from crossbody.reports.bench import throughput as bench_throughput
+
+        rows = bench_throughput.measure(repeats or 5)
+    beyond = rows[~rows["held"].astype(bool)]
+    return table(what, rows, out, command, [str(text) for text in beyond["what"]])

@@ -1,0 +1,41 @@
+"""Work-precision: error across, time up, one line an engine and profile."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from crossbody.reports.pages.styles import COLOURS, DASHES
+
+
+def work_precision(rows: pd.DataFrame) -> go.Figure:
+    """Log-log lines labelled with tolerance or step; a failed run is a cross at the right edge.
+
+    Args:
+        rows: as `crossbody.reports.bench.ladder.bench` gives them.
+    """
+    figure = go.Figure()
+    error = rows["error"].astype(float)
+    finite = error[np.isfinite(error) & (error > 0.0)]
+    edge = 10.0 * float(finite.max()) if len(finite) else 1.0
+    floor = 1e-16
+    for i, ((case, engine, profile), group) in enumerate(rows.groupby(["case", "engine", "profile"], sort=False)):
+        failed = ~np.isfinite(group["error"].astype(float))
+        x = group["error"].astype(float).where(~failed, edge).clip(lower=floor)
+        label = f"{engine}:{profile}" if rows["case"].nunique() == 1 else f"{case} {engine}:{profile}"
+        figure.add_trace(
+            go.Scatter(
+                x=x, y=group["median_ms"], name=label, mode="lines+markers+text",
+                text=[f"{s:.0e}" if np.isfinite(s) else "" for s in group["setting"].astype(float)],
+                textposition="top center", textfont={"size": 9},
+                line={"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)]},
+                marker={"symbol": np.where(failed, "x", "circle").tolist(), "size": 8},
+                error_y={"type": "data", "array": (group["iqr_ms"] / 2).tolist(), "thickness": 1},
+            )
+        )  # fmt: skip
+    figure.update_xaxes(type="log", title_text="relative error of position and event times [1]", exponentformat="power")
+    figure.update_yaxes(type="log", title_text="run time, median [ms]", exponentformat="power")
+    cases = ", ".join(rows["case"].unique())
+    figure.update_layout(title_text=f"Work against precision, {cases}; a cross is a run that failed", height=560)
+    return figure

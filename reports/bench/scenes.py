@@ -1,0 +1,71 @@
+"""What a benchmark runs when nothing is named: scenes whose truth is known, the quick ones or all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+from crossbody import cases, engines
+from crossbody.cases import Case, Value
+from crossbody.reports.bench.ladder import Effort
+from crossbody.reports.runs import jobs
+
+ENGINES = (*jobs.DEFAULT_ENGINES, "exudyn", "drake", "dart", "pymunk")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """One case of the benchmark.
+
+    Attributes:
+        name, variant: of the case.
+        given: parameters that differ from the variant's own.
+    """
+
+    name: str
+    variant: str
+    given: Mapping[str, Value] = field(default_factory=lambda: MappingProxyType({}))
+
+    def case(self) -> Case:
+        """The case; its variant's name tells what was changed, so that no two rows share a label."""
+        found = cases.load(self.name, self.variant, **self.given)
+        changed = ",".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in self.given.items())
+        return replace(found, variant=f"{self.variant}({changed})") if changed else found
+
+
+DROP = Scene(name="bouncing_ball", variant="elastic", given={"a0": 1e5, "a1": 0.0, "a2": 0.0, "t_end": 2.0})
+"""A stiff elastic floor, 1 m below, for 2 s: what every engine can do in its own way."""
+PAIR = Scene(name="newtons_cradle", variant="sliders", given={"n": 2, "collisions": "resolved"})
+"""One collision of two balls, in real time."""
+QUICK = (
+    DROP,
+    Scene(name="bouncing_ball", variant="listing"),
+    Scene(name="bouncing_ball", variant="linear"),
+    PAIR,
+    Scene(name="newtons_cradle", variant="sliders"),
+    Scene(name="delta_impulse", variant="light"),
+)
+QUICK_EFFORT = Effort(repeats=3, slow=0.2, longest=0.5, every=2)
+FULL_EFFORT = Effort(repeats=7, slow=1.0, longest=10.0)
+
+
+def default(full: bool) -> tuple[Case, ...]:
+    """The quick scenes, or every variant of every case and the two special ones."""
+    if not full:
+        return tuple(scene.case() for scene in QUICK)
+    every = [cases.load(name, variant) for name in cases.names() for variant in cases.variants(name)]
+    return (DROP.case(), PAIR.case(), *every)
+
+
+def chosen(names: Sequence[str], variant: str | None, given: Mapping[str, Value], full: bool) -> tuple[Case, ...]:
+    """The cases that were named, in the variant that was, else the default ones."""
+    if not (names or variant or given):
+        return default(full)
+    return jobs.load_cases(names, variant, given)
+
+
+def picks(wanted: Sequence[str]) -> tuple[jobs.Pick, ...]:
+    """What was asked for, else every engine that is known, installed or not."""
+    known = engines.names()
+    return jobs.picks(wanted or [name for name in ENGINES if name in known])

@@ -1,0 +1,192 @@
+"""What a run is judged against, and how that is known (spec 5.2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import Case, Tier, Trajectory
+from crossbody.cases._arrays import Floats
+from crossbody.cases._trajectory import Ledger
+from crossbody.reports.judging._between import between
+
+SECOND = 10.0
+"""Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
+PARTED = 1e-6
+"""Difference of the two, over the largest coordinate, from which on neither is trusted."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """A motion that is taken to be right.
+
+    Attributes:
+        tier: how it is known.
+        source: in words, with the agreement of tier C.
+        trajectory: the motion, dense enough to plot, both sides of every event.
+        at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
+        agreement: metric -> how far the two sources of tier C are apart; empty for the others.
+        trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
+    """
+
+    tier: Tier
+    source: str
+    trajectory: Trajectory
+    at: Callable[[Floats], Trajectory]
+    agreement: dict[str, float]
+    trusted: float = math.inf
+
+
+def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
+    """Times that show a motion: a grid, more of them from each event to the next if that is short, events twice.
+
+    Args:
+        run: whose events.
+        t_end: horizon, s.
+        grid: points on the horizon.
+        inside: points on each interval between events that is shorter than a tenth of the horizon.
+    """
+    events = np.array([e.t for e in run.events if e.t <= t_end])
+    parts = [np.linspace(0.0, t_end, grid)]
+    edges = np.unique(np.concatenate([[0.0], events, [t_end]]))
+    parts += [np.linspace(a, b, inside)[1:-1] for a, b in pairwise(edges) if b - a < 0.1 * t_end]
+    times: Floats = np.sort(np.concatenate([np.unique(np.concatenate([*parts, events])), events]))
+    return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
+
+
+def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:
+    """A run as the truth for others: an engine refined against itself, or a measurement."""
+    return Truth(tier=tier, source=source, trajectory=run, at=between(run), agreement={})
+
+
+def truth_of(case: Case) -> Truth:
+    """The best truth that a case has: its closed form, else two independent integrators that agree.
+
+    Raises:
+        CrossbodyError: if the reference cannot run the case.
+    """
+    if case.closed_form is None:
+        # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
+        return _integrated(case, _tight(case), "cvode" if case.fsm == "level" else "compiled")
+    motion = case.closed_form
+    first = motion(np.zeros(1))
+    return Truth(
+        tier=Tier.A,
+        source="closed form of every arc",
+        trajectory=motion(sample_times(first, case.t_end)),
+        at=motion,
+        agreement={},
+    )
+
+
+def cache_of_one(function: Callable[[Floats], Trajectory]) -> Callable[[Floats], Trajectory]:
+    """Keep the last answer: every metric asks for the truth at the same instants of a run."""
+    last: list[tuple[bytes, Trajectory]] = []
+
+    def cached(times: Floats) -> Trajectory:
+        key = times.tobytes()
+        if not last or last[0][0] != key:
+            last[:] = [(key, function(times))]
+        return last[0][1]
+
+    return cached
+
+
+def law_of(followed: Case) -> Truth | None:
+    """The truth of the equations that an engine really integrates, where they are not the case's own (spec 4.1).
+
+    Against it an engine has a discretisation error alone. It is known by the reference itself (tier D).
+
+    Args:
+        followed: the case with the engine's machine and collision rule (`follows` of its run).
+
+    Returns:
+        None where the reference does not reach the horizon: the engine is then judged against itself.
+    """
+    first = _tight(followed)
+    if not first.outcome.ok:
+        return None
+    found = _integrated(followed, first, "compiled")
+    rule = f"the equations that the engine follows (machine {followed.fsm}, collisions {followed.collisions}): "
+    return replace(found, source=rule + found.source)
+
+
+def _tight(case: Case) -> Trajectory:
+    """The compiled integrator at the case's tightest tolerance."""
+    from crossbody.engines import load
+
+    return load("reference").prepare(case, "compiled", rtol=case.tight).run()
+
+
+def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
+    """The compiled integrator at its tightest, held against another solver: tier C if that is independent, else D."""
+    from crossbody.engines import load
+
+    reference = load("reference")
+
+    @cache_of_one
+    def at(times: Floats) -> Trajectory:
+        run = reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)).run()
+        return with_both_sides(run, first)
+
+    dense = at(sample_times(first, case.t_end))
+    tier = Tier.D if other == "compiled" else Tier.C
+    second = reference.prepare(case, other, rtol=SECOND * case.tight).run()
+    truth = Truth(tier=tier, source="", trajectory=dense, at=at, agreement={})
+    truth = replace(truth, trusted=_trusted(truth, second))
+    found = _agreement(truth, second, case)
+    said = ", ".join(f"{name} {value:.1e}" for name, value in found.items())
+    source = f"compiled reference at rtol {case.tight:g}, {other} at {SECOND * case.tight:g} agrees: {said}"
+    if truth.trusted < case.t_end:
+        source += f"; compared until they part at t = {truth.trusted:.4g} s"
+    return replace(truth, source=source, agreement=found)
+
+
+def _trusted(truth: Truth, second: Trajectory) -> float:
+    """When two runs part by more than `PARTED` of the largest coordinate, s; infinite if they never do."""
+    from crossbody.reports.metrics._align import aligned
+
+    inside, exact = aligned(truth, second)
+    scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0))
+    off = np.max(np.abs(second.q[inside] - exact.q), axis=1, initial=0.0) > PARTED * scale
+    return float(second.t[inside][np.argmax(off)]) if off.any() else math.inf
+
+
+def with_both_sides(run: Trajectory, natural: Trajectory) -> Trajectory:
+    """A run sampled at given times, with the state after an event where an instant was asked for twice.
+
+    Args:
+        run: sampled; an event's instant gives the state before it.
+        natural: the same run at its own steps, both sides of every event.
+    """
+    again = np.flatnonzero(run.t[1:] == run.t[:-1]) + 1
+    after = np.searchsorted(natural.t, run.t[again], side="right") - 1
+    known = natural.t[after] == run.t[again]
+    rows: dict[str, Floats] = {}
+    for name in ("q", "v", "gap", "lam", "energy", "mode"):
+        rows[name] = getattr(run, name).copy()
+        rows[name][again[known]] = getattr(natural, name)[after[known]]
+    booked = run.ledger
+    if booked is not None and natural.ledger is not None:
+        booked = _booked(booked, natural.ledger, again[known], after[known])
+    return replace(run, ledger=booked, **rows)  # type: ignore[arg-type]
+
+
+def _booked(run: Ledger, natural: Ledger, at: NDArray[np.intp], after: NDArray[np.intp]) -> Ledger:
+    """The account behind an event: a collision in no time does its work at one instant."""
+    accounts = {name: getattr(run, name).copy() for name in ("contact", "input", "dissipated")}
+    for name, account in accounts.items():
+        account[at] = getattr(natural, name)[after]
+    return Ledger(**accounts)
+
+
+def _agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
+    from crossbody.reports import metrics
+
+    found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
+    return {name: value for name, value in found.items() if value is not None}

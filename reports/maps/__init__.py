@@ -1,0 +1,1 @@
+"""Maps over two parameters: collision rules over gaps, regions of stability."""

@@ -1,0 +1,1 @@
+"""The HTML report: pages, their sections, figures and tables."""

@@ -1,0 +1,172 @@
+"""The figures of a case's page; every axis has its unit, every line belongs to an engine that can be hidden."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from crossbody.cases import Mode
+from crossbody.cases._arrays import Floats
+from crossbody.reports.metrics._impulse import cumulative
+from crossbody.reports.pages.filled import filled
+from crossbody.reports.pages.section import Figure
+from crossbody.reports.pages.sheet import Sheet
+from crossbody.reports.pages.strips import modes
+from crossbody.reports.pages.styles import COLOURS, DASHES, TRUTH, label, style
+from crossbody.reports.pages.thin import POINTS
+from crossbody.reports.runs.store import Trace
+
+SAMPLE = 15
+"""Room of one sample of one line on a page, bytes (time and value as base64)."""
+FEWEST = 60
+MOST_SIGNALS = 9
+"""Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
+
+__all__ = ["COLOURS", "DASHES", "FIGURES", "TRUTH", "label", "note", "points_for", "style", "suits"]
+
+
+def drawn(count: int) -> list[int]:
+    """Which of so many signals are drawn."""
+    return list(dict.fromkeys(np.linspace(0, count - 1, min(count, MOST_SIGNALS)).round().astype(int).tolist()))
+
+
+def points_for(traces: Sequence[Trace], room: int) -> int:
+    """Samples a line so that all lines of a case take `room` bytes."""
+    coordinates, contacts = (len(drawn(len(traces[0].about[name]))) for name in ("coordinates", "contacts"))
+    lines = len(traces) * (2 * coordinates + 4 * contacts + 4)
+    return int(np.clip(room / (SAMPLE * lines), FEWEST, POINTS))
+
+
+def floor_of(truth: Floats) -> float:
+    """Below this a difference is rounding: the largest value times 2.2e-16, rounded down to a power of ten."""
+    largest = float(np.max(np.abs(truth[np.isfinite(truth)]), initial=0.0))
+    return float(10.0 ** np.floor(np.log10(largest * np.finfo(float).eps))) if largest > 0.0 else 1e-17
+
+
+def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
+    """|difference| for a logarithmic axis, not below the floor that all engines share."""
+    difference: Floats = np.maximum(np.abs(mine - theirs), floor)
+    return difference
+
+
+def _floors(traces: Sequence[Trace], units: Sequence[str]) -> dict[str, float]:
+    """One floor a unit: a coordinate that stays at 0 is compared with its neighbours' size."""
+    q = traces[0].run.q
+    return {unit: floor_of(q[:, [k for k, u in enumerate(units) if u == unit]]) for unit in units}
+
+
+def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+    """Every coordinate of every engine, and under it log |difference to the truth|, impacts matched."""
+    names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
+    floors = _floors(traces, [unit for _, unit in names])
+    shown = drawn(len(names))
+    rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
+    sheet = Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points)
+    for i, trace in enumerate(traces):
+        t, q = filled(trace.run)
+        for place, k in enumerate(shown):
+            sheet.line(trace, i, 2 * place + 1, q[:, k], t)
+            if trace.truth is not None:
+                error = apart(trace.run.q[:, k], trace.truth.q[:, k], floors[names[k][1]])
+                sheet.line(trace, i, 2 * place + 2, error)
+    sheet.logarithmic(*range(2, len(rows) + 1, 2))
+    return sheet.done()
+
+
+def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+    """Multipliers, their cumulative impulse, and its difference to the truth's."""
+    contacts = traces[0].about["contacts"]
+    shown = drawn(len(contacts))
+    each = ("lam {}\n[N]", "impulse\n[N s]", "|error|\n[N s]")
+    rows = [text.format(contacts[k]) for k in shown for text in each]
+    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points)
+    summed = [cumulative(trace.run) for trace in traces]
+    floor = floor_of(summed[0])
+    true = [None if trace.truth is None else cumulative(trace.truth) for trace in traces]
+    for place, k in enumerate(shown):
+        for i, trace in enumerate(traces):
+            if np.isnan(trace.run.lam[:, k]).all():
+                continue
+            sheet.line(trace, i, 3 * place + 1, trace.run.lam[:, k])
+            sheet.line(trace, i, 3 * place + 2, summed[i][:, k])
+            exact = true[i]
+            if exact is not None:
+                sheet.line(trace, i, 3 * place + 3, apart(summed[i][:, k], exact[:, k], floor))
+        sheet.logarithmic(3 * place + 3)
+    return sheet.done()
+
+
+def energy(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+    """Total energy, work of the contacts, and what neither they nor inputs nor damping explain."""
+    rows = ["total energy\n[J]", "work of contacts\n[J]", "|unexplained|\n[J]"]
+    sheet = Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points)
+    floor = floor_of(traces[0].run.energy)
+    for i, trace in enumerate(traces):
+        run = trace.run
+        sheet.line(trace, i, 1, run.total_energy)
+        if run.ledger is None:
+            continue
+        work = run.ledger.contact.sum(axis=1)
+        sheet.line(trace, i, 2, work)
+        book = work + run.ledger.input - run.ledger.dissipated
+        sheet.line(trace, i, 3, apart(run.total_energy - run.total_energy[0], book - book[0], floor))
+    sheet.logarithmic(3)
+    return sheet.done()
+
+
+def penetration(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+    """Depth of every contact below its surface; |gap| of a row that is always on."""
+    contacts = traces[0].about["contacts"]
+    shown = drawn(len(contacts))
+    always = [bool((traces[0].run.mode[:, k] == Mode.BILATERAL).all()) for k in shown]
+    rows = [f"{'|gap|' if on else 'depth'} {contacts[k]}\n[m]" for k, on in zip(shown, always, strict=True)]
+    sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points)
+    for row, (k, on) in enumerate(zip(shown, always, strict=True), start=1):
+        for i, trace in enumerate(traces):
+            gap = trace.run.gap[:, k]
+            depth = np.abs(gap) if on else -gap
+            sheet.line(trace, i, row, np.where(depth > 0.0, depth, np.nan))
+        sheet.logarithmic(row)
+    return sheet.done()
+
+
+def steps(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+    """Length of every step at its start: small while a collision lasts, large again when it is over."""
+    sheet = Sheet(["step size [s]"], "Step size of each engine", points)
+    for i, trace in enumerate(traces):
+        starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
+        sheet.line(trace, i, 1, lengths, starts, shape="hv")
+    sheet.logarithmic(1)
+    return sheet.done()
+
+
+def suits(name: str, traces: Sequence[Trace]) -> bool:
+    """Whether a figure has anything to show."""
+    return bool(traces[0].about["contacts"]) or name not in ("force", "modes", "penetration")
+
+
+def note(name: str, traces: Sequence[Trace]) -> str:
+    """What the reader of a figure must know."""
+    listed = {"motion": "coordinates", "force": "contacts", "penetration": "contacts", "modes": "contacts"}.get(name)
+    count = len(traces[0].about[listed]) if listed else 0
+    some = f"{MOST_SIGNALS} of {count} {listed} are drawn; all are stored." if count > MOST_SIGNALS else ""
+    return f"{NOTES.get(name, '')} {some}".strip()
+
+
+NOTES = {
+    "motion": (
+        "Impacts are matched first and the arcs between them compared; how far impacts are off is the metric "
+        "event_times. Differences end at a common floor, the rounding of the largest value of that unit: below it "
+        "nothing is left to compare. Where a solver took long steps, a cubic through q and v of both ends is drawn."
+    ),
+    "force": "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that.",
+}
+FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int], Figure]]] = {
+    "motion": ("Motion", motion),
+    "force": ("Contact force", force),
+    "energy": ("Energy", energy),
+    "modes": ("Modes", modes),
+    "penetration": ("Penetration", penetration),
+    "steps": ("Step size", steps),
+}

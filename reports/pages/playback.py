@@ -1,0 +1,114 @@
+"""Playback of every engine of a case over one clock, from stored motions; the browser draws it."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import CrossbodyError
+from crossbody.cases._arrays import Floats
+from crossbody.reports import scenes
+from crossbody.reports.pages.filled import filled
+from crossbody.reports.pages.section import Section
+from crossbody.reports.pages.styles import TRUTH, label, style
+from crossbody.reports.runs.store import Trace
+
+ROOM = 280_000
+"""Room of the motions on a page, bytes."""
+FEWEST, MOST = 60, 900
+TEXT = (
+    "All engines over one clock, which the plots below share. Arrows are contact forces, as long as lam; each shows "
+    "the largest force since the picture before, so that no blow is missed."
+)
+
+
+def playback(traces: Sequence[Trace]) -> list[Section]:
+    """The section, or one that says why there is none; nothing where no motion is stored."""
+    if not traces:
+        return []
+    about = traces[0].about
+    name = about.get("mechanism", "")
+    if name not in scenes.names():
+        told = f"There is no picture of the mechanism {name or '(not stored by the version that ran this)'}."
+        return [Section(name="playback", title="Playback", text=told)]
+    try:
+        scene = packed(traces, scenes.load(name))
+    except (KeyError, ValueError, IndexError, CrossbodyError) as error:
+        return [Section(name="playback", title="Playback", text=f"This motion cannot be drawn: {error}.")]
+    caption = f"Motion of {about['case']}, {about['variant']}, as {', '.join(map(label, traces))} computed it."
+    return [
+        Section(
+            name="playback", title="Playback", text=TEXT, template="playback.html",
+            context={"scene": json.dumps(scene, separators=(",", ":")), "caption": caption},
+        )
+    ]  # fmt: skip
+
+
+def packed(traces: Sequence[Trace], scene: scenes.Scene) -> dict[str, Any]:
+    """Stage, and of every trace its times, poses and arrows as single precision in base64."""
+    parameters = traces[0].about["parameters"]
+    stage = scene.stage(parameters)
+    one = scene.poses(traces[0].run.q[:1], parameters)[0].size
+    width = 1 + one + scene.arrows(traces[0].run.q[:1], traces[0].run.lam[:1], parameters)[0].size
+    frames = int(np.clip(ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
+    drawn = [_track(trace, i, scene, parameters, frames) for i, trace in enumerate(traces) if len(trace.run.t)]
+    return {
+        "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
+        "end": max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0),
+        "force": _scale(traces),
+    }  # fmt: skip
+
+
+def _track(trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int) -> dict[str, Any]:
+    run = trace.run
+    t, q = filled(run)
+    at = chosen(t, np.array([e.t for e in run.events]), frames)
+    lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t[at], side="right"), 1))
+    poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)
+    look = style(trace, i)
+    return {
+        "name": label(trace), "color": look["color"], "strokes": look["strokes"], "truth": label(trace) == TRUTH,
+        "t": _base64(t[at]), "poses": _base64(poses), "arrows": _base64(arrows),
+    }  # fmt: skip
+
+
+def chosen(t: Floats, events: Floats, frames: int) -> NDArray[np.intp]:
+    """Indices of samples for pictures: half evenly in time, half around the events, first and last."""
+    even = np.searchsorted(t, np.linspace(t[0], t[-1], max(2, frames // 2)))
+    some = np.linspace(0, len(events) - 1, min(len(events), frames // 8)).astype(np.intp)
+    near = np.searchsorted(t, events[some])[:, None] + np.array([-2, 0, 1, 3])
+    return np.unique(np.clip(np.concatenate([even, near.ravel()]), 0, len(t) - 1))
+
+
+def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
+    """Of every multiplier the value of largest size in the samples since the picture before.
+
+    Args:
+        lam: (n, nc), N.
+        ends: of each picture, how many samples are past (frames,), nondecreasing, at least 1.
+
+    Returns:
+        (frames, nc), N; 0 where the engine cannot tell.
+    """
+    known = np.nan_to_num(lam)
+    found = np.empty((len(ends), lam.shape[1]))
+    for i, (a, b) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+        part = known[min(a, b - 1) : b]
+        found[i] = part[np.argmax(np.abs(part), axis=0), np.arange(lam.shape[1])]
+    return found
+
+
+def _scale(traces: Sequence[Trace]) -> float:
+    """The force that is drawn as the longest arrow, N: the median of the largest of each engine that has one."""
+    largest = [float(np.max(np.abs(np.nan_to_num(trace.run.lam)), initial=0.0)) for trace in traces]
+    return float(np.median([x for x in largest if x > 0.0] or [1.0]))
+
+
+def _base64(array: Floats) -> str:
+    return base64.b64encode(np.ascontiguousarray(np.nan_to_num(array), dtype="<f4").tobytes()).decode()

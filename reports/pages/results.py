@@ -1,0 +1,161 @@
+"""What a folder of results holds, as far as pages need it: tables at once, motions when a page asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from crossbody.cases import OutputError
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.pages.html import file_name
+from crossbody.reports.pages.section import records
+from crossbody.reports.runs.output import MARKER
+from crossbody.reports.runs.store import Trace, load, peek
+from crossbody.reports.runs.study import read_json
+
+COLUMNS = tuple(Verdict.__dataclass_fields__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseFiles:
+    """One case with its motions on disk.
+
+    Attributes:
+        label: case:variant.
+        page: name of its page.
+        about: what is known of it; of the truth, where there is one.
+        paths: files of its motions, truth first.
+        missing: sentences on motions that should be there and cannot be read.
+    """
+
+    label: str
+    page: str
+    about: Mapping[str, Any]
+    paths: tuple[Path, ...]
+    missing: tuple[str, ...]
+
+    def traces(self) -> list[Trace]:
+        """The motions themselves."""
+        return [load(path) for path in self.paths]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """A folder of results.
+
+    Attributes:
+        out: the folder.
+        verdicts: their rows; `base` those compared with, and `base_name` where they stand.
+        rows, audits: verdicts and parity audit of each case (by its label), as plain rows.
+        told: provenance.
+        cases: in the order of their verdicts.
+        walls: (case:variant, engine:profile) -> run time, s.
+    """
+
+    out: Path
+    verdicts: pd.DataFrame
+    rows: Mapping[str, list[dict[str, Any]]]
+    audits: Mapping[str, list[dict[str, Any]]]
+    told: Mapping[str, Any]
+    cases: tuple[CaseFiles, ...]
+    walls: Mapping[tuple[str, str], float]
+    base: pd.DataFrame | None = None
+    base_name: str = ""
+
+    @property
+    def footer(self) -> str:
+        """What made these results, in one line."""
+        version = self.told.get("versions", {}).get("crossbody", "of an unknown version")
+        return f"crossbody {version} · {self.told.get('command', '')} · {self.told.get('time', '')}"
+
+
+def read(out: Path, against: Path | None = None) -> Results:
+    """Read the tables of a folder and find its motions.
+
+    Raises:
+        OutputError: if a folder does not hold results that this version can read.
+    """
+    if not (out / MARKER).is_file():
+        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
+    told = read_json(out / "provenance.json")
+    verdicts = _verdicts(out)
+    audits = _by(read_json(out / "audit.json")["rows"], "case")
+    cases, walls = _cases(out, verdicts)
+    base = None if against is None else _verdicts(against)
+    return Results(
+        out=out, verdicts=verdicts, rows=_by(records(verdicts), "label"), audits=audits, told=told,
+        cases=cases, walls=walls, base=base,
+        base_name="" if against is None else str(against),
+    )  # fmt: skip
+
+
+def _by(rows: Iterable[dict[str, Any]], key: str) -> dict[str, list[dict[str, Any]]]:
+    """Rows by the value of one column: pandas would look through all of them for every case."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        found.setdefault(row[key], []).append(row)
+    return found
+
+
+def _verdicts(out: Path) -> pd.DataFrame:
+    """Verdicts with the case's label and the engine's as columns of their own."""
+    table = read_json(out / "verdicts.json")
+    rows = pd.DataFrame(table.get("rows", []) if isinstance(table, dict) else [])
+    if rows.empty:
+        return pd.DataFrame(columns=[*COLUMNS, "label", "who"])
+    if lacking := [name for name in COLUMNS if name not in rows]:
+        by = table.get("provenance", {}).get("versions", {}).get("crossbody", "another version")
+        raise OutputError(
+            f"{out} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; run the cases again."
+        )
+    return rows.assign(label=rows["case"] + ":" + rows["variant"], who=rows["engine"] + ":" + rows["profile"])
+
+
+def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], dict[tuple[str, str], float]]:
+    """Every case that has a verdict or a motion, and the run times."""
+    paths: dict[str, list[Path]] = {}
+    abouts: dict[str, Mapping[str, Any]] = {}
+    walls: dict[tuple[str, str], float] = {}
+    broken: list[str] = []
+    for path in sorted((out / "traces").glob("*.parquet")):
+        try:
+            told = peek(path)
+        except (OSError, ValueError, KeyError):
+            broken.append(path.name)
+            continue
+        about = told["about"]
+        label, who = f"{about['case']}:{about['variant']}", f"{about['engine']}:{about['profile']}"
+        paths.setdefault(label, []).append(path)
+        abouts.setdefault(label, about)
+        walls[label, who] = told["wall_s"]
+    labels = dict.fromkeys([*verdicts["label"], *paths])
+    wanted = _wanted(verdicts)
+    found = tuple(
+        CaseFiles(
+            label=label, page=f"case-{file_name(label)}", about=abouts.get(label, {}),
+            paths=tuple(paths.get(label, ())),
+            missing=_missing(label, wanted.get(label, []), walls, broken),
+        ) for label in labels
+    )  # fmt: skip
+    return found, walls
+
+
+def _wanted(verdicts: pd.DataFrame) -> dict[str, list[str]]:
+    """Engines whose motion should be there, by case."""
+    ran = verdicts[verdicts["verdict"] != Word.SKIPPED.value].drop_duplicates(["label", "who"])
+    return {str(label): list(group["who"]) for label, group in ran.groupby("label", sort=False)}
+
+
+def _missing(
+    label: str, engines: list[str], walls: Mapping[tuple[str, str], float], broken: list[str]
+) -> tuple[str, ...]:
+    lost = [who for who in ["truth:", *engines] if (label, who) not in walls]
+    if not lost:
+        return ()
+    names = ", ".join(who.removesuffix(":") for who in lost)
+    unreadable = f" (not readable: {', '.join(broken)})" if broken else ""
+    return (f"No motion is stored for {names}{unreadable}: what is drawn below is without it.",)

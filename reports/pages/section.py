@@ -1,0 +1,108 @@
+"""What a page is made of: a section is a template and its context; most are a text, plots and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, TypeAlias
+
+import pandas as pd
+import plotly.graph_objects as go
+
+Figure: TypeAlias = go.Figure | dict[str, Any]
+"""A figure of plotly, or its data and layout as plain values, which is many times faster."""
+
+
+class Kind(StrEnum):
+    """How a column of a table is shown."""
+
+    TEXT = "text"
+    NUMBER = "number"
+    VERDICT = "verdict"
+    LONG = "long"
+    CODE = "code"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a table.
+
+    Attributes:
+        key: of the rows.
+        title: heading, with the unit where there is one.
+        kind: how it is shown.
+    """
+
+    key: str
+    title: str
+    kind: Kind = Kind.TEXT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Rows for those who want the numbers; every table can be saved as CSV from the page.
+
+    Attributes:
+        title: in words; also the name of the CSV file.
+        columns: in order; what is not named is not shown.
+        rows: plain values; numbers are shown with four digits and saved with all.
+        file: name of a file beside the page that holds all rows, where there may be more than a page shows.
+        folded: whether it is closed at first.
+    """
+
+    title: str
+    columns: Sequence[Column]
+    rows: Sequence[Mapping[str, Any]]
+    file: str = ""
+    folded: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """One figure of plotly.
+
+    Attributes:
+        name: its id on the page.
+        figure: every axis with its unit; its title becomes the caption.
+        time: whether x is the time of a case's runs: then it shares cursor, zoom and clock with the others.
+    """
+
+    name: str
+    figure: Figure
+    time: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """One part of a page.
+
+    Attributes:
+        name: its id on the page, of letters, digits and hyphens.
+        title: heading.
+        text: what the reader must know to read it.
+        plots, tables: shown below the text.
+        template: file in reports/pages/templates; it may show more than the rest from `context`.
+        context: for a template of its own.
+    """
+
+    name: str
+    title: str
+    text: str = ""
+    plots: Sequence[Plot] = ()
+    tables: Sequence[Table] = ()
+    template: str = "section.html"
+    context: Mapping[str, Any] = field(default_factory=dict)
+
+
+def columns(**titles: str | tuple[str, Kind]) -> tuple[Column, ...]:
+    """Columns from key=title or key=(title, kind)."""
+    return tuple(
+        Column(key=key, title=given) if isinstance(given, str) else Column(key=key, title=given[0], kind=given[1])
+        for key, given in titles.items()
+    )
+
+
+def records(rows: pd.DataFrame) -> list[dict[str, Any]]:
+    """A table of pandas as plain rows."""
+    return [{str(k): v for k, v in record.items()} for record in rows.to_dict(orient="records")]

@@ -1,0 +1,71 @@
+"""The mode strip: one bar a contact and engine, coloured by the state of the row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Mode, Trajectory
+from crossbody.reports.pages.section import Figure
+from crossbody.reports.pages.sheet import plain
+from crossbody.reports.pages.styles import label
+from crossbody.reports.runs.store import Trace
+
+MODE_COLOURS = {
+    Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
+    Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
+}  # fmt: skip
+LONGEST = 150
+"""Intervals of one mode in one bar; of more, the longest are drawn."""
+MOST_CONTACTS = 8
+
+
+def modes(traces: Sequence[Trace], points: int = LONGEST) -> Figure:
+    """One strip a contact and engine."""
+    contacts = list(enumerate(traces[0].about["contacts"][:MOST_CONTACTS]))
+    shown: set[int] = set()
+    bars: list[dict[str, Any]] = []
+    for k, contact in reversed(contacts):
+        for trace in reversed(traces):
+            for mode, spans in _by_mode(trace.run, k).items():
+                name = label(trace) if len(contacts) == 1 else f"{contact}, {label(trace)}"
+                bars.append(_bar(trace, name, mode, spans[:LONGEST]) | {"showlegend": mode not in shown})
+                shown.add(mode)
+    layout = {
+        "title": {"text": "Modes of the state machine"}, "barmode": "overlay", "bargap": 0.25,
+        "height": 150 + 22 * len({bar["y"][0] for bar in bars}),
+        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
+        "xaxis": {"title": {"text": "time [s]"}, "range": [0.0, float(traces[0].run.t[-1])]},
+        "yaxis": {"automargin": True, "tickfont": {"size": 10}},
+    }  # fmt: skip
+    return {"data": bars, "layout": layout}
+
+
+def _bar(trace: Trace, name: str, mode: Mode, spans: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    starts, widths = np.array(spans).T
+    return {
+        "type": "bar", "y": [plain(name)] * len(starts), "base": starts.tolist(), "x": widths.tolist(),
+        "orientation": "h",
+        "marker": {"color": MODE_COLOURS[mode], "line": {"width": 0}}, "name": mode.name, "legendgroup": mode.name,
+        "meta": label(trace),
+        "hovertemplate": f"{mode.name} from %{{base:.9g}} s for %{{x:.6g}} s<extra></extra>",
+    }  # fmt: skip
+
+
+def _spans(run: Trajectory, row: int) -> Iterator[tuple[float, float, int]]:
+    """(from, to, mode) for every interval of constant mode of one row."""
+    modes = run.mode[:, row]
+    cuts = np.flatnonzero(modes[1:] != modes[:-1]) + 1
+    for a, b in zip([0, *cuts], [*cuts, len(modes) - 1], strict=True):
+        yield float(run.t[a]), float(run.t[b]), int(modes[a])
+
+
+def _by_mode(run: Trajectory, row: int) -> dict[Mode, list[tuple[float, float]]]:
+    """(start, length) of the intervals of every mode, the longest first."""
+    found: dict[Mode, list[tuple[float, float]]] = {}
+    for a, b, mode in _spans(run, row) if len(run.t) else ():
+        if mode >= 0:
+            found.setdefault(Mode(mode), []).append((a, b - a))
+    return {mode: sorted(spans, key=lambda span: -span[1]) for mode, spans in found.items()}

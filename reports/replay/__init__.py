@@ -1,0 +1,1 @@
+"""Hardware logs on the command line: what a log holds, replay, identification."""

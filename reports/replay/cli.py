@@ -1,0 +1,64 @@
+"""The commands `crossbody replay` and `crossbody identify`: their options, nothing heavy."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from crossbody.reports.voice import speaks
+
+_Work = TypeVar("_Work", bound=Callable[..., int])
+
+
+def _replayed(command: _Work) -> _Work:
+    """Options that say which log is replayed on which model."""
+    options = (
+        click.argument("path", metavar="LOG", type=click.Path(path_type=Path)),
+        click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them."),
+        click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
+        click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart."),
+        click.option("--repair", metavar="R", multiple=True, help="fill_dropped or drop_duplicates; repeatable."),
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the model; repeatable."),
+        click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
+        click.option("--horizon", type=float, metavar="S", help="Length of a window, s, if not to the next restart."),
+        click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of what was measured, s."),
+        click.option("--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True, metavar="DIR"),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@click.command()
+@_replayed
+@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option("--closed-loop", is_flag=True, help="Recorded references through the model's controller.")
+@speaks
+def replay(wanted: tuple[str, ...], closed_loop: bool, out: Path, **log: Any) -> int:
+    """Replay LOG on a model and say how well it matches."""
+    from crossbody.reports.replay.command import Ask, run_replay
+
+    return run_replay(Ask(**log), "closed_loop" if closed_loop else "forward", wanted, out, _command())
+
+
+@click.command()
+@_replayed
+@click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter, or delay; repeatable.")
+@click.option("--hold", type=int, default=2, show_default=True, help="Every so manieth window is held out; 0: none.")
+@click.option("--starts", type=click.Choice(["measured", "free"]), default="measured", show_default=True)
+@click.option("--stride", type=int, default=1, show_default=True, help="Of so many samples one is compared.")
+@speaks
+def identify(free: tuple[str, ...], hold: int, starts: str, stride: int, out: Path, **log: Any) -> int:
+    """Identify parameters of a model from LOG, with intervals, judged on windows that were held out."""
+    from crossbody.reports.replay.command import Ask, run_identify
+
+    return run_identify(Ask(**log), free, hold, starts, stride, out, _command())
+
+
+def _command() -> str:
+    return shlex.join(["crossbody", *sys.argv[1:]])

@@ -1,0 +1,178 @@
+"""What `crossbody replay` and `crossbody identify` do: read the log, run, write tables and pages, show the metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from crossbody import hw
+from crossbody.hw import Comparison, Fit, Log
+from crossbody.reports import voice
+from crossbody.reports.commands import where
+from crossbody.reports.pages import site as page
+from crossbody.reports.replay import comparison as replay
+from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs.jobs import DEFAULT_ENGINES
+from crossbody.reports.runs.provenance import provenance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """What both commands are told about a log.
+
+    Attributes:
+        path, columns, part, repair: as for `hw.read`.
+        model: name of the model.
+        pairs: K=V, parameters of the model.
+        restart, horizon: s; None for the usual.
+        delay: of the measured coordinates beyond what the map says, s.
+    """
+
+    path: Path
+    columns: str | None
+    part: int | None
+    repair: Sequence[str]
+    model: str
+    pairs: Sequence[str]
+    restart: float | None
+    horizon: float | None
+    delay: float
+
+    def log(self) -> Log:
+        """The log."""
+        return hw.read(self.path, self.columns, part=self.part, repair=self.repair)
+
+
+def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: str) -> int:
+    """Replay a log and write the report.
+
+    Args:
+        ask: log, map and model.
+        kind: "forward" or "closed_loop".
+        wanted: engines, E or E:PROFILE; all usual ones if empty.
+        out: folder to write.
+        command: what was typed, for provenance.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is written.
+    """
+    hw.models.load(ask.model)
+    output.check(out)
+    engines = list(wanted or DEFAULT_ENGINES)
+    with voice.progress(len(engines)) as tell:
+        found = hw.replay(
+            ask.log(), ask.model, kind=kind, wanted=engines, parameters=jobs.parse_settings(ask.pairs),
+            restart=ask.restart, horizon=ask.horizon, delay=ask.delay, tell=tell,
+        )  # fmt: skip
+    rows = replay.verdicts(found, command)
+    _write(out, found, rows, provenance(command, log=replay.log_about(found)), {})
+    metrics = _metrics(found)
+    if not voice.told_as_json({"metrics": metrics, "findings": replay.findings(found)}):
+        if not voice.quiet():
+            _say(found, metrics)
+        where(out)
+    return 0 if not any(p.failed for p in found.predictions) else 1
+
+
+def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, out: Path, command: str) -> int:
+    """Identify parameters, replay the log with them, and write the report.
+
+    Args:
+        ask: log, map and model.
+        free: names of the parameters; "delay" is that of the measured coordinates.
+        hold: every so manieth window is held out.
+        starts: "measured" or "free".
+        stride: of so many samples one is compared.
+        out: folder to write.
+        command: what was typed, for provenance.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is written.
+    """
+    model = hw.models.load(ask.model)
+    output.check(out)
+    log, given = ask.log(), jobs.parse_settings(ask.pairs)
+    fit = hw.identify(
+        log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
+        stride=stride,
+    )  # fmt: skip
+    found = hw.replay(
+        log, model, wanted=(model.engine,), parameters=fit.parameters, restart=ask.restart, horizon=ask.horizon,
+        delay=ask.delay + fit.delay,
+    )  # fmt: skip
+    tables = {"identify": estimates(fit), "held_out": held_out(fit)}
+    told = {
+        "sensitivities": fit.sensitivities, "covariance": fit.covariance, "warnings": list(fit.warnings),
+        "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message,
+    }  # fmt: skip
+    rows = replay.verdicts(found, command)
+    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables)
+    if not voice.told_as_json(tables | {"warnings": pd.DataFrame({"text": list(fit.warnings)})}):
+        if not voice.quiet():
+            for shown in tables.values():
+                print(shown.to_string(index=False, float_format=lambda x: f"{x:.6g}"), end="\n\n")
+            print(f"{fit.sensitivities}\nIntervals: {fit.covariance}")
+        for warning in fit.warnings:
+            print(f"warning: {warning}")
+        where(out)
+    return 0 if fit.success else 1
+
+
+def estimates(fit: Fit) -> pd.DataFrame:
+    """One row an identified parameter."""
+    return pd.DataFrame(
+        {
+            "name": e.name, "value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "start": e.start,
+            "identifiable": e.identifiable,
+        } for e in fit.estimates
+    )  # fmt: skip
+
+
+def held_out(fit: Fit) -> pd.DataFrame:
+    """One row a kind of error: with the parameters at the start and with the estimates, fitted windows and others."""
+    return pd.DataFrame(
+        {
+            "error": name, "fitted_before": fit.before[name][0], "fitted_after": fit.after[name][0],
+            "held_before": fit.before[name][1], "held_after": fit.after[name][1],
+            "change": 100.0 * (fit.after[name][1] / fit.before[name][1] - 1.0),
+        } for name in fit.before
+    )  # fmt: skip
+
+
+def _metrics(found: Comparison) -> pd.DataFrame:
+    columns = ["who", "metric", "channel", "value", "unit"]
+    rows = [
+        {"who": f"{r.engine}:{r.profile}", "metric": r.metric, "channel": r.channel, "value": r.value, "unit": r.unit}
+        for r in found.rows()
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _say(found: Comparison, metrics: pd.DataFrame) -> None:
+    print(f"{replay.tier(found.log)}: {found.log.provenance.file} on {found.model}, {len(found.windows)} windows")
+    for finding in found.log.findings:
+        print(f"note: {finding.channel}, row {finding.row}: {finding.text}")
+    named = (metrics["metric"] + " " + metrics["channel"]).str.strip() + " [" + metrics["unit"] + "]"
+    wide = metrics.assign(metric=named).pivot(index="metric", columns="who", values="value").loc[named.unique()]
+    print(wide.to_string(float_format=lambda x: f"{x:.5g}"))
+    for (engine, profile), why in found.skipped.items():
+        print(f"skipped {engine}:{profile}: {why}")
+
+
+def _write(
+    out: Path, found: Comparison, rows: pd.DataFrame, told: Mapping[str, Any], more: Mapping[str, pd.DataFrame]
+) -> None:
+    with output.folder(out) as made:
+        study.write(made, [], rows, told)
+        tables = {
+            "replay": _metrics(found), "findings": replay.findings(found), "residuals": replay.residuals(found),
+            "correlations": replay.correlations(found), **more,
+        }  # fmt: skip
+        for name, shown in tables.items():
+            study.write_table(made / name, shown, told)
+        replay.save_motions(made / "traces", found)
+        page.write(made)

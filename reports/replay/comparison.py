@@ -1,0 +1,132 @@
+"""A replayed log as tables and motions, the measurement as the truth of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from crossbody.hw import Comparison, Log, Prediction
+from crossbody.reports.judging.comparison import table
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.pages.styles import TRUTH
+from crossbody.reports.runs.store import Trace, save
+
+MEASURED, SYNTHETIC = "measurement", "SYNTHETIC, no measurement"
+
+
+def tier(log: Log) -> str:
+    """What a log is: a measurement, or made by another engine."""
+    return SYNTHETIC if log.provenance.synthetic else MEASURED
+
+
+def variant(log: Log) -> str:
+    """Name of a log in tables: its file, and the number of the run in it."""
+    stem = Path(log.provenance.file).stem.strip("()") or "log"
+    part = "" if log.provenance.part is None else f"_{log.provenance.part}"
+    return f"{'' if not log.provenance.synthetic or 'synthetic' in stem else 'synthetic_'}{stem}{part}"
+
+
+def verdicts(found: Comparison, command: str) -> pd.DataFrame:
+    """Every metric of every engine; nothing is judged: a log has no limits."""
+    source = f"{found.kind}, {len(found.windows)} windows of {found.log.provenance.file}"
+
+    def row(engine: str, profile: str, **more: Any) -> Verdict:
+        return Verdict(
+            case=found.model, variant=variant(found.log), engine=engine, profile=profile, tier=tier(found.log),
+            command=command, **more,
+        )  # fmt: skip
+
+    rows = [
+        row(
+            r.engine, r.profile, metric=f"{r.metric}_{r.channel}" if r.channel else r.metric, value=r.value,
+            unit=r.unit, verdict=Word.INFO, why=source,
+        ) for r in found.rows()
+    ]  # fmt: skip
+    rows += [
+        row(engine, profile, metric="-", value=np.nan, unit="", verdict=Word.SKIPPED, why=why)
+        for (engine, profile), why in found.skipped.items()
+    ]
+    return table(rows)
+
+
+def findings(found: Comparison) -> pd.DataFrame:
+    """What the checks noticed about the log, and what was repaired."""
+    told = [
+        {"what": f.check, "channel": f.channel, "row": f.row, "t": f.t, "text": f.text} for f in found.log.findings
+    ]  # fmt: skip
+    told += [
+        {"what": "repair", "channel": "", "row": r.row, "t": r.t, "text": f"{r.name}: {r.rows} rows"}
+        for r in found.log.provenance.repairs
+    ]
+    return pd.DataFrame(told, columns=["what", "channel", "row", "t", "text"])
+
+
+def correlations(found: Comparison) -> pd.DataFrame:
+    """Residual tests: every lag of every autocorrelation and of every correlation with an input."""
+    rows = [row for prediction in found.predictions for row in _correlations(found, prediction)]
+    return pd.DataFrame(rows, columns=["who", "channel", "input", "lag", "value", "band"])
+
+
+def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[str, Any]]:
+    if prediction.failed:
+        return
+    who = f"{prediction.engine}:{prediction.profile}"
+    for i, c in enumerate(found.coordinates):
+        tests = {"": found.autocorrelation(prediction, i)}
+        count = found.windows[0].u.shape[1]
+        tests |= {f"input {j + 1}": found.crosscorrelation(prediction, i, j) for j in range(count)}
+        for name, test in tests.items():
+            for lag, value in zip(test.lags.tolist(), test.values.tolist(), strict=True):
+                yield {
+                    "who": who, "channel": c.name, "input": name, "lag": lag, "value": value, "band": test.band,
+                }  # fmt: skip
+
+
+def residuals(found: Comparison, points: int = 2000) -> pd.DataFrame:
+    """Measured less predicted, thinned by taking every so manieth sample of each window, ends included."""
+    rows = []
+    for prediction in found.predictions:
+        who = f"{prediction.engine}:{prediction.profile}"
+        left, t = found.residual(prediction), found.time
+        at = np.unique(np.linspace(0, len(t) - 1, min(points, len(t))).astype(int))
+        for i, c in enumerate(found.coordinates):
+            rows.append(pd.DataFrame({"who": who, "channel": c.name, "unit": c.unit, "t": t[at], "value": left[at, i]}))
+    return (
+        pd.concat(rows, ignore_index=True) if rows else pd.DataFrame(columns=["who", "channel", "unit", "t", "value"])
+    )
+
+
+def log_about(found: Comparison) -> dict[str, Any]:
+    """Provenance of the log, for that of the report."""
+    p = found.log.provenance
+    return {
+        "file": p.file, "sha256": p.sha256, "format": p.format, "library": p.library, "part": p.part,
+        "synthetic": p.synthetic, "about": p.about, "columns": p.columns, "delay": found.delay,
+        "repairs": [f"{r.name}: {r.rows} rows from row {r.row}" for r in p.repairs],
+    }  # fmt: skip
+
+
+def save_motions(folder: Path, found: Comparison) -> None:
+    """The measurement as the truth, and every prediction beside it, into an empty folder."""
+    measured = found.measurement()
+    save(folder / "0000.parquet", Trace(about=_about(found, TRUTH, "") | _source(found.log), run=measured))
+    for i, prediction in enumerate(found.predictions, start=1):
+        about = _about(found, prediction.engine, prediction.profile) | {"settings": dict(prediction.settings)}
+        run = found.trajectory(prediction)
+        save(folder / f"{i:04d}.parquet", Trace(about=about, run=run, truth=measured))
+
+
+def _source(log: Log) -> dict[str, Any]:
+    return {"tier": tier(log), "source": f"{log.provenance.file}. {log.provenance.about}".strip()}
+
+
+def _about(found: Comparison, engine: str, profile: str) -> dict[str, Any]:
+    return {
+        "case": found.model, "variant": variant(found.log), "title": found.title, "mechanism": "",
+        "engine": engine, "profile": profile, "contacts": [], "parameters": dict(found.parameters),
+        "coordinates": [{"name": c.name, "unit": c.unit} for c in found.coordinates], "units": dict(found.units),
+    }  # fmt: skip

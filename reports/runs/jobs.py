@@ -1,0 +1,197 @@
+"""Which engine runs which case, and the running itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from crossbody import cases, engines
+from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName, Value
+from crossbody.reports.judging.audit import AuditRow, audit
+from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
+
+DEFAULT_CASES = ("bouncing_ball",)
+DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
+FINER_STEP = 4.0
+FINEST_TOLERANCE = 1e-12
+_EXAMPLES = {"--set": "a1=0", "--setting": "dt=1e-4"}
+REFINED_S = 20.0
+"""Time that a refinement may take, s: an integrator that grinds to a halt at 1e-12 has none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pick:
+    """One engine under one profile, or the sentence that says why it cannot be had."""
+
+    engine: str
+    profile: str
+    skipped: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseResult:
+    """A case, its truth, and every run."""
+
+    case: Case
+    truth: Truth
+    entries: tuple[Entry, ...]
+
+
+def parse_engine(text: str) -> tuple[str, str | None]:
+    """E or E:PROFILE."""
+    engine, _, profile = text.partition(":")
+    return engine, profile or None
+
+
+def parse_settings(pairs: Sequence[str], option: str = "--set") -> dict[str, Value]:
+    """Parameters or settings from k=v; a number where it reads as one.
+
+    Raises:
+        InvalidValue: for a text without "=".
+    """
+    found: dict[str, Value] = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals or not name.strip() or not text.strip():
+            raise InvalidValue(f"{option} {pair!r} is not name=value, for example {option} {_EXAMPLES[option]}.")
+        try:
+            found[name.strip()] = float(text)
+        except ValueError:
+            found[name.strip()] = text.strip()
+    return found
+
+
+def picks(wanted: Sequence[str]) -> tuple[Pick, ...]:
+    """Every engine and profile asked for; an engine that is not installed is a pick that says so.
+
+    Raises:
+        UnknownName: for an engine or profile that does not exist.
+    """
+    names = wanted or [name for name in DEFAULT_ENGINES if name in engines.names()]
+    return tuple(dict.fromkeys(pick for text in names for pick in _profiles(*parse_engine(text))))
+
+
+def _profiles(name: str, profile: str | None) -> Iterator[Pick]:
+    try:
+        engine = engines.load(name)
+    except EngineUnavailable as error:
+        yield Pick(engine=name, profile=profile or "*", skipped=str(error))
+        return
+    if profile is not None and profile not in engine.profiles:
+        raise UnknownName(f"profile of {name}", profile, engine.profiles)
+    for each in engine.profiles if profile is None else (profile,):
+        yield Pick(engine=name, profile=each)
+
+
+def load_cases(names: Sequence[str], variant: str | None, overrides: Mapping[str, Value]) -> tuple[Case, ...]:
+    """Every case asked for, in all its variants unless one is named."""
+    found = []
+    for name in names or DEFAULT_CASES:
+        chosen = (variant,) if variant is not None else cases.variants(name)
+        found += [cases.load(name, each, **overrides) for each in chosen]
+    return tuple(found)
+
+
+def run_case(
+    case: Case,
+    wanted: Sequence[Pick],
+    rtol: float | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+    settings: Mapping[str, Value] | None = None,
+    truth: Truth | None = None,
+) -> CaseResult:
+    """Run a case on every engine asked for.
+
+    Args:
+        case: what is run.
+        wanted: on which engines.
+        rtol: tolerance for the engines that have one.
+        tell: is told what is being done.
+        settings: of the engines, by name; each takes those that it knows.
+        truth: of the case, where it is known already.
+
+    Raises:
+        UnknownName: for a setting that none of them knows.
+    """
+    asked = dict(settings or {}) | ({} if rtol is None else {"rtol": rtol})
+    tell(f"{case.label}: truth")
+    truth = truth_of(case) if truth is None else truth
+    reference = _reference_audit(case)
+    entries = []
+    for pick in wanted:
+        tell(f"{case.label}: {pick.engine}:{pick.profile}")
+        entries.append(_entry(case, pick, asked, reference))
+    _check_known(settings or {}, entries)
+    return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def _check_known(settings: Mapping[str, Value], entries: Sequence[Entry]) -> None:
+    ran = [entry.settings for entry in entries if entry.run is not None]
+    for name in settings:
+        if ran and not any(name in known for known in ran):
+            raise UnknownName("setting of these engines", name, {key for known in ran for key in known})
+
+
+def _reference_audit(case: Case) -> Mapping[str, Any]:
+    if "reference" not in engines.names():
+        return {}
+    return engines.load("reference").prepare(case, "compiled").audit()
+
+
+def _entry(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
+    if pick.skipped:
+        return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
+    try:
+        prepared = prepare(case, pick, asked)
+    except CaseUnsupported as error:
+        return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
+    rows: tuple[AuditRow, ...] = audit(prepared.audit(), reference, case) if reference else ()
+    natural: Trajectory = prepared.run()
+    return Entry(
+        engine=pick.engine,
+        profile=pick.profile,
+        settings=prepared.settings,
+        run=_dense(case, pick, prepared, natural, asked),
+        stepped=natural.t,
+        audit=rows,
+        refined=_refined(case, pick, prepared.settings),
+        own=None if (followed := getattr(prepared, "follows", None)) is None else law_of(followed),
+    )
+
+
+def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> Any:
+    """A prepared run, with those of the asked settings that the engine has."""
+    engine = engines.load(pick.engine)
+    prepared = engine.prepare(case, pick.profile)
+    own = {key: value for key, value in asked.items() if key in prepared.settings}
+    return engine.prepare(case, pick.profile, **own) if own else prepared
+
+
+def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Mapping[str, Value]) -> Trajectory:
+    """The run; where the engine can be asked for samples, again with enough of them to be drawn."""
+    if "samples" not in prepared.settings or not natural.outcome.ok:
+        return natural
+    asked = {key: prepared.settings[key] for key in ("rtol", *given) if key in prepared.settings}
+    times = sample_times(natural, case.t_end)
+    dense = engines.load(pick.engine).prepare(case, pick.profile, samples=times, **asked).run()
+    if not dense.outcome.ok or dense.events != natural.events:
+        return natural  # samples have changed the steps: it is another run
+    return replace(with_both_sides(dense, natural), wall_s=natural.wall_s, steps=natural.steps)
+
+
+def _refined(case: Case, pick: Pick, settings: Mapping[str, Any]) -> Trajectory | None:
+    """The same engine with a step four times finer or the tightest tolerance; None if it has neither."""
+    if "dt" in settings:
+        finer = {"dt": float(settings["dt"]) / FINER_STEP}
+    elif "rtol" in settings:
+        finer = {"rtol": min(max(FINEST_TOLERANCE, case.tight), float(settings["rtol"]))}
+    else:
+        return None
+    if "time_limit" in settings:
+        finer["time_limit"] = REFINED_S
+    engine = engines.load(pick.engine)
+    run = engine.prepare(case, pick.profile, **finer).run()
+    return run if run.outcome.ok and math.isfinite(float(run.t[-1])) else None
