@@ -20,10 +20,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases import _maze_geometry as geometry
 from crossbody.cases._case import Case, Coordinate, Law, Parameter, Value
-from crossbody.cases._maze_claims import claims
-from crossbody.cases._maze_limits import limits
+from crossbody.cases._maze import geometry
+from crossbody.cases._maze.claims import claims
+from crossbody.cases._maze.limits import limits
 
 
 def _positive(default: float, unit: str, doc: str) -> Parameter:

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from crossbody.cases import _closed_forms as cf
-from crossbody.cases._ball_limits import limits
-from crossbody.cases._ball_truth import Ball, Motion
+from crossbody.cases._ball.limits import limits
+from crossbody.cases._ball.truth import Ball, Motion
 from crossbody.cases._case import Case, Claim, Coordinate, Law, Parameter, Tier, Value
 
 PARAMETERS = {

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases import _delta_pose as pose
-from crossbody.cases import _delta_scene as delta
 from crossbody.cases._case import Case, Value
-from crossbody.cases._delta_limits import CHAOTIC, FREE
+from crossbody.cases._delta import pose
+from crossbody.cases._delta import scene as delta
+from crossbody.cases._delta.limits import CHAOTIC, FREE
 
 PARAMETERS = {**delta.ROBOT, **delta.position(0.05, 0.02, 0.5), **delta.horizon(2.5)}
 

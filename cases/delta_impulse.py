@@ -10,10 +10,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases import _delta_pose as pose
-from crossbody.cases import _delta_scene as delta
 from crossbody.cases._case import Case, Parameter, Value
-from crossbody.cases._delta_limits import IMPULSE
+from crossbody.cases._delta import pose
+from crossbody.cases._delta import scene as delta
+from crossbody.cases._delta.limits import IMPULSE
 from crossbody.cases._errors import InvalidValue
 
 PARAMETERS = {

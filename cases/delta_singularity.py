@@ -11,10 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases import _delta_pose as pose
-from crossbody.cases import _delta_scene as delta
 from crossbody.cases._case import Case, Claim, Parameter, Tier, Value
-from crossbody.cases._delta_limits import SINGULARITY
+from crossbody.cases._delta import pose
+from crossbody.cases._delta import scene as delta
+from crossbody.cases._delta.limits import SINGULARITY
 
 PARAMETERS = {
     **delta.ROBOT,

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases import _delta_pose as pose
-from crossbody.cases import _delta_scene as delta
 from crossbody.cases._case import Case, Claim, Parameter, Tier, Value
-from crossbody.cases._delta_limits import ON_THE_CIRCLE, TRACKING
+from crossbody.cases._delta import pose
+from crossbody.cases._delta import scene as delta
+from crossbody.cases._delta.limits import ON_THE_CIRCLE, TRACKING
 
 PARAMETERS = {
     **delta.ROBOT,

@@ -14,9 +14,9 @@ import numpy as np
 from crossbody.cases import _closed_forms as cf
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Claim, Coordinate, Parameter, Tier, Value
-from crossbody.cases._cradle_limits import limits
-from crossbody.cases._cradle_motion import Motion
-from crossbody.cases._cradle_scene import FROZEN, Row, law, row
+from crossbody.cases._cradle.limits import limits
+from crossbody.cases._cradle.motion import Motion
+from crossbody.cases._cradle.scene import FROZEN, Row, law, row
 from crossbody.cases._parameters import NumberOrWord, Numbers
 
 AUTO = "auto"

@@ -15,8 +15,8 @@ from crossbody.cases import _closed_forms as cf
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Claim, Coordinate, Law, Parameter, Tier, Value
 from crossbody.cases._errors import SceneError
-from crossbody.cases._red_body_limits import limits
-from crossbody.cases._red_body_order import STAGES, Fall, inequalities
+from crossbody.cases._red_body.limits import limits
+from crossbody.cases._red_body.order import STAGES, Fall, inequalities
 
 _LONGER = 1.1
 """Part by which gravity may make the blow of the right corner longer than its closed form."""

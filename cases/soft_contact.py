@@ -11,11 +11,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases import _soft_delta as robot
-from crossbody.cases import _soft_scene as soft
 from crossbody.cases._case import Case, Coordinate, Parameter, Value
 from crossbody.cases._errors import InvalidValue
-from crossbody.cases._soft_claims import claims, limits
+from crossbody.cases._soft import robot
+from crossbody.cases._soft import scene as soft
+from crossbody.cases._soft.claims import claims, limits
 
 PARAMETERS = {
     **soft.FINGERS,

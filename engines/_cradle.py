@@ -13,7 +13,7 @@ import numpy as np
 
 from crossbody.cases import Case, Law
 from crossbody.cases._arrays import Floats
-from crossbody.cases._cradle_scene import masses
+from crossbody.cases._cradle.scene import masses
 from crossbody.engines import _scale
 
 

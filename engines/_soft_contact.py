@@ -13,7 +13,7 @@ import numpy as np
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
-from crossbody.cases._soft_scene import numbers
+from crossbody.cases._soft.scene import numbers
 
 NAMES = ("flange", "left pad", "right pad", "block", "error", "left sensor", "right sensor", "shift", "clock")
 CLOCK = len(NAMES) - 1

@@ -14,40 +14,49 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from crossbody.hw import models
-    from crossbody.hw._columns import Columns, Role, Signal, Time, dump_columns, load_columns, maps, parse_columns
-    from crossbody.hw._comparison import Comparison, Prediction
-    from crossbody.hw._draft import draft_text
-    from crossbody.hw._finding import Finding
-    from crossbody.hw._fit import Estimate, Fit
-    from crossbody.hw._identify import identify
-    from crossbody.hw._inverse import Inferred, estimate_force, inverse
-    from crossbody.hw._log import Channel, Log, Provenance, Repair
-    from crossbody.hw._read import Scan, check, parts, read, scan
-    from crossbody.hw._replay import replay
-    from crossbody.hw._rows import Rows
-    from crossbody.hw._sensors import Sensor, unlagged
-    from crossbody.hw._store import store
-    from crossbody.hw._survey import GroupSurvey, Survey, survey
-    from crossbody.hw._synthetic_log import Sensors, delta_log
-    from crossbody.hw._synthetic_plant import Plant, Push, delta_plant
+    from crossbody.hw.checks.finding import Finding
+    from crossbody.hw.fitting.fit import Estimate, Fit
+    from crossbody.hw.fitting.identify import identify
+    from crossbody.hw.reading.columns import (
+        Columns,
+        Role,
+        Signal,
+        Time,
+        dump_columns,
+        load_columns,
+        maps,
+        parse_columns,
+    )
+    from crossbody.hw.reading.draft import draft_text
+    from crossbody.hw.reading.log import Channel, Log, Provenance, Repair
+    from crossbody.hw.reading.read import Scan, check, parts, read, scan
+    from crossbody.hw.reading.rows import Rows
+    from crossbody.hw.reading.store import store
+    from crossbody.hw.reading.survey import GroupSurvey, Survey, survey
+    from crossbody.hw.replaying.comparison import Comparison, Prediction
+    from crossbody.hw.replaying.inverse import Inferred, estimate_force, inverse
+    from crossbody.hw.replaying.replay import replay
+    from crossbody.hw.replaying.sensors import Sensor, unlagged
+    from crossbody.hw.synthetic.log import Sensors, delta_log
+    from crossbody.hw.synthetic.plant import Plant, Push, delta_plant
 
 _HOMES = {
-    "_columns": ("Columns", "Role", "Signal", "Time", "dump_columns", "load_columns", "maps", "parse_columns"),
-    "_comparison": ("Comparison", "Prediction"),
-    "_draft": ("draft_text",),
-    "_finding": ("Finding",),
-    "_fit": ("Estimate", "Fit"),
-    "_identify": ("identify",),
-    "_inverse": ("Inferred", "estimate_force", "inverse"),
-    "_log": ("Channel", "Log", "Provenance", "Repair"),
-    "_read": ("Scan", "check", "parts", "read", "scan"),
-    "_replay": ("replay",),
-    "_rows": ("Rows",),
-    "_sensors": ("Sensor", "unlagged"),
-    "_store": ("store",),
-    "_synthetic_log": ("Sensors", "delta_log"),
-    "_synthetic_plant": ("Plant", "Push", "delta_plant"),
-    "_survey": ("GroupSurvey", "Survey", "survey"),
+    "reading.columns": ("Columns", "Role", "Signal", "Time", "dump_columns", "load_columns", "maps", "parse_columns"),
+    "replaying.comparison": ("Comparison", "Prediction"),
+    "reading.draft": ("draft_text",),
+    "checks.finding": ("Finding",),
+    "fitting.fit": ("Estimate", "Fit"),
+    "fitting.identify": ("identify",),
+    "replaying.inverse": ("Inferred", "estimate_force", "inverse"),
+    "reading.log": ("Channel", "Log", "Provenance", "Repair"),
+    "reading.read": ("Scan", "check", "parts", "read", "scan"),
+    "replaying.replay": ("replay",),
+    "reading.rows": ("Rows",),
+    "replaying.sensors": ("Sensor", "unlagged"),
+    "reading.store": ("store",),
+    "synthetic.log": ("Sensors", "delta_log"),
+    "synthetic.plant": ("Plant", "Push", "delta_plant"),
+    "reading.survey": ("GroupSurvey", "Survey", "survey"),
 }
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}
 

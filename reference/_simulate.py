@@ -40,6 +40,6 @@ def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> A
         from crossbody.reference._run import CompiledRun
 
         return CompiledRun(system, *start, options)
-    from crossbody.reference._sundials import SundialsRun
+    from crossbody.reference.sundials.run import SundialsRun
 
     return SundialsRun(system, *start, options)

@@ -9,9 +9,8 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, InvalidValue, Outcome, SceneError, UnknownName
-from crossbody.cases import _maze_closed_forms as maze_forms
+from crossbody.cases._maze import closed_forms as maze_forms
 from crossbody.reference import delta, simulate
-from crossbody.reference._equations import Equations
 from crossbody.reference.linear import (
     LinearModel,
     controllable,
@@ -23,6 +22,7 @@ from crossbody.reference.linear import (
     tangents,
     trim,
 )
+from crossbody.reference.sundials.equations import Equations
 from crossbody.reports.analysis import numbers as analyse
 
 RNG = np.random.default_rng(27)

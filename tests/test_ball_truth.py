@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from crossbody.cases import Mode, _ball_truth, load
+from crossbody.cases import Mode, load
 from crossbody.cases import _closed_forms as cf
-from crossbody.cases._ball_truth import Ball, Motion
+from crossbody.cases._ball import truth as _ball_truth
+from crossbody.cases._ball.truth import Ball, Motion
 from crossbody.cases._linear_arc import LinearArc
 
 SCENES = {

@@ -16,8 +16,8 @@ from scipy.special import ellipk
 
 from crossbody.cases import Case, Outcome, Tier, Trajectory, load
 from crossbody.cases import _closed_forms as cf
-from crossbody.cases._cradle_motion import Motion
-from crossbody.cases._cradle_rules import answer
+from crossbody.cases._cradle.motion import Motion
+from crossbody.cases._cradle.rules import answer
 from crossbody.engines import load as engine
 from crossbody.reference import Options, prepare
 from crossbody.reference.systems import sliders

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, load
-from crossbody.cases._cradle_impact import delassus, pushes
-from crossbody.cases._cradle_motion import Motion
-from crossbody.cases._cradle_rules import RULES, answer, block, simultaneous
-from crossbody.cases._cradle_scene import Row
+from crossbody.cases._cradle.impact import delassus, pushes
+from crossbody.cases._cradle.motion import Motion
+from crossbody.cases._cradle.rules import RULES, answer, block, simultaneous
+from crossbody.cases._cradle.scene import Row
 
 ONE = Row(masses=np.full(5, 0.1), lifted=1, speed=1.0, gap=0.0, a0=1e6, zeta=0.0)
 THREE = replace(ONE, masses=np.ones(3))

@@ -9,7 +9,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, InvalidValue, Outcome, SceneError, Tier, Trajectory, load
-from crossbody.cases import _delta_pose as pose
+from crossbody.cases._delta import pose
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.kinematics import tips
@@ -136,7 +136,7 @@ def test_where_lam_is_ill_posed_its_force_is_compared_instead(tilt: int) -> None
     """H loses rank: no lam is reported; H^T lam is unique and the same in Pinocchio, MuJoCo and least squares."""
     pin = pytest.importorskip("pinocchio")
     mujoco = pytest.importorskip("mujoco")
-    from crossbody.engines import _delta_chart as chart
+    from crossbody.engines._delta import chart
     from crossbody.engines.mujoco._delta_model import compiled
     from crossbody.engines.pinocchio._delta_model import by_hand
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Law
-from crossbody.engines import _delta_chart as chart
+from crossbody.engines._delta import chart
 from crossbody.reference import delta
 from crossbody.reference.systems import delta as kernels
 

@@ -105,7 +105,7 @@ def test_impulse_changes_the_momentum_that_the_loops_leave_free():
 def test_pulse_under_servos_agrees_with_pinocchio():
     """5 s at rtol 1e-10 against Pinocchio's constrained dynamics through SciPy's DOP853 at 1e-13."""
     pytest.importorskip("pinocchio")
-    from crossbody.engines import _delta_chart as chart
+    from crossbody.engines._delta import chart
     from crossbody.engines.pinocchio._delta_model import by_hand
 
     robot = delta.LIGHT

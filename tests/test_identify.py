@@ -9,9 +9,9 @@ from rig_data import channels, log_of, needs_pendulum, pendulum, run_as_log
 from crossbody import cases, engines, hw
 from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw import models
-from crossbody.hw._derivative import Exact
-from crossbody.hw._windows import windows
+from crossbody.hw.fitting.derivative import Exact
 from crossbody.hw.models._contract import Segment
+from crossbody.hw.replaying.windows import windows
 
 TRUE = {"k1": 5e-4, "s1": 8e-4, "k2": 2e-4, "s2": 3e-4, "slip": 0.05}
 

@@ -13,9 +13,9 @@ from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import LogFormatError, SceneError, UnknownName
-from crossbody.hw._check_clock import ClockCheck
-from crossbody.hw._check_rates import RateCheck
-from crossbody.hw._check_values import ValueCheck
+from crossbody.hw.checks.clock import ClockCheck
+from crossbody.hw.checks.rates import RateCheck
+from crossbody.hw.checks.values import ValueCheck
 
 STEP = 8.8e-4
 COLUMNS = """[time]

@@ -13,7 +13,7 @@ from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import ColumnMapError, InvalidValue
-from crossbody.hw._units import to_si
+from crossbody.hw.reading.units import to_si
 
 GOOD = """[time]
 column = "t"

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from crossbody.cases import CaseUnsupported, Outcome, load
-from crossbody.cases import _maze_closed_forms as cf
+from crossbody.cases._maze import closed_forms as cf
 from crossbody.engines import load as load_engine
-from crossbody.engines._maze_machine import MazeMachine
-from crossbody.engines._maze_rows import MazeRows, Place
-from crossbody.engines._maze_scene import ball_maze
+from crossbody.engines._maze.machine import MazeMachine
+from crossbody.engines._maze.rows import MazeRows, Place
+from crossbody.engines._maze.scene import ball_maze
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import audit
 

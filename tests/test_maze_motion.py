@@ -10,8 +10,8 @@ import pytest
 from scipy.linalg import expm
 
 from crossbody.cases import Mode, Outcome, load
-from crossbody.cases import _maze_closed_forms as cf
-from crossbody.cases._maze_geometry import Ring, maze_of
+from crossbody.cases._maze import closed_forms as cf
+from crossbody.cases._maze.geometry import Ring, maze_of
 from crossbody.cases.ball_maze import VARIANTS
 from crossbody.reference import prepare, simulate
 from crossbody.reference._options import Options

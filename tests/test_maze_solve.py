@@ -11,7 +11,7 @@ import pytest
 
 from crossbody.cases import CrossbodyError, Mode, Outcome, load
 from crossbody.cases import _closed_forms as cf
-from crossbody.cases import _maze_closed_forms as maze_forms
+from crossbody.cases._maze import closed_forms as maze_forms
 from crossbody.reference import simulate
 from crossbody.reference.systems import maze
 from crossbody.reports import commands, metrics

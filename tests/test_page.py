@@ -280,7 +280,8 @@ def test_results_of_another_version_are_told(tmp_path: Path, result: CaseResult)
 
 def test_a_page_needs_no_engine(out: Path) -> None:
     code = (
-        "import sys; from pathlib import Path; from crossbody.reports.pages import site; site.write(Path(sys.argv[1])); "
+        "import sys; from pathlib import Path; from crossbody.reports.pages import site; "
+        "site.write(Path(sys.argv[1])); "
         "print(sorted({'mujoco', 'pinocchio', 'sksundae', 'numba'} & set(sys.modules)))"
     )
     said = subprocess.run([sys.executable, "-c", code, str(out)], capture_output=True, text=True, check=True).stdout

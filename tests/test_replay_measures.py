@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from crossbody.cases import InvalidValue
-from crossbody.hw import Sensor, _measures, unlagged
-from crossbody.hw._impacts import impacts, least_of, matched
-from crossbody.hw._rates import derivatives, felt
-from crossbody.hw._sensors import lagged
-from crossbody.hw._whiteness import autocorrelation, crosscorrelation
+from crossbody.hw import Sensor, unlagged
+from crossbody.hw.replaying import measures as _measures
+from crossbody.hw.replaying.impacts import impacts, least_of, matched
+from crossbody.hw.replaying.rates import derivatives, felt
+from crossbody.hw.replaying.sensors import lagged
+from crossbody.hw.replaying.whiteness import autocorrelation, crosscorrelation
 
 STEP = 0.88e-3
 

@@ -13,7 +13,7 @@ from wall_pendulum import wall_pendulum
 
 from crossbody.cases import InvalidValue, Outcome, SceneError, Trajectory
 from crossbody.reference import System, delta, simulate
-from crossbody.reference._equations import Equations
+from crossbody.reference.sundials.equations import Equations
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 INDEPENDENT = ("cvode", "ida")

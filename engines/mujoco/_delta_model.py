@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 
 from crossbody.cases import Law
-from crossbody.engines._delta_mjcf import mjcf
+from crossbody.engines._delta.mjcf import mjcf
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, direct_solref, without_regularisation
 from crossbody.reference.delta import Robot
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
-from crossbody.engines._maze_machine import MazeMachine
-from crossbody.engines._maze_rows import SLIP_BELOW
+from crossbody.engines._maze.machine import MazeMachine
+from crossbody.engines._maze.rows import SLIP_BELOW
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import captured, hooked
 from crossbody.engines.mujoco._maze_charts import Charts

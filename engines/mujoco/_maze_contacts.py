@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.engines._maze_edges import SOLID, wrapped
-from crossbody.engines._maze_memory import angle
-from crossbody.engines._maze_rows import ABOVE, BELOW, SLIP_OF, Place
-from crossbody.engines._maze_scene import BallMaze
+from crossbody.engines._maze.edges import SOLID, wrapped
+from crossbody.engines._maze.memory import angle
+from crossbody.engines._maze.rows import ABOVE, BELOW, SLIP_OF, Place
+from crossbody.engines._maze.scene import BallMaze
 
 State = tuple[float, ...]
 

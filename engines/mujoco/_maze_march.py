@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 
 from crossbody.cases import Outcome
 from crossbody.cases._arrays import Floats
-from crossbody.engines._maze_log import MazeLog
-from crossbody.engines._maze_machine import MazeMachine, Settled
-from crossbody.engines._maze_memory import CONTACT, FREE
-from crossbody.engines._maze_rows import NORMALS
+from crossbody.engines._maze.log import MazeLog
+from crossbody.engines._maze.machine import MazeMachine, Settled
+from crossbody.engines._maze.memory import CONTACT, FREE
+from crossbody.engines._maze.rows import NORMALS
 from crossbody.engines.mujoco._march import SAME_INSTANT
 from crossbody.engines.mujoco._maze_charts import Charts
 

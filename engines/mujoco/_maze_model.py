@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 
 from crossbody.cases import Law
-from crossbody.engines._maze_scene import BallMaze
+from crossbody.engines._maze.scene import BallMaze
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, direct_solref
 
 FAR = 1e10

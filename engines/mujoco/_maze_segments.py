@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases._maze_geometry import THICKNESS, Ring
-from crossbody.engines._maze_scene import BallMaze
+from crossbody.cases._maze.geometry import THICKNESS, Ring
+from crossbody.engines._maze.scene import BallMaze
 
 ANGLE = math.radians(5.0)
 """Longest chord, as an angle at the axis."""

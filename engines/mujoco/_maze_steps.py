@@ -11,11 +11,11 @@ import numpy as np
 
 from crossbody.cases import Event, Mode, Outcome
 from crossbody.cases._arrays import Floats
-from crossbody.engines._maze_log import MazeLog
-from crossbody.engines._maze_machine import MazeMachine, Settled, switches
-from crossbody.engines._maze_memory import CONTACT, FREE, Memory
-from crossbody.engines._maze_rows import ABOVE, BELOW, NORMALS, SLIP_OF
-from crossbody.engines._maze_scene import BallMaze
+from crossbody.engines._maze.log import MazeLog
+from crossbody.engines._maze.machine import MazeMachine, Settled, switches
+from crossbody.engines._maze.memory import CONTACT, FREE, Memory
+from crossbody.engines._maze.rows import ABOVE, BELOW, NORMALS, SLIP_OF
+from crossbody.engines._maze.scene import BallMaze
 from crossbody.engines.mujoco._maze_contacts import ContactForces
 
 State = tuple[float, ...]

@@ -14,9 +14,9 @@ import numpy as np
 
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
-from crossbody.engines import _delta_chart as chart
-from crossbody.engines._delta_forces import forces
-from crossbody.engines._delta_scene import Delta, delta, in_absolute
+from crossbody.engines._delta import chart
+from crossbody.engines._delta.forces import forces
+from crossbody.engines._delta.scene import Delta, delta, in_absolute
 from crossbody.engines.mujoco._delta_model import compiled
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
@@ -59,6 +59,16 @@ def build(case: Case, profile: str, dt: float) -> Scene:
     )
     scene.audit = _audit(case, scene, matched=profile == "matched")
     return scene
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The matched model at an equilibrium under constant torques, no servo and no controller."""
+    own, (r, rd) = unpowered(case, spot.u), chart.to_tree(spot.q, spot.v)
+    model = compiled(own.robot, case.law)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = r, rd
+    data.xfrc_applied[[model.body(f"tip{i}").id for i in (1, 2, 3)], :3] = spot.u[3:] / 3
+    return Stand(model=model, data=data, chart=chart.linear(r), hook=_hook(own, data))
 
 
 def _start(own: Delta, model: Any, data: Any) -> Callable[[], None]:

@@ -13,8 +13,8 @@ import mujoco
 
 from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases._arrays import Floats
-from crossbody.engines._maze_log import MazeLog
-from crossbody.engines._maze_scene import ONLY_CONTINUOUS, BallMaze, ball_maze
+from crossbody.engines._maze.log import MazeLog
+from crossbody.engines._maze.scene import ONLY_CONTINUOUS, BallMaze, ball_maze
 from crossbody.engines.mujoco import _maze_audit as audits
 from crossbody.engines.mujoco import _maze_segments as segments
 from crossbody.engines.mujoco._globals import captured, hooked

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from crossbody.cases import Law, SceneError
 from crossbody.cases._arrays import Floats
-from crossbody.engines._delta_mjcf import mjcf
+from crossbody.engines._delta.mjcf import mjcf
 from crossbody.reference.delta import Robot
 from crossbody.reference.delta.kinematics import rotations
 

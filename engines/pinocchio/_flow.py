@@ -13,7 +13,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Log
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Settled, first_modes
 from crossbody.engines.pinocchio._scene import World
-from crossbody.reference._quiet import quiet
+from crossbody.reference.sundials.quiet import quiet
 
 PER_SOLVE = 100_000
 """Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""

@@ -11,11 +11,11 @@ from sksundae.cvode import CVODE
 
 from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
-from crossbody.engines._maze_log import MazeLog
-from crossbody.engines._maze_machine import NG, MazeMachine, Settled
-from crossbody.engines._maze_memory import Memory
+from crossbody.engines._maze.log import MazeLog
+from crossbody.engines._maze.machine import NG, MazeMachine, Settled
+from crossbody.engines._maze.memory import Memory
 from crossbody.engines.pinocchio._flow import PER_SOLVE, ROOT_FOUND, SAME_INSTANT, TINY
-from crossbody.reference._quiet import quiet
+from crossbody.reference.sundials.quiet import quiet
 
 
 class MazeFlow:

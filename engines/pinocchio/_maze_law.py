@@ -9,9 +9,9 @@ import pinocchio as pin
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
-from crossbody.engines._maze_machine import MazeMachine
-from crossbody.engines._maze_memory import Memory
-from crossbody.engines._maze_scene import BallMaze
+from crossbody.engines._maze.machine import MazeMachine
+from crossbody.engines._maze.memory import Memory
+from crossbody.engines._maze.scene import BallMaze
 from crossbody.engines.pinocchio._rows import ALGEBRA
 
 State = tuple[float, ...]
@@ -50,7 +50,7 @@ class MazeLaw:
         self.solve = ALGEBRA[algebra](self.model, self.data, self.tau)
 
     def accelerate(self, q: State, v: State, memory: Memory) -> tuple[Floats, Floats]:
-        """See `crossbody.engines._maze_machine.Accelerate`."""
+        """See `crossbody.engines._maze.machine.Accelerate`."""
         self.q[:], self.v[:] = q, v
         brake = self.maze.braking(v, memory)
         self.tau[0], self.tau[3] = self.maze.torque(q, v, memory) - brake, brake

@@ -13,7 +13,7 @@ from sksundae.cvode import CVODE
 from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Chart, Log, Modes
-from crossbody.reference._quiet import quiet
+from crossbody.reference.sundials.quiet import quiet
 
 PER_SOLVE = 100_000
 """Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
-from crossbody.engines import _delta_chart as chart
-from crossbody.engines._delta_forces import forces
-from crossbody.engines._delta_scene import Delta, delta, in_absolute
+from crossbody.engines._delta import chart
+from crossbody.engines._delta.forces import forces
+from crossbody.engines._delta.scene import Delta, delta, in_absolute
 from crossbody.engines.pinocchio._delta_model import Closed, by_hand, imported
 from crossbody.engines.pinocchio._smooth import Smooth
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, Parameter, Trajectory, Value
-from crossbody.engines._maze_log import MazeLog
-from crossbody.engines._maze_machine import MazeMachine
-from crossbody.engines._maze_scene import ONLY_CONTINUOUS, ball_maze
+from crossbody.engines._maze.log import MazeLog
+from crossbody.engines._maze.machine import MazeMachine
+from crossbody.engines._maze.scene import ONLY_CONTINUOUS, ball_maze
 from crossbody.engines.pinocchio._maze_flow import MazeFlow
 from crossbody.engines.pinocchio._maze_law import MazeLaw, audit
 from crossbody.engines.pinocchio._rows import ALGEBRA

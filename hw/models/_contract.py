@@ -14,7 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from crossbody.cases import Case, Coordinate, Parameter, SceneError, Trajectory, UnknownName, Value
 
 if TYPE_CHECKING:
-    from crossbody.hw._log import Log
+    from crossbody.hw.reading.log import Log
 
 Floats = NDArray[np.float64]
 Numbers = Mapping[str, Value]

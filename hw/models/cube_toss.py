@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from crossbody.cases import Case, Coordinate, Law, Parameter, Trajectory
-from crossbody.hw._log import Log
 from crossbody.hw.models._contract import Floats, Model, Numbers, Segment
+from crossbody.hw.reading.log import Log
 
 PLACE = ("px", "py", "pz")
 TURN = ("qw", "qx", "qy", "qz")

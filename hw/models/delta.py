@@ -7,10 +7,10 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import Case, Coordinate, Inputs, Law, Trajectory
-from crossbody.cases._delta_scene import JOINTS, LOOPS, NAMES, ROBOT
+from crossbody.cases._delta.scene import JOINTS, LOOPS, NAMES, ROBOT
 from crossbody.cases.delta_tracking import PARAMETERS
-from crossbody.hw._log import Log
 from crossbody.hw.models._contract import Floats, Model, Numbers, Segment
+from crossbody.hw.reading.log import Log
 from crossbody.reference import simulate
 from crossbody.reference.delta import control, forward, jacobians, paths, scene
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS

@@ -9,7 +9,7 @@ import numpy as np
 
 from crossbody import cases
 from crossbody.cases import Case, Coordinate, Inputs, SceneError
-from crossbody.cases._maze_geometry import maze_of
+from crossbody.cases._maze.geometry import maze_of
 from crossbody.cases.ball_maze import PARAMETERS
 from crossbody.hw.models._contract import Model, Numbers, Segment
 

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crossbody.cases import _maze_closed_forms as cf
-from crossbody.cases import _maze_geometry as geometry
+from crossbody.cases._maze import closed_forms as cf
+from crossbody.cases._maze import geometry
 from crossbody.reference import System, kernels
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference.systems import _maze_control as control

@@ -139,8 +139,8 @@ def _solid(case: Case, ring: int) -> float:
 
 def _soft(case: Case, at: Mapping[str, float]) -> list[Place]:
     """Closed fingers in every mode set; positions, sensors and multipliers are found."""
-    from crossbody.cases import _soft_closed_forms as closed
-    from crossbody.cases._soft_scene import numbers
+    from crossbody.cases._soft import closed_forms as closed
+    from crossbody.cases._soft.scene import numbers
 
     p, found = numbers(case.parameters), []
     for name, rows in (("grasp", [0, 1]), ("left finger", [0]), ("right finger", [1])):

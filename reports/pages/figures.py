@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from crossbody.cases import Mode
+from crossbody.cases import Event, Mode, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._impulse import cumulative
 from crossbody.reports.pages.filled import filled
@@ -22,6 +22,8 @@ SAMPLE = 15
 FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
+ROUNDING = 1e-17
+"""Depth below which there is none, m."""
 
 __all__ = ["COLOURS", "DASHES", "FIGURES", "TRUTH", "label", "note", "points_for", "style", "suits"]
 
@@ -62,16 +64,25 @@ def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     floors = _floors(traces, [unit for _, unit in names])
     shown = drawn(len(names))
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
-    sheet = Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points)
+    sheet = Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points, group=2)
     for i, trace in enumerate(traces):
         t, q = filled(trace.run)
         for place, k in enumerate(shown):
-            sheet.line(trace, i, 2 * place + 1, q[:, k], t)
+            sheet.line(trace, i, 2 * place, q[:, k], t)
             if trace.truth is not None:
                 error = apart(trace.run.q[:, k], trace.truth.q[:, k], floors[names[k][1]])
-                sheet.line(trace, i, 2 * place + 2, error)
-    sheet.logarithmic(*range(2, len(rows) + 1, 2))
+                sheet.line(trace, i, 2 * place + 1, error)
+    sheet.logarithmic(*range(1, len(rows), 2))
     return sheet.done()
+
+
+def impulse(run: Trajectory, events: Sequence[Event]) -> Floats:
+    """INT lam dt of a motion (n, nc) with the impulses of collisions that took no time, N s."""
+    total = cumulative(run)
+    for event in events:
+        if event.impulse:
+            total[run.t >= event.t, event.contact] += event.impulse
+    return total
 
 
 def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
@@ -80,38 +91,38 @@ def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     shown = drawn(len(contacts))
     each = ("lam {}\n[N]", "impulse\n[N s]", "|error|\n[N s]")
     rows = [text.format(contacts[k]) for k in shown for text in each]
-    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points)
-    summed = [cumulative(trace.run) for trace in traces]
+    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points, group=3)
+    summed = [impulse(trace.run, trace.run.events) for trace in traces]
     floor = floor_of(summed[0])
-    true = [None if trace.truth is None else cumulative(trace.truth) for trace in traces]
+    true = [None if trace.truth is None else impulse(trace.truth, traces[0].run.events) for trace in traces]
     for place, k in enumerate(shown):
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
                 continue
-            sheet.line(trace, i, 3 * place + 1, trace.run.lam[:, k])
-            sheet.line(trace, i, 3 * place + 2, summed[i][:, k])
+            sheet.line(trace, i, 3 * place, trace.run.lam[:, k])
+            sheet.line(trace, i, 3 * place + 1, summed[i][:, k])
             exact = true[i]
             if exact is not None:
-                sheet.line(trace, i, 3 * place + 3, apart(summed[i][:, k], exact[:, k], floor))
-        sheet.logarithmic(3 * place + 3)
+                sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor))
+    sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
 
 
 def energy(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Total energy, work of the contacts, and what neither they nor inputs nor damping explain."""
     rows = ["total energy\n[J]", "work of contacts\n[J]", "|unexplained|\n[J]"]
-    sheet = Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points)
+    sheet = Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points, group=3)
     floor = floor_of(traces[0].run.energy)
     for i, trace in enumerate(traces):
         run = trace.run
-        sheet.line(trace, i, 1, run.total_energy)
+        sheet.line(trace, i, 0, run.total_energy)
         if run.ledger is None:
             continue
         work = run.ledger.contact.sum(axis=1)
-        sheet.line(trace, i, 2, work)
+        sheet.line(trace, i, 1, work)
         book = work + run.ledger.input - run.ledger.dissipated
-        sheet.line(trace, i, 3, apart(run.total_energy - run.total_energy[0], book - book[0], floor))
-    sheet.logarithmic(3)
+        sheet.line(trace, i, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor))
+    sheet.logarithmic(2)
     return sheet.done()
 
 
@@ -121,23 +132,24 @@ def penetration(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     shown = drawn(len(contacts))
     always = [bool((traces[0].run.mode[:, k] == Mode.BILATERAL).all()) for k in shown]
     rows = [f"{'|gap|' if on else 'depth'} {contacts[k]}\n[m]" for k, on in zip(shown, always, strict=True)]
-    sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points)
-    for row, (k, on) in enumerate(zip(shown, always, strict=True), start=1):
+    sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points, group=len(rows))
+    for row, (k, on) in enumerate(zip(shown, always, strict=True)):
         for i, trace in enumerate(traces):
             gap = trace.run.gap[:, k]
             depth = np.abs(gap) if on else -gap
-            sheet.line(trace, i, row, np.where(depth > 0.0, depth, np.nan))
-        sheet.logarithmic(row)
+            sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, np.nan))
+    sheet.logarithmic(*range(len(rows)))
     return sheet.done()
 
 
 def steps(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Length of every step at its start: small while a collision lasts, large again when it is over."""
-    sheet = Sheet(["step size [s]"], "Step size of each engine", points)
+    sheet = Sheet(["step size\n[s]"], "Step size of each engine", points)
+    floor = floor_of(traces[0].run.t)
     for i, trace in enumerate(traces):
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
-        sheet.line(trace, i, 1, lengths, starts, shape="hv")
-    sheet.logarithmic(1)
+        sheet.line(trace, i, 0, np.maximum(lengths, floor), starts, shape="hv")
+    sheet.logarithmic(0)
     return sheet.done()
 
 
@@ -160,7 +172,10 @@ NOTES = {
         "event_times. Differences end at a common floor, the rounding of the largest value of that unit: below it "
         "nothing is left to compare. Where a solver took long steps, a cubic through q and v of both ends is drawn."
     ),
-    "force": "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that.",
+    "force": (
+        "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that. "
+        "Collisions that take no time are steps of the impulse."
+    ),
 }
 FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int], Figure]]] = {
     "motion": ("Motion", motion),

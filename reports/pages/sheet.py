@@ -17,35 +17,28 @@ FINE = 2e-5
 """Distance of samples over the horizon below which times are written in double precision."""
 EVENTS = 40
 """Events around which all samples stay: the first of them where there are very many."""
-HEAD, ROW, GAP = 130, 170, 45
-"""Height of a figure besides its plots, of a plot with the gap above it, and of that gap, pixels."""
+TOP, BOTTOM, PLOT, CLOSE, APART = 34, 50, 128, 16, 46
+"""Above and below the plots of a figure, a plot, between plots of one group, between groups (with times), pixels."""
 
 
 class Sheet:
-    """Plots one below another, with the lines of every engine.
+    """Plots one below another, with the lines of every engine; a plot in which nothing is drawn is left out.
 
     Args:
         rows: title of every plot's y axis, with its unit.
         title: of the figure.
         points: samples a line, besides those around events.
+        group: so many plots belong together: the last of them carries the times.
     """
 
-    def __init__(self, rows: Sequence[str], title: str, points: int) -> None:
-        self.points = points
-        self.data: list[dict[str, Any]] = []
-        height = HEAD + ROW * len(rows)
-        self.layout: dict[str, Any] = {"title": {"text": title}, "height": height, "showlegend": False}
-        pitch = 1.0 / len(rows)
-        share = pitch * (1.0 - GAP / ROW)
-        for i, name in enumerate(rows):
-            top = 1.0 - i * pitch
-            low = max(top - share, 0.0) if i + 1 < len(rows) else 0.0
-            self.layout |= _axes(number(i + 1), name, [low, top], last=i + 1 == len(rows))
+    def __init__(self, rows: Sequence[str], title: str, points: int, group: int = 1) -> None:
+        self.rows, self.title, self.points, self.group = rows, title, points, group
+        self.lines: list[tuple[int, dict[str, Any]]] = []
+        self.decades: set[int] = set()
 
     def logarithmic(self, *rows: int) -> None:
-        """Make the y axes of these plots (from 1 on) logarithmic."""
-        for row in rows:
-            self.layout[f"yaxis{number(row)}"] |= {"type": "log", "nticks": 5}
+        """Make the y axes of these plots (from 0 on) logarithmic."""
+        self.decades |= set(rows)
 
     def line(self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, **more: Any) -> None:
         """One line of one engine into plot `row`, thinned; what is not finite is a gap."""
@@ -54,18 +47,53 @@ class Sheet:
             return
         at = keep(t, y, np.unique([e.t for e in trace.run.events])[:EVENTS], self.points)
         look = style(trace, i)
-        self.data.append(
-            {
-                "type": "scatter", "x": coded(_times(t[at])), "y": coded(y[at].astype(np.float32)),
-                "name": plain(label(trace)), "meta": label(trace), "mode": "lines", "xaxis": f"x{number(row)}",
-                "yaxis": f"y{number(row)}", "line": {key: look[key] for key in ("color", "dash", "width")} | more,
-                "opacity": 0.65 if label(trace) == TRUTH else 1.0,
-            }
-        )  # fmt: skip
+        line = {
+            "type": "scatter", "x": coded(_times(t[at])), "y": coded(y[at].astype(np.float32)),
+            "name": plain(label(trace)), "meta": label(trace), "mode": "lines",
+            "line": {key: look[key] for key in ("color", "dash", "width")} | more,
+            "opacity": 0.65 if label(trace) == TRUTH else 1.0,
+        }  # fmt: skip
+        self.lines.append((row, line))
 
     def done(self) -> dict[str, Any]:
         """The figure."""
-        return {"data": self.data, "layout": self.layout}
+        drawn = sorted({row for row, _ in self.lines})
+        axes, height = self._axes(drawn)
+        place = {row: number(i + 1) for i, row in enumerate(drawn)}
+        data = [line | {"xaxis": f"x{place[row]}", "yaxis": f"y{place[row]}"} for row, line in self.lines]
+        layout = {"title": {"text": self._caption(drawn)}, "height": height, "showlegend": False} | axes
+        return {"data": data, "layout": layout}
+
+    def _caption(self, drawn: Sequence[int]) -> str:
+        empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
+        return f"{self.title}. Nothing to draw of: {', '.join(empty)}" if empty else self.title
+
+    def _axes(self, drawn: Sequence[int]) -> tuple[dict[str, Any], int]:
+        """Axes of the plots that are drawn, and the height of the figure, pixels."""
+        last = [i + 1 == len(drawn) or row // self.group != drawn[i + 1] // self.group for i, row in enumerate(drawn)]
+        below = [APART if end else CLOSE for end in last[:-1]] + [0]
+        inside = PLOT * len(drawn) + sum(below)
+        axes: dict[str, Any] = {}
+        top = 0
+        for i, row in enumerate(drawn):
+            span = [1.0 - (top + PLOT) / inside, 1.0 - top / inside]
+            axes |= _pair(number(i + 1), self.rows[row], [max(span[0], 0.0), span[1]], last[i])
+            if i + 1 == len(drawn):
+                axes[f"xaxis{number(i + 1)}"]["title"] = {"text": "time [s]"}
+            if row in self.decades:
+                axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 5, "exponentformat": "power"}
+            top += PLOT + below[i]
+        return axes, TOP + inside + BOTTOM
+
+
+def _pair(n: str, name: str, domain: list[float], timed: bool) -> dict[str, Any]:
+    """The two axes of one plot."""
+    x: dict[str, Any] = {"anchor": f"y{n}", "domain": [0.0, 1.0], "showticklabels": timed}
+    if n:
+        x["matches"] = "x"
+    title = {"text": plain(name).replace("\n", "<br>"), "standoff": 2, "font": {"size": 12}}
+    y = {"anchor": f"x{n}", "domain": domain, "title": title, "exponentformat": "e", "tickfont": {"size": 10.5}}
+    return {f"xaxis{n}": x, f"yaxis{n}": y}
 
 
 def number(row: int) -> str:
@@ -81,19 +109,6 @@ def plain(text: str) -> str:
 def coded(array: Floats) -> dict[str, str]:
     """An array as plotly reads it from base64 ("typed array specification")."""
     return {"dtype": f"f{array.itemsize}", "bdata": base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()}
-
-
-def _axes(n: str, name: str, domain: list[float], *, last: bool) -> dict[str, Any]:
-    x: dict[str, Any] = {"anchor": f"y{n}", "domain": [0.0, 1.0], "showticklabels": last}
-    if n:
-        x["matches"] = "x"
-    if last:
-        x["title"] = {"text": "time [s]"}
-    title = {"text": plain(name).replace("\n", "<br>"), "standoff": 4, "font": {"size": 12}}
-    return {
-        f"xaxis{n}": x,
-        f"yaxis{n}": {"anchor": f"x{n}", "domain": domain, "title": title, "exponentformat": "power"},
-    }
 
 
 def _times(t: Floats) -> Floats:

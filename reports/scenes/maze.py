@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases._maze_geometry import Maze, Ring, maze_of
+from crossbody.cases._maze.geometry import Maze, Ring, maze_of
 from crossbody.reports.scenes import Parameters, Shape, Stage, circle, path
 
 ARC = 0.06

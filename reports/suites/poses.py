@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import CrossbodyError
-from crossbody.cases._delta_pose import pose
+from crossbody.cases._delta.pose import pose
 from crossbody.cases._load import module
 from crossbody.reports.suites._axis import Linear, Log
 from crossbody.reports.suites._contract import Drawn, Family, Suite

@@ -1,0 +1,1 @@
+"""The bouncing ball: its exact motion and how far engines may be from it."""

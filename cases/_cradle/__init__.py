@@ -1,0 +1,1 @@
+"""Newton's cradle: scene, collision rules, exact motions, limits."""

@@ -1,0 +1,1 @@
+"""The delta robot: what its cases share, closed forms, limits."""

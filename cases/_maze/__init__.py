@@ -1,0 +1,1 @@
+"""The ball maze: geometry, closed forms, claims, limits."""

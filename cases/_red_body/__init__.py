@@ -1,0 +1,1 @@
+"""The red body: order of its modes and limits."""

@@ -1,0 +1,1 @@
+"""The soft contact: scene, the variant on a robot, closed forms, claims."""

@@ -1,0 +1,1 @@
+"""The delta robot as engines of hinges see it."""

@@ -1,0 +1,113 @@
+"""A case of the delta robot as any engine of hinges needs it: robot, start, what drives it, and what is seen of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Case
+from crossbody.cases._arrays import Floats
+from crossbody.engines._delta import chart
+from crossbody.engines._delta.forces import table
+from crossbody.reference.delta import Robot, scene
+from crossbody.reference.systems import delta as kernels
+
+
+class Drive:
+    """The inputs of a run: they change at given instants and hold between them.
+
+    Attributes:
+        times (m,): instants, s; the first is 0 if anything acts at the start.
+        u (6,): what acts now, motor torques (3,), N m, and the force on the flange (3,), N.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self.program = scene.program_of(case.parameters)
+        given = case.inputs
+        self._changes = {} if given is None else dict(zip(given.times.tolist(), given.values, strict=True))
+        self._ticks: dict[float, None] = {}
+        if self.program is not None:
+            ticks = scene.sampling_of(case.parameters).ticks(case.t_end).tolist()
+            self._ticks = dict.fromkeys(t for t in ticks if t < case.t_end)
+        self.times: list[float] = sorted(t for t in {**self._changes, **self._ticks} if t < case.t_end)
+        self.u = np.zeros(6)
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing acts, and the controller remembers nothing."""
+        self.u[:] = 0.0
+        self.memory = np.zeros(self.program.memory if self.program else 0)
+
+    def change(self, t: float, q: Floats, v: Floats) -> None:
+        """Put in force what acts from t on; q, v (9,) are absolute angles and rates at t."""
+        if t in self._changes:
+            self.u[:] = self._changes[t]
+        if self.program is not None and t in self._ticks:
+            self.program.control(t, q, v, self.u, self.memory, self.program.parameters)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Delta:
+    """A case.
+
+    Attributes:
+        robot: geometry, masses, gravity, friction.
+        r0, rd0 (9,): start in the coordinates of the tree.
+        drive: what acts from outside.
+        table: numbers of `_delta_forces.forces`.
+    """
+
+    robot: Robot
+    r0: Floats
+    rd0: Floats
+    drive: Drive
+    table: Floats
+
+    def absolute(self, r: Floats, rd: Floats) -> tuple[Floats, Floats]:
+        """Q and v (n, 9) of a motion of the tree; q_i3 goes on where its angle passes pi."""
+        q, v = chart.from_tree(r, rd)
+        if len(q) > 1:
+            q[:, 2::3] = np.unwrap(q[:, 2::3], axis=0)
+        return q, v
+
+    def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Gaps (n, 6), m, and energies (n, 2), J, of absolute angles and rates."""
+        p, gap, rate, energy = self.robot.array(), np.empty((len(q), 6)), np.empty(6), np.empty((len(q), 2))
+        for i in range(len(q)):
+            kernels.gaps(0.0, q[i], v[i], p, gap[i], rate)
+            kernels.energy(q[i], v[i], p, energy[i])
+        return gap, energy
+
+
+def delta(case: Case) -> Delta:
+    """Read a case.
+
+    Raises:
+        SceneError: if the start does not close the loops; it offers one that does.
+        InvalidValue: for a number outside its range.
+    """
+    scene.check_start(case.parameters, case.q0, case.v0)
+    robot = scene.robot_of(case.parameters)
+    r0, rd0 = chart.to_tree(np.array(case.q0), np.array(case.v0))
+    forces = table(robot, scene.servo_of(case.parameters))
+    return Delta(robot=robot, r0=r0, rd0=rd0, drive=Drive(case), table=forces)
+
+
+def in_absolute(terms: Any) -> dict[str, Any]:
+    """M(q), bias(q, v) and H(q) of the audit in absolute angles.
+
+    Args:
+        terms: (r, rd) -> M (9, 9), bias (9,), H (6, 9) of the tree.
+    """
+
+    def at(q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
+        r, rd = chart.to_tree(q, v)
+        return chart.absolute(r, rd, *terms(r, rd))
+
+    return {
+        "M": lambda q: at(q, np.zeros(9))[0],
+        "bias": lambda q, v: at(q, v)[1],
+        "H": lambda q: at(q, np.zeros(9))[2],
+    }

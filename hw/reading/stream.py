@@ -1,0 +1,96 @@
+"""Rows of a log in SI, a bounded number at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats import Group, Reader
+from crossbody.hw.reading.plan import Plan, Source
+from crossbody.hw.reading.rows import Floats, Rows
+
+EXACT = 2**53  # beyond, an integer is no float64
+
+
+class Stream:
+    """The blocks of one plan; `origin` is known once the first is there.
+
+    Args:
+        plan: what to read.
+        reader: the open log.
+        part: number of the run, where the map names a column that tells them apart.
+    """
+
+    def __init__(self, plan: Plan, reader: Reader, part: int | None = None) -> None:
+        self.plan, self.origin = plan, 0
+        self._reader, self._part = reader, part
+        self._begun = False
+
+    def rows(self) -> Iterator[Rows]:
+        """The log's own rows with the signals that stand in them."""
+        plan = self.plan
+        own = list(plan.own)
+        extra = [plan.columns.part] if plan.columns.part else []
+        counted = 0
+        for start, block in self._blocks(plan.group, own, [plan.time_column, *extra]):
+            size = len(next(iter(block.values())))
+            rows = np.arange(start, start + size, dtype=np.int64)
+            kept = block[extra[0]] == self._part if extra and self._part is not None else slice(None)
+            rows = rows[kept]
+            time = self._time(block, kept, counted, len(rows))
+            counted += len(rows)
+            yield Rows(rows=rows, time=time, values=tuple(s.to_si(block[s.signal.column][kept]) for s in own))
+
+    def _time(self, block: dict[str, NDArray[Any]], kept: Any, counted: int, size: int) -> Floats:
+        plan = self.plan
+        if not plan.time_column:
+            return plan.start + plan.step * np.arange(counted, counted + size, dtype=np.float64)
+        return self.seconds(block[plan.time_column][kept], plan.time_column)
+
+    def seconds(self, raw: NDArray[Any], column: str) -> Floats:
+        """Stored times to seconds; integers that no float64 holds count from the log's first."""
+        if raw.dtype.kind in "iu":
+            if not self._begun and len(raw):
+                self._begun = True
+                self.origin = int(raw[0]) if abs(int(raw[0])) > EXACT else 0
+            raw = raw - np.asarray(self.origin, dtype=raw.dtype) if self.origin else raw
+        elif raw.dtype.kind not in "f":
+            raise LogFormatError(self.plan.path, f"holds {raw.dtype}, not times.", column=column)
+        times: Floats = raw.astype(np.float64, copy=False)
+        scale = self.plan.columns.time.scale
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not finite, which a check tells
+            times = times * scale if scale != 1.0 else times
+            return times * self.plan.step if self.plan.step else self.plan.ticks.apply(times)
+
+    def joined(self, sources: Sequence[Source]) -> Iterator[Rows]:
+        """Rows of signals with times of their own, all of one group and clock; after `rows` has begun."""
+        clock = sources[0].clock
+        for start, block in self._blocks(sources[0].group, sources, [clock]):
+            times = self.seconds(block[clock], clock)
+            rows = np.arange(start, start + len(times), dtype=np.int64)
+            yield Rows(rows=rows, time=times, values=tuple(s.to_si(block[s.signal.column]) for s in sources))
+
+    def _blocks(
+        self, group: Group, sources: Sequence[Source], extra: Sequence[str]
+    ) -> Iterator[tuple[int, dict[str, NDArray[Any]]]]:
+        names = list(dict.fromkeys([name for name in extra if name] + [s.signal.column for s in sources]))
+        start = 0
+        for block in self._reader.blocks(group, names):
+            yield start, block
+            start += len(block[names[0]])
+
+    def parts(self) -> tuple[int, ...]:
+        """Numbers of the runs in the file, in the order of their size."""
+        column = self.plan.columns.part
+        found: set[int] = set()
+        for _, block in self._blocks(self.plan.group, (), [column]):
+            if block[column].dtype.kind not in "iuf" or not np.all(block[column] == np.rint(block[column])):
+                raise LogFormatError(
+                    self.plan.path, "does not hold whole numbers: it cannot tell runs apart.", column=column
+                )
+            found.update(np.unique(block[column]).astype(int).tolist())
+        return tuple(sorted(found))

@@ -1,0 +1,185 @@
+"""What is in a file that nobody has described yet: channels, rates, gaps, ranges, and a draft of a column map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import LogFormatError
+from crossbody.hw import formats
+from crossbody.hw.checks.clock import ClockCheck
+from crossbody.hw.checks.finding import Finding
+from crossbody.hw.checks.values import ValueCheck
+from crossbody.hw.formats import Column, Group, Reader
+from crossbody.hw.reading.clock_guess import ClockGuess, guess_clock
+from crossbody.hw.reading.columns import Columns
+from crossbody.hw.reading.rows import Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ColumnSurvey:
+    """One column as it stands in the file.
+
+    Attributes:
+        column: name, stored type and unit.
+        low, high: smallest and largest finite value; NaN if there is none.
+        missing: cells that are not finite.
+    """
+
+    column: Column
+    low: float
+    high: float
+    missing: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroupSurvey:
+    """Columns whose rows belong together.
+
+    Attributes:
+        group: as the reader tells it.
+        rows: number of rows.
+        clock: the column that seems to hold the times.
+        duration: from the first to the last time, s; NaN without a clock.
+        step: median time between the first samples, s.
+        longest: longest time between samples, s.
+        lost: samples that seem to be missing.
+        jitter: scatter of the sample times about a steady clock, s.
+        columns: of the group, in the order of the file.
+    """
+
+    group: Group
+    rows: int
+    clock: ClockGuess | None
+    duration: float
+    step: float
+    longest: float
+    lost: int
+    jitter: float
+    columns: tuple[ColumnSurvey, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """What a file holds.
+
+    Attributes:
+        path: the file.
+        format: name of its format.
+        library: package that reads it, with its version.
+        groups: what is in it.
+        refused: columns that are no numbers -> why.
+        findings: doubts about it; faults first.
+    """
+
+    path: Path
+    format: str
+    library: str
+    groups: tuple[GroupSurvey, ...]
+    refused: dict[str, str]
+    findings: tuple[Finding, ...]
+
+    def draft(self) -> Columns:
+        """A column map to begin with: roles and missing units are guessed from names."""
+        from crossbody.hw.reading.draft import draft
+
+        return draft(self)
+
+    def refuse(self) -> None:
+        """Raise the first fault that was found, if there is one.
+
+        Raises:
+            LogFormatError: with row, time and column of its first offence.
+        """
+        for finding in self.findings:
+            if finding.fault:
+                raise finding.error(self.path)
+
+
+def survey(path: str | Path) -> Survey:
+    """Go through a file once, in bounded memory, without a column map.
+
+    Args:
+        path: file of any format of `formats.names()`, or the folder of a ROS 2 bag.
+
+    Raises:
+        LogFormatError: if it cannot be read.
+        FormatUnavailable: if the format's package is not installed.
+    """
+    path = Path(path)
+    name = formats.recognise(path)
+    reader = formats.open_log(path, name)
+    try:
+        refused, findings = dict(reader.refused), list[Finding]()
+        groups = tuple(_group(reader, group, refused, findings) for group in reader.groups)
+        if not any(group.rows for group in groups):
+            raise LogFormatError(path, "holds no samples.")
+    finally:
+        reader.close()
+    found = tuple(sorted(findings, key=lambda f: (not f.fault, f.row)))
+    return Survey(path=path, format=name, library=reader.library, groups=groups, refused=refused, findings=found)
+
+
+def _group(reader: Reader, group: Group, refused: dict[str, str], findings: list[Finding]) -> GroupSurvey:
+    columns = [c for c in group.columns if _numeric(reader, group, c, refused, findings)]
+    checks = {c.name: ValueCheck(c.name, c.unit or "?") for c in columns}
+    clock, check, rows = None, ClockCheck(group.step or None), 0
+    for block in reader.blocks(group, list(checks)) if checks else ():
+        size = len(next(iter(block.values())))
+        at = np.arange(rows, rows + size, dtype=np.int64)
+        clock = guess_clock(columns, block) if not rows else clock
+        with np.errstate(over="ignore", invalid="ignore"):
+            times = _times(clock, group, block, at)
+            if clock is not None or group.step:
+                check.see(at, times)
+            for name, one in checks.items():
+                one.see(at, times, block[name].astype(np.float64))
+        rows += size
+    findings += check.findings() if clock else []
+    findings += [f for one in checks.values() for f in one.findings() if f.channel != (clock.column if clock else "")]
+    known = clock is not None or group.step > 0.0
+    return GroupSurvey(
+        group=group, rows=rows, clock=clock, duration=check.end - check.start if known and rows else np.nan,
+        step=check.step if known else np.nan, longest=check.longest, lost=check.missing,
+        jitter=check.jitter if known else np.nan, columns=tuple(_column(c, checks[c.name]) for c in columns),
+    )  # fmt: skip
+
+
+def _times(clock: ClockGuess | None, group: Group, block: formats.Block, rows: NDArray[np.int64]) -> Floats:
+    if clock is None:
+        return np.full(len(rows), np.nan) if not group.step else group.start + group.step * rows.astype(np.float64)
+    return clock.seconds(block[clock.column])
+
+
+def _numeric(reader: Reader, group: Group, column: Column, refused: dict[str, str], findings: list[Finding]) -> bool:
+    """Whether a column is one of numbers; a text column that begins as numbers is a fault with its place."""
+    if column.type != "text":
+        return True
+    try:
+        for _ in reader.blocks(group, [column.name]):
+            pass
+    except LogFormatError as error:
+        refused[column.name] = "holds text, not numbers"
+        if error.row:
+            text = str(error).rpartition(f"row {error.row}: ")[2]
+            findings.append(
+                Finding(
+                    check="finite", fault=True, channel=error.column, row=error.row, t=np.nan, count=1, text=text
+                )
+            )  # fmt: skip
+        return False
+    return True
+
+
+def _column(column: Column, check: ValueCheck) -> ColumnSurvey:
+    low, high = (check.runs.low, check.runs.high) if check.runs.low <= check.runs.high else (np.nan, np.nan)
+    return ColumnSurvey(column=column, low=low, high=high, missing=check.missing)
+
+
+def largest(groups: Sequence[GroupSurvey]) -> GroupSurvey:
+    """The group to begin with: one that has a clock, then the one with most numbers."""
+    return max(groups, key=lambda g: (g.clock is not None or g.group.step > 0.0, g.rows * len(g.columns)))

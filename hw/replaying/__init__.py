@@ -1,0 +1,1 @@
+"""What engines make of a log: windows, starts, predictions, and how far they are off."""

@@ -1,0 +1,182 @@
+"""Backwards: the torque that a recorded motion needs, and the force that nobody measured.
+
+The measured coordinates y with their rates and accelerations, from polynomials through the samples, give the whole
+motion of a mechanism whose rows are closed: H v = 0 and H v' = -H' v, so v = S y' and v' = S y'' + s. With S^T H^T = 0
+the multipliers drop out and
+
+    S^T (M v' - f(q, v, 0)) = S^T B u
+
+holds the torques that act (u of the motors) and the force that acts besides (u of the contact), B = df/du.
+A smoothed acceleration is a mean over its samples: recorded torques are taken in the same mean, and an estimated force
+is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from crossbody.cases import SceneError, Value
+from crossbody.engines._equations import system_of
+from crossbody.hw import models
+from crossbody.hw.models._contract import Model, Segment
+from crossbody.hw.reading.log import Log
+from crossbody.hw.replaying.lift import check_measured, lift, rows_at
+from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, Rows, derivatives, felt
+from crossbody.reference import System
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Inferred:
+    """Something that was not measured, and how well it is known.
+
+    Attributes:
+        t (n,): s.
+        names, unit: of the columns.
+        value (n, k): the estimate.
+        std (n, k): standard deviation that the noise of the measured coordinates gives it.
+        recorded (n, k): the same as the log has it; NaN where it does not.
+    """
+
+    t: Floats
+    names: tuple[str, ...]
+    unit: str
+    value: Floats
+    std: Floats
+    recorded: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Balance:
+    """S^T (M v' - f) (n, k), S^T B (n, k, nu), S^T M S (n, k, k) and the noise of the accelerations (n, k)."""
+
+    t: Floats
+    needed: Floats
+    inputs: Floats
+    mass: Floats
+    noise: Floats
+
+
+def inverse(
+    log: Log, model: str | Model, *, parameters: Mapping[str, Value] | None = None, delay: float = 0.0,
+    half: int = HALF, degree: int = DEGREE, stride: int = 1,
+) -> Inferred:  # fmt: skip
+    """Torques that the model needs for the recorded motion, beside the recorded ones.
+
+    Args:
+        log: what was recorded.
+        model: its name in `hw.models`, or itself; its rows are always on and all its free coordinates are measured.
+        parameters: of the model, where not its defaults.
+        delay: of the measured coordinates beyond what the column map says, s.
+        half: samples on each side of the polynomials: more for less noise, fewer for quicker motion.
+        degree: of the polynomials.
+        stride: of so many samples one is evaluated.
+
+    Raises:
+        SceneError: if the log or the model does not fit.
+        InvalidValue: for a log shorter than a polynomial.
+    """
+    chosen = models.load(model) if isinstance(model, str) else model
+    balance = _balance(log, chosen, parameters, delay, half, degree, stride)
+    B = balance.inputs[:, :, : len(chosen.inputs)]
+    have = all(name in log.names("inputs") for name in chosen.inputs)
+    rows = _rows(log, half, stride)
+    recorded = (
+        _felt(log, chosen, delay, half, degree, rows) if have else np.full((len(balance.t), len(chosen.inputs)), np.nan)
+    )
+    return _solved(balance, B, balance.needed, chosen.inputs, "N m", recorded)
+
+
+def estimate_force(
+    log: Log, model: str | Model, *, parameters: Mapping[str, Value] | None = None, delay: float = 0.0,
+    half: int = HALF, degree: int = DEGREE, stride: int = 1,
+) -> Inferred:  # fmt: skip
+    """The force that acts on the mechanism besides the recorded torques, from motion and torque.
+
+    Args and errors as for `inverse`; the model must have inputs for such a force (`Model.forces`).
+    """
+    chosen = models.load(model) if isinstance(model, str) else model
+    if not chosen.forces:
+        raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
+    balance = _balance(log, chosen, parameters, delay, half, degree, stride)
+    own = len(chosen.inputs)
+    torque = _felt(log, chosen, delay, half, degree, _rows(log, half, stride))
+    left = balance.needed - np.einsum("nij,nj->ni", balance.inputs[:, :, :own], torque)
+    names = chosen.forces
+    nothing = np.full((len(balance.t), len(names)), np.nan)
+    return _solved(balance, balance.inputs[:, :, own : own + len(names)], left, names, "N", nothing)
+
+
+def _felt(log: Log, model: Model, delay: float, half: int, degree: int, rows: Rows) -> Floats:
+    """The recorded inputs as the smoothed accelerations show them."""
+    lacking = [name for name in model.inputs if name not in log.names("inputs")]
+    if lacking:
+        raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
+    shift = log.channel("coordinates", model.channels[0]).delay + delay
+    return felt(log.time, log.matrix("inputs", model.inputs), shift, half, degree, rows)
+
+
+def _solved(
+    balance: _Balance, B: Floats, left: Floats, names: tuple[str, ...], unit: str, recorded: Floats
+) -> Inferred:
+    value = np.asarray(np.linalg.solve(B, left[:, :, None])[:, :, 0], dtype=np.float64)
+    gain = np.linalg.solve(B, balance.mass)
+    std: Floats = np.sqrt(np.einsum("nij,nj->ni", gain**2, balance.noise**2))
+    return Inferred(t=balance.t, names=names, unit=unit, value=value, std=std, recorded=recorded)
+
+
+def _balance(
+    log: Log, model: Model, parameters: Mapping[str, Value] | None, delay: float, half: int, degree: int, stride: int
+) -> _Balance:
+    model.check_log(log)
+    y, _ = model.read(model, log)
+    rows = _rows(log, half, stride)
+    smooth = derivatives(log.time, y, half, degree, rows)
+    value, rate, acceleration, gain = smooth
+    noise = gain[:, 2:] * _noise(log.time, y, half, degree)
+    segment = Segment(y=value[0], yd=rate[0], t_end=float(log.time[-1] - log.time[0]))
+    case = model.build(model.numbers(parameters), segment)
+    system = system_of(case)
+    check_measured(system, model.seen, model.name)
+    q, found = np.array(case.q0), []
+    for k in range(len(rows)):
+        terms = _one(system, model.seen, q, value[k], rate[k], acceleration[k])
+        q = terms[0]
+        found.append(terms[1:])
+    needed, inputs, mass = (np.array([one[i] for one in found]) for i in range(3))
+    shift = log.channel("coordinates", model.channels[0]).delay + delay
+    return _Balance(t=log.time[rows] - shift, needed=needed, inputs=inputs, mass=mass, noise=noise)
+
+
+def _rows(log: Log, half: int, stride: int) -> Rows:
+    return np.arange(half, len(log) - half, stride)
+
+
+def _one(
+    system: System, seen: tuple[int, ...], q: Floats, y: Floats, yd: Floats, ydd: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Pose, S^T (M v' - f), S^T B and S^T M S of one instant."""
+    p = system.p.astype(np.complex128)
+    state = lift(system, seen, q.astype(np.complex128), y.astype(np.complex128), yd.astype(np.complex128), p)
+    q, v = np.split(state.real, 2)
+    H, _, drift = (part.real for part in rows_at(system, q.astype(np.complex128), v.astype(np.complex128), p))
+    own = np.array(seen)
+    others = np.setdiff1d(np.arange(system.n), own)
+    S, vd = np.zeros((system.n, len(own))), np.zeros(system.n)
+    S[own], vd[own] = np.eye(len(own)), ydd
+    S[others] = -np.linalg.solve(H[:, others], H[:, own])
+    vd[others] = -np.linalg.solve(H[:, others], drift + H[:, own] @ ydd)
+    M, f = system.terms(q, v)
+    B = np.column_stack([system.terms(q, v, e)[1] - f for e in np.eye(system.inputs)])
+    return q, S.T @ (M @ vd - f), S.T @ B, S.T @ M @ S
+
+
+def _noise(t: Floats, y: Floats, half: int, degree: int) -> Floats:
+    """Standard deviation of the samples about their polynomials (k,), all parameters of which are paid for."""
+    rows = np.arange(half, len(t) - half)
+    value, _, _, gain = derivatives(t, y, half, degree, rows)
+    # The residual at the middle of a polynomial has the variance 1 - gain^2 of the noise.
+    left = (y[rows] - value) / np.sqrt(1.0 - gain[:, :1] ** 2)
+    return np.asarray(np.sqrt(np.mean(left**2, axis=0)))

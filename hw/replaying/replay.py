@@ -1,0 +1,148 @@
+"""Replay a log: what engines make of the recorded inputs or references, beside what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from crossbody import engines
+from crossbody.cases import CaseUnsupported, EngineUnavailable, InvalidValue, SceneError, Trajectory, UnknownName, Value
+from crossbody.hw import models
+from crossbody.hw.models._contract import Model
+from crossbody.hw.reading.log import Log
+from crossbody.hw.replaying.comparison import Comparison, Prediction
+from crossbody.hw.replaying.rates import Floats
+from crossbody.hw.replaying.starts import fitted_starts
+from crossbody.hw.replaying.system import run_once
+from crossbody.hw.replaying.windows import Window, windows
+
+KINDS = ("forward", "closed_loop")
+REFERENCE = {"rtol": 1e-8}
+"""Settings of the reference: far below what a rig measures."""
+
+
+def replay(
+    log: Log, model: str | Model, *, kind: str = "forward", wanted: Sequence[str] = ("reference",),
+    parameters: Mapping[str, Value] | None = None, restart: float | None = None, horizon: float | None = None,
+    delay: float = 0.0, settings: Mapping[str, Any] | None = None, tell: Callable[[str], None] = lambda _: None,
+) -> Comparison:  # fmt: skip
+    """Run a model through a log.
+
+    The model starts in every window from what was measured there; where rates are not, from the state that fits the
+    window's first samples (`Model.start_span`). Recorded inputs change at their recorded times and
+    hold between them; the integrator is free between them and is never resampled.
+
+    Args:
+        log: what was recorded.
+        model: its name in `hw.models`, or itself.
+        kind: "forward": recorded inputs drive the model; "closed_loop": recorded references drive the model and its
+            controller (one free run, reference alone).
+        wanted: engines, each E or E:PROFILE.
+        parameters: of the model, where not its own defaults.
+        restart: time between restarts, s; 0 for a free run; the model's usual one if not given.
+        horizon: length of a window, s; up to the next restart if not given.
+        delay: of the measured coordinates beyond what the column map says, s.
+        settings: of the engines, where they have them.
+        tell: is told what is being done.
+
+    Raises:
+        UnknownName: for a model, kind, engine, profile or parameter that does not exist.
+        SceneError: if the log lacks what the model needs, or a start is impossible.
+        InvalidValue: for a number outside its range.
+    """
+    chosen = models.load(model) if isinstance(model, str) else model
+    numbers = chosen.numbers(parameters)
+    if kind not in KINDS:
+        raise UnknownName("kind of replay", kind, KINDS)
+    if kind == "closed_loop" and chosen.loop is None:
+        raise InvalidValue(f"{chosen.name} has no controller; replay it forward.")
+    restart = 0.0 if kind == "closed_loop" else restart
+    cut = windows(log, chosen, restart, delay, horizon)
+    if chosen.start_span and chosen.places:
+        cut = fitted_starts(chosen, numbers, cut, chosen.start_span)
+    predictions, skipped = [], {}
+    for text in wanted:
+        name, _, profile = text.partition(":")
+        profile = profile or chosen.profiles.get(name, "matched")
+        tell(f"{chosen.name} on {name}:{profile}, {len(cut)} windows")
+        try:
+            predictions.append(_predict(chosen, numbers, cut, name, profile, kind, settings or {}))
+        except (CaseUnsupported, EngineUnavailable) as error:
+            skipped[name, profile] = str(error)
+    return Comparison(
+        log=log, model=chosen.name, title=chosen.title, kind=kind, parameters=MappingProxyType(numbers),
+        units=MappingProxyType({k: p.unit for k, p in chosen.parameters.items()}), coordinates=chosen.measured,
+        windows=cut, predictions=tuple(predictions), skipped=MappingProxyType(skipped), delay=delay,
+        falls=chosen.falls, mass=float(numbers.get("mass", 1.0)),
+    )  # fmt: skip
+
+
+def _predict(
+    model: Model, numbers: Mapping[str, Value], cut: Sequence[Window], name: str, profile: str, kind: str,
+    settings: Mapping[str, Any],
+) -> Prediction:  # fmt: skip
+    runs = []
+    used: dict[str, Any] = {}
+    for window in cut:
+        if kind == "closed_loop":
+            run, used = _looped(model, numbers, window, name, profile)
+        else:
+            run, used = run_window(model, numbers, window, name, profile, settings)
+        runs.append((run, *_seen(model, run, window)))
+    label = str(used.pop("profile", profile))
+    return Prediction(
+        engine=name, profile=label, settings=MappingProxyType(used),
+        y=tuple(y for _, y, _ in runs), yd=tuple(yd for _, _, yd in runs),
+        outcomes=tuple(run.outcome for run, *_ in runs),
+        messages=tuple(run.message for run, *_ in runs if run.message),
+        wall_s=sum(run.wall_s for run, *_ in runs), steps=sum(run.steps for run, *_ in runs),
+    )  # fmt: skip
+
+
+def run_window(
+    model: Model, numbers: Mapping[str, Value], window: Window, name: str, profile: str, settings: Mapping[str, Any]
+) -> tuple[Trajectory, dict[str, Any]]:
+    """One window on one engine: the motion, and what was really used.
+
+    Raises:
+        CaseUnsupported, EngineUnavailable: if the engine cannot do it.
+    """
+    case = model.build(numbers, window.segment)
+    asked = dict(model.settings.get(name, {})) | dict(settings)
+    engine = engines.load(name)
+    reason = model.why_not.get(name) or engine.why_not(case, profile)
+    if reason is not None:
+        raise CaseUnsupported(reason)
+    if name == "reference":
+        used = REFERENCE | asked
+        solver = "compiled" if profile == "matched" else profile
+        # Where inputs change at every sample its steps end there: samples of their own would cost a third more.
+        samples = None if len(window.segment.times) else window.t - window.t[0]
+        return run_once(case, solver, samples=samples, **used), {**used, "profile": solver}
+    prepared = engine.prepare(case, profile, **asked)
+    return prepared.run(), dict(prepared.settings) | {"profile": prepared.profile}
+
+
+def _looped(
+    model: Model, numbers: Mapping[str, Value], window: Window, name: str, profile: str
+) -> tuple[Trajectory, dict[str, Any]]:
+    if name != "reference":
+        raise CaseUnsupported(f"{name} follows the paths of a case alone; a recorded reference is the reference's.")
+    assert model.loop is not None  # checked by the caller
+    lacking = [r for r in model.references if r not in window.log.names("references")]
+    if lacking:
+        raise SceneError(f"The log has no reference {', '.join(lacking)}, which the controller follows.")
+    return model.loop(numbers, window.segment, window.log), {"profile": "compiled"}
+
+
+def _seen(model: Model, run: Trajectory, window: Window) -> tuple[Floats, Floats]:
+    """Measured coordinates and their rates at the instants at which each sample was true."""
+    first = window.age[:, 0]
+    if np.array_equal(window.age, np.broadcast_to(first[:, None], window.age.shape)):
+        return model.see(model, run, np.ascontiguousarray(first))
+    each = [model.see(model, run, np.ascontiguousarray(age)) for age in window.age.T]
+    y, yd = (np.column_stack([pair[j][:, i] for i, pair in enumerate(each)]) for j in (0, 1))
+    return y, yd

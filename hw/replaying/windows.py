@@ -1,0 +1,108 @@
+"""A log cut into windows, each of which a model is started in anew from what was measured there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from crossbody.cases import InvalidValue, SceneError
+from crossbody.hw.models._contract import Floats, Model, Segment
+from crossbody.hw.reading.log import Log
+from crossbody.hw.replaying.rates import rates_by_fit
+
+FEWEST = 8
+"""Samples of a window."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Window:
+    """One stretch of a log.
+
+    Attributes:
+        t (n,): recorded times, s; both ends belong to it.
+        age (n, k): how long after the window's beginning each measured value was true, s: its delay taken off.
+        y (n, k): measured coordinates.
+        u (n, nu): recorded inputs, in force from each time on.
+        segment: what a model needs to run it.
+        log: its rows.
+    """
+
+    t: Floats
+    age: Floats
+    y: Floats
+    u: Floats
+    segment: Segment
+    log: Log
+
+
+def windows(
+    log: Log, model: Model, restart: float | None = None, delay: float = 0.0, horizon: float | None = None
+) -> tuple[Window, ...]:
+    """Cut a log.
+
+    Args:
+        log: what was recorded.
+        model: what it is replayed on.
+        restart: time from one restart to the next, s; 0 for one window; the model's usual one if None.
+        delay: of the measured coordinates beyond what the column map says, s.
+        horizon: length of a window, s; up to the next restart if None. Longer ones overlap.
+
+    Raises:
+        SceneError: if the log lacks a coordinate, or a whole window.
+        InvalidValue: for a restart or a horizon outside its range.
+    """
+    model.check_log(log)
+    length = model.restart if restart is None else restart
+    if not 0.0 <= length < math.inf:
+        raise InvalidValue(f"restart is {length!r} s; it must be at least 0 (0: one free run).")
+    reach = length if horizon is None else horizon
+    if not 0.0 <= reach < math.inf or (length == 0.0 and reach > 0.0) or (length > 0.0 and reach == 0.0):
+        raise InvalidValue(f"horizon is {reach!r} s; it must be above 0, and restart too.")
+    y, yd = model.read(model, log)
+    delays = _delays(log, model) + delay
+    recorded = [name for name in model.inputs if name in log.names("inputs")]
+    u = log.matrix("inputs", recorded) if len(recorded) == len(model.inputs) else np.zeros((len(log), 0))
+    cuts = _cuts(log.time, length, reach)
+    if yd is None:
+        starts = np.array([a for a, _ in cuts])
+        yd = np.zeros_like(y)
+        yd[starts] = rates_by_fit(log.time, y, starts)
+    return tuple(_window(log, y, yd, u, delays, a, b) for a, b in cuts)
+
+
+def _delays(log: Log, model: Model) -> Floats:
+    """Delay of every compared coordinate (k,), s, as the column map says; one for all where they are made of others."""
+    each = np.array([log.channel("coordinates", name).delay for name in model.channels])
+    return np.full(len(model.measured), each[0]) if model.needs else each
+
+
+def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:
+    """First and last row of every whole window."""
+    if restart == 0.0:
+        return [(0, len(t) - 1)]
+    starts = t[0] + restart * np.arange(max(0, int((t[-1] - t[0] - length) / restart + 1e-9) + 1))
+    edges = np.searchsorted(t, np.stack([starts, starts + length]) - 1e-9 * length)
+    found = [(int(a), int(b)) for a, b in edges.T if b - a >= FEWEST and b < len(t)]
+    if not found:
+        raise SceneError(
+            f"The log spans {t[-1] - t[0]:g} s with {len(t)} samples: no window of {length:g} s with {FEWEST} of them."
+        )
+    return found
+
+
+def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, a: int, b: int) -> Window:
+    rows = slice(a, b + 1)
+    t = log.time[rows]
+    age = (t - t[0])[:, None] - delays
+    # The state at the window's beginning was measured a delay later: the rate carries it there.
+    start, rate = y[a] + yd[a] * delays, yd[a]
+    driven = bool(u.shape[1])
+    segment = Segment(
+        y=start, yd=rate, t_end=float(t[-1] - t[0]), times=t[:-1] - t[0] if driven else np.zeros(0),
+        inputs=u[a:b] if driven else np.zeros((0, 0)),
+    )  # fmt: skip
+    last = float(log.time[b]) if b + 1 == len(log) else float(log.time[b + 1])
+    kept = log.window(float(t[0]), np.nextafter(last, math.inf) if b + 1 == len(log) else last)
+    return Window(t=t, age=age, y=y[rows], u=u[rows], segment=segment, log=kept)

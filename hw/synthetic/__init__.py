@@ -1,0 +1,1 @@
+"""Logs of a rig that MuJoCo computed; they are no measurement."""

@@ -1,0 +1,262 @@
+"""The level machine of spec 1.2 in plain Python: the check on the compiled one.
+
+    FREE -> active        h <= 0 and (h' < 0 or h < 0)
+    active -> BALLISTIC   lam < 0, h <= 0         active -> FREE        lam < 0, h > 0
+    BALLISTIC -> FREE     h > 0                   BALLISTIC -> active   h <= 0, h' < 0, lam would be > 0
+    COLLISION -> CONTACT  b1 |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
+
+h' counts as zero below 1e-9 of the largest rate seen, lam as zero below what rounding makes of it. A gap below -1e-9 m
+that does not close was started in penetration: it is active if it would press, else BALLISTIC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from crossbody.cases import Event, Mode, Outcome
+from crossbody.reference._kinds import Floats
+from crossbody.reference._system import System, initial_modes
+from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
+
+SLOW, DEEP, SPENT = 1e-9, 1e-9, 0.01
+SAME_INSTANT = 8.0 * ULP
+TINY = 1e-300  # in place of 0: SUNDIALS takes a function that is zero at the start for one that is absent
+
+
+class Watch(IntEnum):
+    """The functions watched for each row; each is positive until it fires."""
+
+    SWITCH = 0
+    """FREE: touch. Active: release. BALLISTIC: leave."""
+    TURN = 1
+    """The gap has its extremum: nothing switches, but a touch and a leave inside one step are seen."""
+    OTHER = 2
+    """BALLISTIC: catch. COLLISION: hand-over."""
+
+
+@dataclass(slots=True)
+class View:
+    """Everything the machine asks for at one instant; all (nc,) but vd (n,)."""
+
+    gap: Floats
+    rate: Floats
+    vd: Floats
+    lam: Floats
+    noise: Floats
+    size: Floats
+
+
+class LevelMachine:
+    """Modes of all rows and the transitions made so far.
+
+    Attributes:
+        modes: of every row.
+        events: transitions in order.
+        frozen: rows whose collisions take no time; none in this machine.
+        deep: depth beyond which a gap that does not close was started in penetration, m.
+        work (nc,): done by the impulses of every row so far, J.
+    """
+
+    def __init__(self, system: System, equations: Equations) -> None:
+        self.equations = equations
+        self.follows = np.asarray(system.follows).tolist()
+        self.switching = np.asarray(system.unilateral, dtype=bool).tolist()
+        self.rows = [i for i in range(system.nc) if self.switching[i] and self.follows[i] < 0]
+        self.modes: list[Mode] = [Mode(mode) for mode in initial_modes(system).tolist()]
+        self.events: list[Event] = []
+        self.frozen: frozenset[int] = frozenset()
+        self.work = np.zeros(system.nc)
+        self.deep = DEEP
+        self.fastest = 0.0
+        self._instant = -np.inf
+        self._seen: set[tuple[int, ...]] = set()
+        self._one_by_one = False
+        self._shift: list[float] = []
+        self._inside: set[int] = set()
+
+    @property
+    def slow(self) -> float:
+        """The rate below which a gap stands still."""
+        return SLOW * self.fastest
+
+    def _active_mode(self, i: int) -> Mode:
+        return Mode.COLLISION if self.equations.fast[i, 0] > 0.0 else Mode.CONTACT
+
+    def _touches(self, i: int, h: float, q: Floats) -> bool:
+        """Whether gap i is closed."""
+        return h <= 0.0
+
+    def _approaches(self, i: int, rate: float) -> bool:
+        """Whether gap i closes."""
+        return rate < -self.slow
+
+    def _activate(self, modes: list[Mode]) -> None:
+        for i, leader in enumerate(self.follows):
+            if leader >= 0:
+                modes[i] = modes[leader]
+        self.equations.activate(modes)
+
+    def look(self, t: float, q: Floats, v: Floats) -> View:
+        """Evaluate the present mode set."""
+        e = self.equations
+        self._activate(self.modes)
+        gap, rate = (a.copy() for a in e.gaps(t, q, v))
+        if not (np.isfinite(gap).all() and np.isfinite(rate).all()):
+            raise Ended(Outcome.NOT_FINITE)
+        self.fastest = max([self.fastest, *(abs(float(rate[i])) for i in self.rows)])
+        noise, size = e.noise(t, q, v, self.fastest)
+        vd, lam = e.accelerate(t, q, v)
+        return View(gap, rate, vd, lam, noise, size)
+
+    def pressure(self, i: int, t: float, q: Floats, v: Floats) -> tuple[float, float]:
+        """Multiplier of row i if it were active now, and its noise; -inf if that is ill posed."""
+        trial = list(self.modes)
+        trial[i] = self._active_mode(i)
+        self._activate(trial)
+        try:
+            noise, _ = self.equations.noise(t, q, v)
+            _, lam = self.equations.accelerate(t, q, v)
+            return float(lam[i]), float(noise[i])
+        except Ended:
+            return -np.inf, 0.0
+        finally:
+            self._activate(self.modes)
+
+    def _presses(self, i: int, h: float, t: float, q: Floats, v: Floats) -> bool:
+        """Whether row i would push if it were active now."""
+        lam, noise = self.pressure(i, t, q, v)
+        return lam > noise
+
+    def _wanted(self, i: int, view: View, t: float, q: Floats, v: Floats) -> Mode:
+        """Where row i belongs at this instant."""
+        mode, h, rate = self.modes[i], float(view.gap[i]), float(view.rate[i])
+        closing = self._approaches(i, rate)
+
+        def presses() -> bool:
+            return self._presses(i, h, t, q, v)
+
+        if mode in ACTIVE:
+            return self._released(i, h) if view.lam[i] < -view.noise[i] else mode
+        if not self._touches(i, h, q) or (h > 0.0 and mode != Mode.FREE):
+            return Mode.FREE
+        if closing and i in self.frozen:
+            return mode  # it collides
+        if mode != Mode.FREE:
+            return self._active_mode(i) if closing and presses() else mode
+        if closing:
+            return self._active_mode(i)
+        if h < -self.deep:
+            return self._active_mode(i) if presses() else Mode.BALLISTIC
+        return self._active_mode(i) if rate <= self.slow and presses() else Mode.FREE
+
+    def _released(self, i: int, h: float) -> Mode:
+        if h > 0.0:
+            return Mode.FREE
+        return Mode.COLLISION_SEPARATION if self.modes[i] == Mode.COLLISION else Mode.BALLISTIC
+
+    def _switch(self, t: float, i: int, after: Mode, impulse: float = 0.0) -> None:
+        self.events.append(Event(t=t, contact=i, before=self.modes[i], after=after, impulse=impulse))
+        self.modes[i] = after
+
+    def _repeats(self, t: float) -> bool:
+        """Note the mode set; whether it stood here at this instant before."""
+        if abs(t - self._instant) > SAME_INSTANT * abs(t):
+            self._instant, self._one_by_one = t, False
+            self._seen.clear()
+        now = tuple(self.modes)
+        known = now in self._seen
+        self._seen.add(now)
+        return known
+
+    def settle(self, t: float, q: Floats, v: Floats) -> View:
+        """Switch until nothing changes; only frozen collisions change v, in place.
+
+        Raises:
+            Ended: MODE_CYCLE naming the rows, or what the equations raise.
+        """
+        view = self._switch_rows(t, q, v)
+        self._arm(view, q)
+        return view
+
+    def _switch_rows(self, t: float, q: Floats, v: Floats) -> View:
+        """All rows together, and one at a time once a mode set has repeated."""
+        changed: set[int] = set()
+        self._repeats(t)
+        while True:
+            view = self.look(t, q, v)
+            count = 0
+            for i in self.rows:
+                after = self._wanted(i, view, t, q, v)
+                if after != self.modes[i]:
+                    self._switch(t, i, after)
+                    changed.add(i)
+                    count += 1
+                    if self._one_by_one:
+                        break
+            if count == 0:
+                return view
+            if self._repeats(t):
+                if self._one_by_one:
+                    raise Ended(Outcome.MODE_CYCLE, sorted(changed))
+                self._one_by_one = True
+                self._seen.clear()
+                changed.clear()
+
+    def fire(self, t: float, q: Floats, v: Floats, fired: Iterable[tuple[int, Watch]]) -> bool:
+        """Apply what was located, never deciding it again from a value at round-off; whether anything switched."""
+        gap, _ = self.equations.gaps(t, q, v)
+        self._repeats(t)
+        before = len(self.events)
+        for i, watch in {i: watch for i, watch in fired if watch != Watch.TURN}.items():
+            mode = self.modes[i]
+            if watch == Watch.OTHER:
+                self._switch(t, i, Mode.CONTACT if mode == Mode.COLLISION else self._active_mode(i))
+            elif mode in ACTIVE:
+                self._switch(t, i, self._released(i, float(gap[i])))
+            else:
+                self._switch(t, i, self._active_mode(i) if mode == Mode.FREE else Mode.FREE)
+        return len(self.events) > before
+
+    def move(self, t: float, modes: list[Mode]) -> None:
+        """Take over the modes that the mechanism's `switch` wants."""
+        for i, after in enumerate(modes):
+            if after != self.modes[i] and i in self.rows:
+                self._switch(t, i, after)
+
+    def _arm(self, view: View, q: Floats) -> None:
+        """Lift every guard that starts at or below zero to just above: it has fired already, or is round-off."""
+        self._inside = {i for i in self.rows if self._touches(i, float(view.gap[i]), q)}
+        self._shift = [0.0] * (len(Watch) * len(self.rows))
+        for j, i in enumerate(self.rows):
+            start = view.lam[i] if self.modes[i] in ACTIVE else view.gap[i]
+            if self.modes[i] not in (Mode.FREE, *ACTIVE):
+                start = -start
+            if start <= 0.0 and not (self.modes[i] == Mode.FREE and i in self._inside):
+                self._shift[len(Watch) * j] = -start + view.noise[i]
+
+    def guards(self, t: float, q: Floats, v: Floats, lam: Floats, out: Floats) -> None:
+        """All watched functions (3 a row) at a state with its multipliers."""
+        gap, rate = (a.copy() for a in self.equations.gaps(t, q, v))
+        out[:] = 1.0
+        for j, i in enumerate(self.rows):
+            at, mode = len(Watch) * j, self.modes[i]
+            h, hd = float(gap[i]), float(rate[i])
+            if mode in ACTIVE:
+                out[at] = lam[i]
+                if mode == Mode.COLLISION:
+                    elastic, inertial = self.equations.elastic_part(t, q, v, i)
+                    out[at + Watch.OTHER] = elastic - SPENT * max(inertial, 0.0)
+            elif mode == Mode.FREE:
+                out[at] = max(h, hd + self.slow) if i in self._inside else h
+                out[at + Watch.TURN] = (self.slow if i in self.frozen else 0.0) - hd
+            else:
+                closing = hd + self.slow
+                out[at], out[at + Watch.TURN] = -h, hd
+                catches = closing <= 0.0 and i not in self.frozen
+                out[at + Watch.OTHER] = max(closing, -self.pressure(i, t, q, v)[0]) if catches else closing
+        out += self._shift
+        out[out == 0.0] = TINY

@@ -1,0 +1,269 @@
+"""A run by SUNDIALS through scikit-sundae (Hindmarsh et al. 2005): the independent check on the compiled loop.
+
+It shares nothing with the compiled loop but the mechanism's kernels: equations, state machine, integrator and root
+finding are others. It is slower by the price of Python callbacks. Every arc between two events, changes of the inputs
+or ticks of the controller begins anew at order one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+
+from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
+from crossbody.reference._kinds import Floats
+from crossbody.reference._options import Options
+from crossbody.reference._system import System
+from crossbody.reference.sundials.arcs import Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
+from crossbody.reference.sundials.discrete import START, TOUCHED, Discrete
+from crossbody.reference.sundials.equations import ULP, Ended, Equations
+from crossbody.reference.sundials.frozen_machine import FrozenMachine
+from crossbody.reference.sundials.level_machine import LevelMachine, View
+from crossbody.reference.sundials.quiet import quiet
+
+FAR = 1e30
+RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
+ROUNDS = 100  # of rows and discrete variables that switch each other at one instant
+STILL = 200  # steps in a row, each within rounding of the time
+ON_THE_MANIFOLD = 1e-6
+
+
+class SundialsRun:
+    """One prepared run; `go` may be repeated, with the same result.
+
+    Args:
+        system: the mechanism.
+        q0, v0 (n,): start.
+        options: what is asked; solver "cvode" or "ida", fsm "level".
+
+    Raises:
+        InvalidValue: for another machine than "level".
+        SceneError: if rows of index 3 do not hold at the start.
+    """
+
+    def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
+        if options.fsm != "level":
+            raise InvalidValue(f"fsm is {options.fsm!r} with solver {options.solver!r}; valid: 'level'.")
+        self.system, self.options, self.q0, self.v0 = system, options, q0, v0
+        self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
+        self.natural = options.samples is None
+        self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
+        held = ~np.asarray(system.unilateral, dtype=bool)
+        self.rigid: list[int] = np.flatnonzero(held).tolist() if options.index == 3 else []
+        self._check_manifold()
+
+    def _check_manifold(self) -> None:
+        h, hd = self.system.gap(self.q0, self.v0)
+        off = max(np.abs(h[self.rigid]).max(initial=0.0), np.abs(hd[self.rigid]).max(initial=0.0))
+        if off > ON_THE_MANIFOLD:
+            raise SceneError(f"index=3 needs a start with h = h' = 0 in every bilateral row; the largest is {off:.3g}.")
+
+    def warm(self) -> None:
+        """Nothing to prepare: kernels are compiled where they are declared."""
+
+    def start(self) -> None:
+        """Back to the beginning."""
+        e = self.equations = Equations(self.system, rigid=bool(self.rigid))
+        self.machine = self._machine(e)
+        self.discrete = Discrete(self.system, e)
+        nz = self.system.nc + 2 if self.options.ledger else 0
+        energy = np.abs(np.nan_to_num(e.energy(self.q0, self.v0))).sum()
+        self.scene = Scene(e, self.machine, self.discrete, self.options, nz, max(float(energy), 1.0))
+        self.state = State(0.0, self.q0.copy(), self.v0.copy(), np.zeros(nz))
+        self.rows: list[tuple[float, Floats, Floats, Floats, Floats, Floats, list[int], Floats]] = []
+        self.next_sample = self.next_input = self.next_tick = 0
+        self.retries = self.still = 0
+        self.ended_rows: list[int] = []
+        self.told = 0  # events of which the mechanism's `switch` knows
+
+    def _machine(self, e: Equations) -> LevelMachine:
+        rule, rtol = self.options.collisions, self.options.rtol
+        return LevelMachine(self.system, e) if rule == "resolved" else FrozenMachine(self.system, e, rule, rtol)
+
+    def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
+        """Run to the end; how it ended, and the wall time in s."""
+        began = time.perf_counter()
+        self.start()
+        outcome = Outcome.FINISHED
+        try:
+            with quiet():
+                self._drive(began, progress)
+        except Ended as end:
+            outcome, self.ended_rows = end.outcome, end.rows
+        except KeyboardInterrupt:
+            outcome = Outcome.INTERRUPTED
+        return outcome, time.perf_counter() - began
+
+    def _drive(self, began: float, progress: Callable[[float], None] | None) -> None:
+        t_end = self.options.t_end
+        stop = self._take_inputs()
+        self._discretely(START)
+        view = self._settle()
+        self._sample(view.lam)
+        arc = self._arc(view)
+        while self.state.t < t_end:
+            self._check_bounds(began)
+            switched = self._step(arc, stop)
+            if switched is None:
+                arc = self._arc(view, cautious=True)
+                continue
+            if progress is not None:
+                progress(self.state.t / t_end)
+            at_stop = self.state.t >= stop
+            if at_stop and stop < t_end:
+                stop = self._take_inputs()
+            if switched or (at_stop and self.state.t < t_end):
+                view = self._settle()
+                arc = self._arc(view)
+            elif arc.stiff and self.kind is CvodeArc:
+                arc = BdfArc(self.scene, self.state, view, self.options.max_step)
+
+    def _check_bounds(self, began: float) -> None:
+        if self.scene.steps >= self.options.max_steps:
+            raise Ended(Outcome.STEP_LIMIT)
+        if time.perf_counter() - began > self.options.time_limit:
+            raise Ended(Outcome.TIME_LIMIT)
+
+    def _settle(self) -> View:
+        """Switch what must be switched now, and record the instant behind it.
+
+        IDA cannot start off the manifold of rigid rows: the drift of the arc before is taken away first.
+        """
+        s, work = self.state, self.machine.work.copy()
+        s.q, s.v = s.q.copy(), s.v.copy()
+        if self.rigid:
+            self.equations.project(s.q, s.v, self.rigid)
+        view = self._settle_both()
+        if self.scene.nz:
+            s.z = s.z.copy()
+            s.z[: self.system.nc] += self.machine.work - work
+        if self.natural:
+            self._record(view.lam)
+        return view
+
+    def _settle_both(self) -> View:
+        """Settle the rows, and tell the mechanism's `switch` whenever some have switched, until nothing changes."""
+        s, events = self.state, self.machine.events
+        for _ in range(ROUNDS):
+            view = self.machine.settle(s.t, s.q, s.v)
+            if len(events) == self.told:
+                return view
+            self.told = len(events)
+            if not self._discretely(TOUCHED):
+                return view
+        raise Ended(Outcome.MODE_CYCLE, sorted({e.contact for e in events if e.t == s.t}))
+
+    def _discretely(self, fired: int) -> bool:
+        """Let the mechanism switch its discrete variables; whether it did."""
+        s, events = self.state, self.machine.events
+        changed, modes = self.discrete.switch(s.t, s.q, s.v, self.machine.modes, fired)
+        known = len(events)
+        self.machine.move(s.t, modes)
+        self.told += len(events) - known
+        return changed
+
+    def _arc(self, view: View, cautious: bool = False) -> Arc:
+        longest = self.options.max_step
+        if cautious:
+            longest = min(longest, (self.options.t_end - self.state.t) * CAUTION**self.retries)
+        return self.kind(self.scene, self.state, view, longest)
+
+    def _step(self, arc: Arc, stop: float) -> bool | None:
+        """Go on; whether a machine switched, or None if the arc must begin anew with shorter steps."""
+        before = self.state
+        if stop - before.t <= 16.0 * ULP * stop:
+            self.state.t = stop
+            return False
+        target = stop if self.natural else min(stop, self._next_sample())
+        if target - before.t <= 16.0 * ULP * stop:  # a sample at an event, apart by rounding: no solver starts so near
+            before.t = target
+            self._sample(self.equations.accelerate(target, before.q, before.v)[1])
+            return False
+        try:
+            state, fired = arc.step(target, stop, self.natural)
+        except Ended as end:
+            if end.outcome is not Outcome.NOT_FINITE or self.retries >= RETRIES:
+                raise
+            self.retries += 1
+            return None
+        if max(np.abs(state.q).max(), np.abs(state.v).max()) > FAR:
+            raise Ended(Outcome.DIVERGED)
+        self.state = state
+        self._check_progress(state.t - before.t > 16.0 * ULP * stop)
+        lam = arc.multipliers(state)
+        if self.natural:
+            self._record(lam)
+        else:
+            self._sample(lam)
+        return self._fire(fired)
+
+    def _fire(self, fired: Fired) -> bool:
+        """Apply what was located; whether the arc ends there."""
+        s = self.state
+        switched = self.machine.fire(s.t, s.q, s.v, fired.rows) if fired.rows else False
+        for guard in fired.guards:
+            self._discretely(guard)
+        return switched or bool(fired.guards)
+
+    def _check_progress(self, moved: bool) -> None:
+        self.still = 0 if moved else self.still + 1
+        if moved:
+            self.retries = 0
+        elif self.still > STILL:
+            raise Ended(Outcome.STEP_TOO_SMALL)
+
+    def _next_sample(self) -> float:
+        return float(self.samples[self.next_sample]) if self.next_sample < len(self.samples) else np.inf
+
+    def _sample(self, lam: Floats) -> None:
+        """Record the samples that fall on the present instant."""
+        while self._next_sample() <= self.state.t:
+            self._record(lam)
+            self.next_sample += 1
+
+    def _record(self, lam: Floats) -> None:
+        s, e = self.state, self.equations
+        gap = e.gaps(s.t, s.q, s.v)[0].copy()
+        self.rows.append((s.t, s.q, s.v, gap, lam, e.energy(s.q, s.v), [int(m) for m in self.machine.modes], s.z))
+
+    def _take_inputs(self) -> float:
+        """Put the inputs that hold from now on in force; the next instant at which they change."""
+        s, system = self.state, self.system
+        while self.next_input < len(self.inputs_t) and self.inputs_t[self.next_input] <= s.t:
+            self.equations.u[:] = self.inputs_u[self.next_input]
+            self.next_input += 1
+        if system.control is not None and self.next_tick * system.tick <= s.t:
+            self.equations.control(s.t, s.q, s.v)
+            self.next_tick += 1
+        stops = [self.options.t_end, *self.inputs_t[self.next_input : self.next_input + 1].tolist()]
+        if system.control is not None:
+            stops.append(self.next_tick * system.tick)
+        return float(min(stops))
+
+    def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
+        """What was recorded, as a Trajectory."""
+        n, nc, count = self.system.n, self.system.nc, len(self.rows)
+        columns = list(zip(*self.rows, strict=True)) if self.rows else [()] * 8
+        widths = (n, n, nc, nc, 2, nc, self.scene.nz)
+        t = np.array(columns[0], dtype=np.float64)
+        q, v, gap, lam, energy, mode, z = (
+            np.array(c, dtype=np.float64).reshape(count, w) for c, w in zip(columns[1:], widths, strict=True)
+        )
+        modes = mode.astype(np.int8)
+        return Trajectory(
+            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, events=tuple(self.machine.events),
+            switches=tuple(self.discrete.switches),
+            outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
+            counts=MappingProxyType({"rhs": self.equations.evaluations}),
+            ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
+        )  # fmt: skip
+
+    def _message(self, outcome: Outcome) -> str:
+        if outcome is Outcome.FINISHED:
+            return ""
+        s = self.state
+        rows = f"Rows {self.ended_rows}, " if self.ended_rows else ""
+        return f"{outcome.advice} {rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}."
