@@ -81,6 +81,9 @@ class CompiledRun:
         self.model = [np.array(getattr(system, name)) for name in layout.Model.__annotations__]
         self.tables = [table(self.model), table([*self.work.values()]), table([*self.buffers.values()])]
         self.template = self._state_template(natural)
+        self.state = self.template.copy()
+        self._bytes, self._blank = (array.view(np.uint8) for array in (self.state, self.template))
+        self._modes = initial_modes(system)
         self.call: Callable[..., int] = partial(program(), *system.kernels.values())
 
     def _state_template(self, natural: bool) -> Any:
@@ -103,8 +106,8 @@ class CompiledRun:
 
     def start(self) -> None:
         """Back to the beginning."""
-        self.state = self.template.copy()
-        self.buffers["mode"][:] = initial_modes(self.system)
+        self._bytes[:] = self._blank  # a record is copied field by field, which costs more than a short run
+        self.buffers["mode"][:] = self._modes
         self.model[0][:] = self.system.p
         for name in ("u", "s", "z"):
             self.work[name][:] = 0.0
