@@ -120,7 +120,7 @@ def table(*rungs: tuple[str, float, float, float]) -> pd.DataFrame:
     profile = np.where(frame["engine"] == "reference", "compiled", "matched")
     return frame.assign(
         case="c", profile=profile, tier="A", against="the case", knob="rtol", call_ms=2.0 * frame["median_ms"],
-        outcome="finished",
+        outcome="finished", known_to=0.0,
     )  # fmt: skip
 
 
@@ -134,15 +134,23 @@ def test_headline_takes_the_cheapest_run_that_is_as_accurate() -> None:
     ).set_index("engine")  # fmt: skip
     assert found.loc["slow", ["ratio", "ratio_call", "least_ratio"]].to_list() == [40.0, 40.0, 3.0]
     assert found.loc["exact", "ratio"] == 2.0  # below rounding all are alike
-    assert found.loc["quick", "ratio"] == 4.0
-    assert "ahead where the error is large" in found.loc["quick", "says"]
-    assert "no run reaches" in found.loc["lost", "says"]
+    assert found.loc["quick", ["ratio", "least_ratio", "least_error"]].to_list() == [4.0, 0.5, 1e-2]
+    assert found["ahead"].dropna().to_dict() == {"slow": "yes", "exact": "yes", "quick": "no"}
+    assert "no less than its cheapest run, 1 ms at 1.0e-05" in found.loc["quick", "says"]
+    assert "reaches no error" in found.loc["lost", "says"]
+
+
+def test_errors_below_what_the_truth_is_known_to_are_alike() -> None:
+    rows = table(("reference", 1e-4, 1e-5, 1.0), ("reference", 1e-9, 1e-11, 9.0), ("other", 1e-9, 1e-10, 3.0))
+    assert headline(rows)["ratio"][0] == pytest.approx(1.0 / 3.0)
+    assert headline(rows.assign(known_to=2e-5))["ratio"][0] == 3.0
 
 
 def test_an_error_that_the_reference_does_not_reach_is_said() -> None:
     found = headline(table(("reference", 1e-9, 1e-6, 1.0), ("other", 1e-9, 1e-8, 1.0))).iloc[0]
     assert np.isnan(found["ratio"])
-    assert "more accurate than the reference" in found["says"]
+    assert found["ahead"] == "no"
+    assert "the reference does not get below 1.0e-06" in found["says"]
 
 
 def test_what_was_lost_is_told_with_its_reason() -> None:

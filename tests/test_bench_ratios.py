@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from crossbody.reports.bench import skip as bench_skip
-from crossbody.reports.bench import throughput as bench_throughput
+from crossbody.reports.bench import skip as skip
+from crossbody.reports.bench import throughput as throughput
 from crossbody.reports.bench.headline import headline
 from crossbody.reports.bench.ladder import Effort, bench
 from crossbody.reports.bench.scenes import DROP, PAIR, picks
@@ -32,7 +32,7 @@ def test_one_collision_is_ahead_of_every_engine_at_every_error() -> None:
 
 
 def test_what_a_scene_does_not_need_costs_nothing() -> None:
-    found = bench_skip.measure(7)
+    found = skip.measure(7)
     print("\n" + found.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
     assert found["held"].all(), found[~found["held"]]["what"].to_list()
 
@@ -40,14 +40,14 @@ def test_what_a_scene_does_not_need_costs_nothing() -> None:
 @pytest.mark.parametrize("integrator", ["Euler", "RK4"])
 def test_ensemble_against_mujocos_own_batch(integrator: str) -> None:
     pytest.importorskip("mujoco")
-    found = bench_throughput.against_mujoco(3, integrator)
+    found = throughput.against_mujoco(3, integrator)
     print(f"\n{found['what']}: {found['value']:.0f} ({found['beside']})")
-    assert found["value"] >= bench_throughput.LEAST_RATIO
+    assert found["value"] >= throughput.LEAST_RATIO
 
 
 def test_two_cores_run_nearly_twice_as_many() -> None:
-    found = bench_throughput.two_cores(5)
+    found = throughput.two_cores(5)
     if found["how"].startswith("not judged"):
         pytest.skip(f"{found['how']}; the ensemble reached {found['value']:.2f}")
     print(f"\n{found['value']:.2f} ({found['beside']})")
-    assert found["value"] >= bench_throughput.LEAST_TWO
+    assert found["value"] >= throughput.LEAST_TWO

@@ -25,7 +25,7 @@ SHOWN = {
               "outcome"],
     "orders": ["case", "engine", "profile", "knob", "order", "promised", "says"],
     "headline": ["case", "engine", "profile", "tier", "best_error", "engine_ms", "reference_ms", "ratio",
-                 "ratio_call", "least_ratio", "says"],
+                 "least_ratio", "ahead", "says"],
 }  # fmt: skip
 
 

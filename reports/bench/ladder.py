@@ -35,25 +35,31 @@ PARTS = {
     "error_times": "event_times",
 }  # fmt: skip
 COLUMNS = (
-    "case", "engine", "profile", "against", "tier", "knob", "setting", "error", *PARTS, "honesty", "median_ms",
-    "iqr_ms", "call_ms", "cores", "repeats", "steps", "outcome", "promised",
+    "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "honesty",
+    "median_ms", "iqr_ms", "call_ms", "cores", "repeats", "steps", "outcome", "promised",
 )  # fmt: skip
+PATIENCE = 2.0
+"""A rung may take this many times what was expected; its steps are bounded accordingly."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """How much is measured.
+    """How much is measured, and for how long.
 
     Attributes:
         repeats: timed runs of each rung.
-        slow: a run longer than this is not repeated, s.
-        longest: a ladder ends with the rung that took longer, s.
+        slow: a run longer than this is its own warm-up and not repeated, s.
+        longest: a ladder ends before the rung that would take longer, s.
+        climb: a ladder ends with the rung at which it has taken longer, s.
+        rounds: no round of repeats begins after this, s.
         every: one rung in so many is taken.
     """
 
     repeats: int = 5
     slow: float = 0.5
     longest: float = 2.0
+    climb: float = 10.0
+    rounds: float = 20.0
     every: int = 1
 
 
@@ -63,30 +69,65 @@ class Rung:
 
     pick: Pick
     against: str
-    tier: str
+    truth: Truth
     knob: str
     setting: float
     run: Any
     first: Trajectory
-    took: float
     errors: dict[str, float]
     promised: float
     inner: list[float] = field(default_factory=list)
     call: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
 
+    def note(self, run: Trajectory, took: float, cores: float) -> None:
+        """One timed run: its own clock, the whole call, s, and processor time over wall time."""
+        self.inner.append(run.wall_s or took)
+        self.call.append(took)
+        self.cpu.append(cores)
 
-def ladder(case: Case, pick: Pick, every: int = 1) -> Iterator[tuple[str, float, Any]]:
-    """(knob, setting, prepared run) for every rung; one without a knob for an engine that has none."""
-    engine = engines.load(pick.engine)
-    plain = engine.prepare(case, pick.profile)
-    lean = {"ledger": False} if "ledger" in plain.settings else {}  # nobody asked for the account
-    knob = next((name for name in LADDERS if name in plain.settings), "")
-    if not knob:
-        yield "", math.nan, plain
-    for setting in LADDERS.get(knob, ())[::every]:
-        if knob != "dt" or setting <= case.t_end:
-            yield knob, setting, engine.prepare(case, pick.profile, **{knob: setting}, **lean)
+
+@dataclass(slots=True)
+class Ladder:
+    """The settings of one engine on one case, from coarse to fine, each prepared when its turn comes."""
+
+    case: Case
+    pick: Pick
+    effort: Effort
+    took: list[float] = field(default_factory=list)
+    steps: int = 0
+
+    def __iter__(self) -> Iterator[tuple[str, float, Any]]:
+        """(knob, setting, prepared run) of every rung; one without a knob for an engine that has none."""
+        plain = engines.load(self.pick.engine).prepare(self.case, self.pick.profile)
+        lean = {"ledger": False} if "ledger" in plain.settings else {}  # nobody asked for the account
+        knob = next((name for name in LADDERS if name in plain.settings), "")
+        if not knob:
+            yield "", math.nan, plain
+        for setting in LADDERS.get(knob, ())[:: self.effort.every]:
+            if self._too_long():
+                return
+            if knob != "dt" or setting <= self.case.t_end:
+                given = {knob: setting, **lean, **self._bound(plain)}
+                yield knob, setting, engines.load(self.pick.engine).prepare(self.case, self.pick.profile, **given)
+
+    def climbed(self, took: float, steps: int) -> None:
+        """Tell what the rung cost: wall time, s, and steps."""
+        self.took.append(took)
+        self.steps = steps
+
+    def _too_long(self) -> bool:
+        if len(self.took) < 2:
+            return bool(self.took) and self.took[-1] > self.effort.longest
+        before, last = self.took[-2:]
+        return last * max(1.0, last / before) > self.effort.longest or sum(self.took) > self.effort.climb
+
+    def _bound(self, plain: Any) -> dict[str, int]:
+        """As many steps as may be taken in the longest time, by what a step cost so far."""
+        if not self.took or not self.steps or "max_steps" not in plain.settings:
+            return {}
+        most = PATIENCE * self.effort.longest * self.steps / self.took[-1]
+        return {"max_steps": max(self.steps, min(int(most), int(plain.settings["max_steps"])))}
 
 
 class _Truths:
@@ -146,24 +187,40 @@ def _rungs(case: Case, picks: Sequence[Pick], effort: Effort, tell: Callable[[st
 def _climbed(case: Case, pick: Pick, effort: Effort, truths: _Truths) -> Iterator[Rung]:
     """The rungs of one engine, up to the one that takes too long."""
     promised = float(getattr(engines.load(pick.engine), "orders", {}).get(pick.profile, math.nan))
-    for knob, setting, run in ladder(case, pick, effort.every):
+    rungs = Ladder(case, pick, effort)
+    for knob, setting, run in rungs:
         began = time.perf_counter()
         first = run.run()
         took = time.perf_counter() - began
+        rungs.climbed(took, first.steps)
         against, truth = truths.of(run)
-        errors = _errors(truth, first, case)
-        yield Rung(pick, against, truth.tier.value[0], knob, setting, run, first, took, errors, promised)
-        if took > effort.longest:
-            return
+        rung = Rung(pick, against, truth, knob, setting, run, first, _errors(truth, first, case), promised)
+        if took > effort.slow:
+            rung.note(first, took, 1.0)
+        yield rung
 
 
 def _timed(rung: Rung) -> None:
     cpu, began = time.process_time(), time.perf_counter()
     run = rung.run.run()
     took = time.perf_counter() - began
-    rung.call.append(took)
-    rung.cpu.append((time.process_time() - cpu) / took)
-    rung.inner.append(run.wall_s or took)
+    rung.note(run, took, (time.process_time() - cpu) / took)
+
+
+def _rounds(rungs: Sequence[Rung], effort: Effort) -> None:
+    """Time every rung that is not timed yet, in turns, again and again."""
+    quick = [rung for rung in rungs if not rung.call]
+    began = time.perf_counter()
+    gc.collect()
+    gc.disable()
+    try:
+        for i in range(effort.repeats):
+            if i and time.perf_counter() - began > effort.rounds:
+                return
+            for rung in quick:
+                _timed(rung)
+    finally:
+        gc.enable()
 
 
 def bench(
@@ -183,15 +240,7 @@ def bench(
     """
     effort = Effort(repeats=effort) if isinstance(effort, int) else effort
     rungs = list(_rungs(case, picks, effort, tell))
-    gc.collect()
-    gc.disable()
-    try:
-        for _ in range(effort.repeats):
-            for rung in rungs:
-                if not rung.call or rung.took < effort.slow:
-                    _timed(rung)
-    finally:
-        gc.enable()
+    _rounds(rungs, effort)
     return pd.DataFrame([_row(case, rung) for rung in rungs], columns=list(COLUMNS))
 
 
@@ -199,12 +248,19 @@ def _row(case: Case, rung: Rung) -> dict[str, Any]:
     low, median, high = (1e3 * float(x) for x in np.percentile(rung.inner, (25, 50, 75)))
     return {
         "case": case.label, "engine": rung.pick.engine, "profile": rung.pick.profile, "against": rung.against,
-        "tier": rung.tier, "knob": rung.knob, "setting": rung.setting, **rung.errors,
+        "tier": rung.truth.tier.value[0], "known_to": _known_to(case, rung.truth), "knob": rung.knob,
+        "setting": rung.setting, **rung.errors,
         "honesty": rung.errors["error"] / rung.setting if rung.knob == "rtol" else math.nan,
         "median_ms": median, "iqr_ms": high - low, "call_ms": 1e3 * float(np.median(rung.call)),
         "cores": float(np.median(rung.cpu)), "repeats": len(rung.call), "steps": rung.first.steps,
         "outcome": rung.first.outcome.value, "promised": rung.promised,
     }  # fmt: skip
+
+
+def _known_to(case: Case, truth: Truth) -> float:
+    """How far a truth of two integrators can be trusted: their difference, as in the column `error`; else 0."""
+    times = truth.agreement.get("event_times", 0.0) / case.t_end
+    return float(max(truth.agreement.get("position", 0.0), times))
 
 
 def joined(tables: Sequence[pd.DataFrame]) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -46,8 +46,8 @@ QUICK = (
     Scene(name="newtons_cradle", variant="sliders"),
     Scene(name="delta_impulse", variant="light"),
 )
-QUICK_EFFORT = Effort(repeats=3, slow=0.2, longest=0.5, every=2)
-FULL_EFFORT = Effort(repeats=7, slow=1.0, longest=10.0)
+QUICK_EFFORT = Effort(repeats=3, slow=0.2, longest=0.5, climb=2.0, rounds=10.0, every=2)
+FULL_EFFORT = Effort(repeats=7, slow=0.3, longest=4.0, climb=8.0, rounds=30.0)
 
 
 def default(full: bool) -> tuple[Case, ...]:

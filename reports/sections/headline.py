@@ -12,14 +12,15 @@ from crossbody.reports.runs.study import read_json
 TITLE = "Lead of the reference"
 TEXT = (
     "For each engine its best error and the time that it took there, beside the cheapest run of the compiled reference "
-    "that is at least as accurate. The least ratio is that of all errors which the engine reaches. Errors below 1e-13 "
-    "are rounding. An engine that follows another law is judged against that law's truth."
+    "that is at least as accurate. The least ratio is that of all errors which the engine reaches. Errors below 1e-13, "
+    "or below what a truth of tier C is known to, count as that. An engine that follows another law is judged against "
+    "that law's truth."
 )
 COLUMNS = columns(
     case="Case", who="Engine", tier="Tier", against="Against the truth of", best_error=("Best error [1]", Kind.NUMBER),
     engine_ms=("Its run [ms]", Kind.NUMBER), reference_ms=("Reference [ms]", Kind.NUMBER),
     ratio=("Ratio [1]", Kind.NUMBER), ratio_call=("Ratio of the Python calls [1]", Kind.NUMBER),
-    least_ratio=("Least ratio [1]", Kind.NUMBER), says=("Says", Kind.LONG),
+    least_ratio=("Least ratio [1]", Kind.NUMBER), ahead="Ahead at every error", says=("Says", Kind.LONG),
 )  # fmt: skip
 
 
