@@ -51,7 +51,11 @@ def _ratios(ours: pd.DataFrame, rungs: pd.DataFrame) -> dict[str, Any]:
     levels = [_level(ours, rung) for rung in done.to_dict(orient="records")]
     best = min(levels, key=lambda level: (level["best_error"], level["engine_ms"]))
     least = min(levels, key=lambda level: (math.isfinite(level["ratio"]), level["ratio"]))
-    found = {"least_ratio": least["ratio"], "least_error": least["best_error"], "ahead": "yes" if least["ratio"] > 1.0 else "no"}
+    found = {
+        "least_ratio": least["ratio"],
+        "least_error": least["best_error"],
+        "ahead": "yes" if least["ratio"] > 1.0 else "no",
+    }
     return about | best | found | {"says": _says(least, ours)}
 
 
