@@ -47,6 +47,9 @@ class Engine(Protocol):
 
     An engine may have `orders`, profile -> promised order of the error in its step `dt` or its tolerance `rtol`; the
     benchmark holds the observed one against it.
+
+    An engine may have `linearise(case, spot) -> tuple[Tangent, ...]` (`crossbody.engines._linear`): its derivatives of
+    the accelerations at an equilibrium of the case, by each way that it has.
     """
 
     name: str

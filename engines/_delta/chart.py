@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from crossbody.engines._linear import Chart
+
 Floats = NDArray[np.float64]
 
 
@@ -74,6 +76,13 @@ def rate_matrix(r: Floats) -> Floats:
     """T (9, 9) of one pose r (9,): v = T r'."""
     columns = [from_tree(r, e)[1] for e in np.eye(9)]
     return np.column_stack(columns)
+
+
+def linear(r: Floats) -> Chart:
+    """The chart of small motions about one pose r (9,)."""
+    T = rate_matrix(r)
+    inverse: Floats = np.linalg.inv(T).astype(np.float64)
+    return Chart(T=T, S=inverse)
 
 
 def absolute(r: Floats, rd: Floats, M: Floats, bias: Floats, H: Floats) -> tuple[Floats, Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -93,6 +93,17 @@ def delta(case: Case) -> Delta:
     r0, rd0 = chart.to_tree(np.array(case.q0), np.array(case.v0))
     forces = table(robot, scene.servo_of(case.parameters))
     return Delta(robot=robot, r0=r0, rd0=rd0, drive=Drive(case), table=forces)
+
+
+def unpowered(case: Case, u: Floats) -> Delta:
+    """A case without its servos and controller, under the constant inputs u (6,).
+
+    Raises:
+        SceneError: if the start does not close the loops.
+    """
+    own = delta(case)
+    own.drive.u[:] = u
+    return replace(own, table=table(own.robot, None))
 
 
 def in_absolute(terms: Any) -> dict[str, Any]:

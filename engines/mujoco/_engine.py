@@ -13,6 +13,7 @@ import mujoco
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory, _registry
 from crossbody.engines import _settings
 from crossbody.engines._contract import Run
+from crossbody.engines._linear import Spot, Tangent
 from crossbody.engines.mujoco._globals import captured, hooked
 from crossbody.engines.mujoco._march import March
 from crossbody.engines.mujoco._scene import Scene
@@ -113,6 +114,19 @@ class Mujoco:
             case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said),
             follows=followed(case, profile) if followed else None,
         )  # fmt: skip
+
+    def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
+        """The matched profile's derivatives of v' at an equilibrium, by each way that there is.
+
+        Raises:
+            CaseUnsupported: with the sentence of `why_not`.
+        """
+        from crossbody.engines.mujoco._linear import linearise
+
+        reason = self.why_not(case, "matched")
+        if reason is not None:
+            raise CaseUnsupported(reason)
+        return linearise(_mechanism(case.mechanism), case, spot)
 
 
 def _known(case: Case, step: float) -> dict[str, Parameter]:

@@ -16,10 +16,12 @@ from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces
-from crossbody.engines._delta.scene import Delta, delta, in_absolute
+from crossbody.engines._delta.scene import Delta, delta, in_absolute, unpowered
+from crossbody.engines._linear import Spot
 from crossbody.engines.mujoco._delta_model import compiled
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
+from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._scene import Scene
 
 HELD = (int(Mode.BILATERAL),) * 6

@@ -13,11 +13,14 @@ import mujoco
 
 from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.engines._linear import Spot
 from crossbody.engines._maze.log import MazeLog
+from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.scene import ONLY_CONTINUOUS, BallMaze, ball_maze
 from crossbody.engines.mujoco import _maze_audit as audits
 from crossbody.engines.mujoco import _maze_segments as segments
 from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._maze_charts import Charts
 from crossbody.engines.mujoco._maze_march import MazeMarch
 from crossbody.engines.mujoco._maze_steps import MazeSteps
@@ -97,6 +100,17 @@ def prepare(case: Case, profile: str, used: Mapping[str, Any]) -> MazeRun:
         InvalidValue: for a geometry that is impossible.
     """
     return (_segments if profile == "default" else _matched)(case, ball_maze(case), used)
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The matched model with the ball at rest on a face."""
+    charts = Charts(case, ball_maze(case))
+    q, v = tuple(spot.q.tolist()), tuple(spot.v.tolist())
+    machine = MazeMachine(charts.maze, charts.probe)
+    with hooked(charts.stage):
+        charts.arm(machine.untouched(q), q, v)
+        charts.arm(machine.first(q, v).memory, q, v)
+    return Stand(model=charts.model, data=charts.data, chart=charts.linear(), hook=charts.stage)
 
 
 def _matched(case: Case, maze: BallMaze, used: Mapping[str, Any]) -> MazeRun:

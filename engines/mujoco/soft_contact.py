@@ -17,10 +17,12 @@ import numpy as np
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _soft_contact as soft
+from crossbody.engines._linear import Spot, same
 from crossbody.engines._log import Chart, Modes
 from crossbody.engines._soft_contact import NAMES, SoftContact
 from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
+from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._pairs import add_pairs
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._two_sets import TwoSets
@@ -66,6 +68,16 @@ def build(case: Case, profile: str, dt: float) -> Scene:
     """
     own = soft.soft_contact(case)
     return _matched(own, case) if profile == "matched" else _obvious(own, case)
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The matched model at an equilibrium, the clock at its time."""
+    scene = _matched(soft.soft_contact(case), case)
+    scene.start()
+    scene.data.qpos[:], scene.data.qvel[:] = np.append(spot.q, spot.t), np.append(spot.v, 1.0)
+    if scene.arm is not None:
+        scene.arm(spot.modes(case))
+    return Stand(model=scene.model, data=scene.data, chart=same(len(spot.q), more=1), hook=scene.hook)
 
 
 def _matched(own: SoftContact, case: Case) -> Scene:

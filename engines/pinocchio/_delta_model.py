@@ -53,6 +53,43 @@ class Closed:
         pin.constraintDynamics(self.model, self.data, r, rd, tau, self.constraints, self.states, self.settings)
         return self.data.ddq.copy(), self.data.lambda_c.copy()
 
+    def law(self, r: Floats, rd: Floats) -> Floats:
+        """H' r' + a1 h' + a0 h (6,) of the loops."""
+        pin.forwardKinematics(self.model, self.data, r, rd, np.zeros(9))
+        pin.updateFramePlacements(self.model, self.data)
+        ends = self.ends
+        at = [self.data.oMf[i].translation.copy() for i in ends]
+        kinds = (pin.getFrameVelocity, pin.getFrameClassicalAcceleration)
+        rate, drift = (
+            [np.array(get(self.model, self.data, i, pin.LOCAL_WORLD_ALIGNED).linear) for i in ends] for get in kinds
+        )
+        h, hd, Hdv = (np.concatenate((x[0] - x[1], x[0] - x[2])) for x in (at, rate, drift))
+        own = self.constants()
+        gamma: Floats = Hdv + own["a1"] * hd + own["a0"] * h
+        return gamma
+
+    def derivatives(self, r: Floats, rd: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
+        """Of the accelerations by r, r' and tau (9, 9), as `computeConstraintDynamicsDerivatives` has them."""
+        self.accelerate(r, rd, tau)
+        pin.computeConstraintDynamicsDerivatives(
+            self.model, self.data, self.constraints, self.states, self.settings
+        )  # fmt: skip
+        return self.data.ddq_dq.copy(), self.data.ddq_dv.copy(), self.data.ddq_dtau.copy()
+
+    def turned(self, r: Floats) -> Floats:
+        """What `derivatives` has too much in v' (9, 18), behind it: found from its residual, exact to rounding.
+
+        It is M v' - H^T lam of arms 2 and 3, in the column of the first joint: J_i^T (-nv e x lam_i), e its axis.
+        """
+        M, _, H = self.terms(r, np.zeros(9))
+        axis = pin.getJointJacobian(self.model, self.data, 1, pin.LOCAL_WORLD_ALIGNED)[3:, 0]
+        wrong, K = np.zeros(15), np.block([[M, -H.T], [H, np.zeros((6, 6))]])
+        for i, lam in enumerate(self.data.lambda_c.reshape(2, 3)):
+            wrong[:9] += self.model.nv * np.cross(axis, lam) @ np.where(np.arange(9) < 3, 0.0, H[3 * i : 3 * i + 3])
+        found = np.zeros((9, 18))
+        found[:, 0] = np.linalg.solve(K, wrong)[:9]
+        return found
+
     def masses(self) -> Floats:
         """Proximal link, distal link and tip of each arm (9,), kg: a joint has one inertia for all that it carries.
 

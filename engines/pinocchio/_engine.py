@@ -17,6 +17,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.engines import _settings
 from crossbody.engines._contract import Run
 from crossbody.engines._level_machine import LevelMachine
+from crossbody.engines._linear import Spot, Tangent
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
 from crossbody.engines.pinocchio._admm import TimeStepper
@@ -170,6 +171,19 @@ class Pinocchio:
             case=case, scene=scene, profile=profile, settings=used, constants=constants, integrate=integrate,
             follows=followed(case, profile) if (followed := getattr(mechanism, "followed", None)) else None,
         )  # fmt: skip
+
+    def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
+        """The derivatives of v' of the profile law at an equilibrium, by each way that there is.
+
+        Raises:
+            CaseUnsupported: with the sentence of `why_not`.
+        """
+        from crossbody.engines.pinocchio._linear import linearise
+
+        reason = self.why_not(case, "law")
+        if reason is not None:
+            raise CaseUnsupported(reason)
+        return linearise(_mechanism(case), case, spot)
 
 
 def _path() -> list[str]:

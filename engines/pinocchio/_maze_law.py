@@ -52,18 +52,24 @@ class MazeLaw:
     def accelerate(self, q: State, v: State, memory: Memory) -> tuple[Floats, Floats]:
         """See `crossbody.engines._maze.machine.Accelerate`."""
         self.q[:], self.v[:] = q, v
-        brake = self.maze.braking(v, memory)
-        self.tau[0], self.tau[3] = self.maze.torque(q, v, memory) - brake, brake
+        self.force(q, v, memory)
         on, lam = memory.active(), np.zeros(self.maze.nc)
         if not on:
             return pin.aba(self.model, self.data, self.q, self.v, self.tau), lam
-        J, gamma = self._rows(q, v, memory, on)
+        J, gamma = self.rows(q, v, memory)
         vd, part = self.solve(self.q, self.v, J, gamma)
         lam[list(on)] = part
         return vd, lam
 
-    def _rows(self, q: State, v: State, memory: Memory, on: tuple[int, ...]) -> tuple[Floats, Floats]:
+    def force(self, q: State, v: State, memory: Memory) -> Floats:
+        """Of the controller and of rolling damping (4,): the forces that are in force."""
+        brake = self.maze.braking(v, memory)
+        self.tau[0], self.tau[3] = self.maze.torque(q, v, memory) - brake, brake
+        return self.tau.copy()
+
+    def rows(self, q: State, v: State, memory: Memory) -> tuple[Floats, Floats]:
         """J (na, 4) and gamma (na,) of the active rows."""
+        on = memory.active()
         formulas, J, gamma = self.maze.rows.at(memory.place), np.empty((len(on), 4)), np.empty(len(on))
         for k, i in enumerate(on):
             h, H, Hdv = formulas[i](q, v)

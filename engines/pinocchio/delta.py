@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,16 @@ from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces
-from crossbody.engines._delta.scene import Delta, delta, in_absolute
+from crossbody.engines._delta.scene import Delta, delta, in_absolute, unpowered
+from crossbody.engines._linear import Spot, Tangent
 from crossbody.engines.pinocchio._delta_model import Closed, by_hand, imported
+from crossbody.engines.pinocchio._linear import Stand
 from crossbody.engines.pinocchio._smooth import Smooth
 
+TURNED = (
+    "Pinocchio 4.1.0 turns the force on the second body of a constraint nv times about the first joint's axis in "
+    "ddq_dq; ddq_dv and ddq_dtau are right."
+)
 MODELS = {"by_hand": by_hand, "imported": imported}
 
 
@@ -50,6 +57,35 @@ def smooth(case: Case, model: str) -> Smooth:
         observe=own.observe,
         audit=_audit(case, own, closed),
     )
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The tree with its loops at an equilibrium under constant torques, no servo and no controller."""
+    own, (r, rd) = unpowered(case, spot.u), chart.to_tree(spot.q, spot.v)
+    closed = by_hand(own.robot, case.law)
+
+    def force(r: Floats, rd: Floats) -> Floats:
+        tau = np.zeros(9)
+        forces(spot.t, r, rd, own.drive.u, own.table, tau)
+        return tau
+
+    return Stand(
+        model=closed.model, data=closed.data, q=r, v=rd, chart=chart.linear(r), force=force,
+        jacobian=lambda r: closed.terms(r, np.zeros(9))[2], law=closed.law, more=_constrained(closed),
+    )  # fmt: skip
+
+
+def _constrained(closed: Closed) -> Callable[[Stand, Floats], tuple[Tangent, ...]]:
+    """Pinocchio's own derivatives of the constrained dynamics, and what is wrong with them."""
+
+    def ways(stand: Stand, right: Floats) -> tuple[Tangent, ...]:
+        by_q, by_v, by_tau = closed.derivatives(stand.q, stand.v, stand.force(stand.q, stand.v))
+        found = np.hstack([by_q, by_v]) + by_tau @ stand.outside()
+        explained = right + closed.turned(stand.q)
+        way = "computeConstraintDynamicsDerivatives"
+        return (Tangent(way=way, slope=found, known=TURNED, explained=explained),)
+
+    return ways
 
 
 def _audit(case: Case, own: Delta, closed: Closed) -> dict[str, Any]:

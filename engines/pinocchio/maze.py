@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, Parameter, Trajectory, Value
+from crossbody.engines._linear import Spot, same
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.scene import ONLY_CONTINUOUS, ball_maze
+from crossbody.engines.pinocchio._linear import Stand
 from crossbody.engines.pinocchio._maze_flow import MazeFlow
 from crossbody.engines.pinocchio._maze_law import MazeLaw, audit
 from crossbody.engines.pinocchio._rows import ALGEBRA
@@ -26,6 +28,10 @@ SETTINGS = {
 """BDF, because a ball that rests on a face is stiff: its rows decay a thousand times faster than it moves."""
 SIZES = np.array([1.0, 1e-3, 1e-3, 1.0, 1.0, 1e-1, 1e-1, 1.0])
 """Sizes of theta, x, y, phi and their rates, which times rtol are the absolute tolerances: rad, m, rad/s, m/s."""
+
+
+SMALL = 2e-2
+"""Size of the coordinates, for differences: the rings are a few centimetres wide."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,3 +75,16 @@ def prepare(case: Case, used: Mapping[str, Value]) -> MazeRun:
         InvalidValue: for a geometry that is impossible.
     """
     return MazeRun(case=case, law=MazeLaw(case, ball_maze(case), str(used["algebra"])), settings=used)
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The model with the ball at rest on a face."""
+    law = MazeLaw(case, ball_maze(case), "forwardDynamics")
+    q, v = tuple(spot.q.tolist()), tuple(spot.v.tolist())
+    memory = MazeMachine(law.maze, law.accelerate).first(q, v).memory
+    return Stand(
+        model=law.model, data=law.data, q=spot.q, v=spot.v, chart=same(4), size=SMALL,
+        force=lambda q, v: law.force(tuple(q.tolist()), tuple(v.tolist()), memory),
+        jacobian=lambda q: law.rows(tuple(q.tolist()), tuple(spot.v.tolist()), memory)[0],
+        law=lambda q, v: law.rows(tuple(q.tolist()), tuple(v.tolist()), memory)[1],
+    )  # fmt: skip

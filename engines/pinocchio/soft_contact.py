@@ -10,6 +10,8 @@ import pinocchio as pin
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _soft_contact as soft
+from crossbody.engines._linear import Spot
+from crossbody.engines.pinocchio._linear import Stand, of_rows
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene
 
@@ -42,6 +44,11 @@ def build(case: Case, algebra: str) -> Scene:
         rows=rows, observe=own.observe, sizes=own.sizes, start=own.start(case), chart=soft.chart,
         audit=_listed(rows, own),
     )  # fmt: skip
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The model at an equilibrium, the clock at its time."""
+    return of_rows(build(case, "forwardDynamics").rows, spot, more=(spot.t,), rates=(1.0,))
 
 
 def _listed(rows: PinRows, own: soft.SoftContact) -> dict[str, Any]:

@@ -1,0 +1,140 @@
+"""Linear models from Pinocchio's derivatives of the tree, with the rows by the implicit function theorem.
+
+At an equilibrium the accelerations a and the multipliers lam of the rows that are on solve
+
+    rnea(q, v, a) - tau(q, v) - H(q)^T lam = 0        H(q) a + gamma(q, v) = 0
+
+with gamma = H' v + a1 h' + a0 h + a2 h^3. `computeRNEADerivatives` gives the derivative of rnea at fixed a,
+`computeABADerivatives` that of a where no row is on. What Pinocchio does not know, the forces tau and the geometry of
+the rows, is differenced centrally to fourth order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from crossbody.cases import Case
+from crossbody.cases._arrays import Floats
+from crossbody.engines._linear import Chart, Spot, Tangent, differences, in_contact, same
+from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
+
+STEP = 1e-3
+"""Of the differences, as a part of the coordinates' sizes."""
+Force = Callable[[Floats, Floats], Floats]
+"""(q, v) -> a force or an acceleration."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stand:
+    """A model at an equilibrium, in its own coordinates.
+
+    Attributes:
+        model, data: Pinocchio's.
+        q, v (nv,): state.
+        chart: its coordinates and the case's.
+        force: tau (nv,), beside gravity and the rows.
+        jacobian: q -> H (na, nv) of the rows that are on.
+        law: (q, v) -> gamma (na,).
+        size: of the coordinates, for the differences.
+        more: (this, right derivative (nv, 2 nv) of v') -> other ways, in the coordinates of the model.
+    """
+
+    model: Any
+    data: Any
+    q: Floats
+    v: Floats
+    chart: Chart
+    force: Force
+    jacobian: Callable[[Floats], Floats]
+    law: Force
+    size: float = 1.0
+    more: Callable[[Stand, Floats], tuple[Tangent, ...]] = lambda _stand, _right: ()
+
+    def differenced(self, function: Force) -> Floats:
+        """Derivative of a function of (q, v) by both."""
+        n, x = self.model.nv, np.concatenate((self.q, self.v))
+        return differences(lambda x: function(x[:n].copy(), x[n:].copy()), x, STEP * self.size)
+
+    def outside(self) -> Floats:
+        """Derivative (nv, 2 nv) of the forces beside gravity and the rows."""
+        return self.differenced(self.force)
+
+
+def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, ...]:
+    """What Pinocchio's derivatives make of an equilibrium.
+
+    Args:
+        mechanism: its module here; one with coordinates of its own has `stand(case, spot) -> Stand`.
+        case: the scene.
+        spot: the equilibrium.
+    """
+    case = in_contact(case)
+    own: Callable[[Case, Spot], Stand] | None = getattr(mechanism, "stand", None)
+    stand = own(case, spot) if own else of_rows(mechanism.build(case, "forwardDynamics").rows, spot)
+    right = _by_rnea(stand) if spot.rows else _by_aba(stand)
+    return tuple(stand.chart.tangent(way) for way in (right, *stand.more(stand, right.slope)))
+
+
+def of_rows(rows: PinRows, spot: Spot, more: tuple[float, ...] = (), rates: tuple[float, ...] = ()) -> Stand:
+    """The stand of a mechanism of `PinRows`.
+
+    Args:
+        rows: the mechanism.
+        spot: the equilibrium.
+        more: coordinates of the model behind those of the case.
+        rates: their rates.
+    """
+    on, zero = list(spot.rows), rows.tau.copy()
+    a0, a1, a2 = rows.slow[:, on]
+
+    def force(q: Floats, v: Floats) -> Floats:
+        if rows.forces is None:
+            return zero
+        rows.forces(q, v, rows.tau)
+        return rows.tau.copy()
+
+    def law(q: Floats, v: Floats) -> Floats:
+        h = rows.heights(q)[on]
+        gamma: Floats = rows.drift(q, v)[on] + a1 * (rows.jacobian(q)[on] @ v) + (a0 + a2 * h * h) * h
+        return gamma
+
+    return Stand(
+        model=rows.model, data=rows.data, q=np.append(spot.q, more), v=np.append(spot.v, rates),
+        chart=same(len(spot.q), len(more)), force=force, jacobian=lambda q: np.array(rows.jacobian(q)[on]), law=law,
+    )  # fmt: skip
+
+
+def _by_aba(stand: Stand) -> Tangent:
+    """Of a tree that touches nothing."""
+    model, data = stand.model, stand.data
+    tau = stand.force(stand.q, stand.v)
+    pin.computeABADerivatives(model, data, stand.q, stand.v, tau)
+    by_q, by_v, by_tau = data.ddq_dq.copy(), data.ddq_dv.copy(), data.Minv.copy()
+    by_tau = np.triu(by_tau) + np.triu(by_tau, 1).T
+    return Tangent(way="computeABADerivatives", slope=np.hstack([by_q, by_v]) + by_tau @ stand.outside())
+
+
+def _by_rnea(stand: Stand) -> Tangent:
+    """Of a tree with rows."""
+    model, data, q, v, n = stand.model, stand.data, stand.q, stand.v, stand.model.nv
+    M, H = mass_matrix(model, data, q), stand.jacobian(q)
+    K = np.block([[M, -H.T], [H, np.zeros((len(H), len(H)))]])
+    bias = np.array(pin.nonLinearEffects(model, data, q, v))
+    a, lam = np.split(np.linalg.solve(K, np.concatenate((stand.force(q, v) - bias, -stand.law(q, v)))), [n])
+    pin.computeRNEADerivatives(model, data, q, v, a)
+    inertial = np.hstack([data.dtau_dq, data.dtau_dv])
+
+    def rest(q: Floats, v: Floats) -> Floats:
+        H = stand.jacobian(q)
+        return np.concatenate((-stand.force(q, v) - lam @ H, H @ a + stand.law(q, v)))
+
+    residual = stand.differenced(rest)
+    residual[:n] += inertial
+    found: Floats = -np.linalg.solve(K, residual)[:n]
+    return Tangent(way="computeRNEADerivatives, rows implicitly", slope=found)
