@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from crossbody.reports.pages import figures
+from crossbody.reports import sections
+from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import label, style, suits
 from crossbody.reports.pages.html import Page
 from crossbody.reports.pages.playback import playback
+from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results
 from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.runs.store import Trace
@@ -39,8 +43,9 @@ def case_page(found: Results, case: CaseFiles) -> Page:
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about), engines=_engines(traces),
         sections=[
-            _verdicts(found, case), *playback(traces), *_plots(traces), _runs(traces, case.about), _audit(found, case),
-            provenance(found),
+            _glance(found, case), _verdicts(found, case), *playback(traces), *_plots(traces),
+            *precision(found.out, case.label, found.rows.get(case.label, ()), _walls(found, case)),
+            *studied(found.out, case.about), _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
 
@@ -55,6 +60,34 @@ def _lead(about: Mapping[str, Any]) -> str:
 
 def _engines(traces: Sequence[Trace]) -> list[Mapping[str, Any]]:
     return [{"name": label(trace), **style(trace, i)} for i, trace in enumerate(traces)]
+
+
+def _walls(found: Results, case: CaseFiles) -> dict[str, float]:
+    """Run times of the engines, s."""
+    return {who: wall for (label, who), wall in found.walls.items() if label == case.label and who != "truth:"}
+
+
+def _glance(found: Results, case: CaseFiles) -> Section:
+    """Which engine can be trusted here, and at what cost."""
+    rows = found.rows.get(case.label, [])
+    return Section(
+        name="glance", title="At a glance", template="matrix.html",
+        context={
+            "corner": "Metric", "heads": grid.heads(grid.names(rows)), "wide": True, "filtered": False, "pages": (),
+            "lines": grid.of_case(rows, case.page, case.label, _walls(found, case)),
+            "says": "A cell leads to its limit, its reason and the command that repeats it.",
+        },
+    )  # fmt: skip
+
+
+def studied(out: Path, about: Mapping[str, Any]) -> list[Section]:
+    """What studies in the same folder drew of this case."""
+    return [
+        replace(section, tables=())
+        for name in sections.names()
+        if about.get("case") in getattr(study := sections.load(name), "CASES", ())
+        for section in study.sections(out)
+    ]
 
 
 def _verdicts(found: Results, case: CaseFiles) -> Section:
@@ -100,19 +133,22 @@ def _run(trace: Trace) -> dict[str, Any]:
 
 
 def _audit(found: Results, case: CaseFiles) -> Section:
+    said = {row["who"]: row["verdict"] for row in found.rows.get(case.label, ()) if row["metric"] == "audit"}
     told = [
-        row | {"who": f"{row['engine']}:{row['profile']}", "verdict": "within" if row["same"] else "outside"}
-        for row in found.audits.get(case.label, [])
-    ]
-    failed = sum(not row["same"] for row in told)
-    text = f"{AUDIT_TEXT} {failed} of {len(told)} quantities differ." if told else f"{AUDIT_TEXT} None was audited."
+        row | {"who": who, "verdict": "within" if row["same"] else said.get(who, "outside")}
+        for row in found.audits.get(case.label, []) for who in (f"{row['engine']}:{row['profile']}",)
+    ]  # fmt: skip
+    told.sort(key=lambda row: row["same"])
+    failed = [row["who"] for row in told if not row["same"]]
+    whose = f" ({', '.join(dict.fromkeys(failed))})" if failed else ""
+    text = f"{AUDIT_TEXT} {len(failed)} of {len(told)} quantities differ{whose}." if told else f"{AUDIT_TEXT} None was."
     table = Table(title="Parity audit", columns=AUDIT, rows=told, folded=not failed)
     return Section(name="audit", title="Parity audit", text=text, tables=(table,))
 
 
-def provenance(found: Results) -> Section:
-    """What the results depend on besides their numbers."""
-    rows = [{"key": key, "value": _words(value)} for key, value in found.told.items()]
+def provenance(told: Mapping[str, Any]) -> Section:
+    """What results depend on besides their numbers."""
+    rows = [{"key": key, "value": _words(value)} for key, value in told.items() if value not in (None, {}, "")]
     table = Table(title="Provenance", columns=columns(key="What", value=("Value", Kind.CODE)), rows=rows)
     return Section(name="provenance", title="Provenance", tables=(table,))
 

@@ -12,7 +12,7 @@ from crossbody.reports.metrics._impulse import cumulative
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.section import Figure
 from crossbody.reports.pages.sheet import Sheet
-from crossbody.reports.pages.strips import modes
+from crossbody.reports.pages.strips import changing, modes
 from crossbody.reports.pages.styles import COLOURS, DASHES, TRUTH, label, style
 from crossbody.reports.pages.thin import POINTS
 from crossbody.reports.runs.store import Trace
@@ -155,7 +155,9 @@ def steps(traces: Sequence[Trace], points: int = POINTS) -> Figure:
 
 def suits(name: str, traces: Sequence[Trace]) -> bool:
     """Whether a figure has anything to show."""
-    return bool(traces[0].about["contacts"]) or name not in ("force", "modes", "penetration")
+    if name == "modes":
+        return bool(changing(traces)[0])
+    return bool(traces[0].about["contacts"]) or name not in ("force", "penetration")
 
 
 def note(name: str, traces: Sequence[Trace]) -> str:

@@ -1,0 +1,146 @@
+"""From sections to HTML: the templates with their filters, names that are safe in a path, numbers for a reader."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from crossbody.reports.pages.section import Figure, Kind, Section
+
+TEMPLATES = Path(__file__).parent / "templates"
+PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
+PARTS = ("page.js", "plots.js", "player.js")
+"""The pages' own script, in this order."""
+SIGNS = {"within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·", "skipped": "-"}
+"""A verdict is told by sign and word besides its colour."""
+MOST = 2000
+"""Rows of a table that a page shows; the file beside it has all."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """One page.
+
+    Attributes:
+        name: of its file, without ".html".
+        title: heading.
+        sections: in order.
+        lead: one line below the heading.
+        engines: label and style of every engine that can be shown and hidden on it.
+    """
+
+    name: str
+    title: str
+    sections: Sequence[Section]
+    lead: str = ""
+    engines: Sequence[Mapping[str, Any]] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """One entry of the navigation: the name of a page, and what to call it."""
+
+    page: str
+    title: str
+
+
+@cache
+def environment() -> Environment:
+    """Templates that escape whatever is put in, and refuse what is not there."""
+    made = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    made.filters |= {"number": number, "slug": slug, "plot": plot}
+    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST, "json": json_text}
+    return made
+
+
+def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single: bool = False) -> str:
+    """HTML of one page, or of all in one file.
+
+    Args:
+        pages: one, or all if `single`.
+        links: navigation, the same on every page.
+        footer: what made it, in one line.
+        single: whether style and scripts stand in the file and links stay inside it.
+    """
+
+    def href(page: str, anchor: str = "") -> str:
+        inside = f"#{page}--{anchor}" if anchor else f"#{page}"
+        return inside if single else f"{page}.html{inside if anchor else ''}"
+
+    inline = {"style": _text("page.css"), "script": _script(), "plotly": get_plotlyjs()} if single else {}
+    template = environment().get_template("page.html")
+    return template.render(
+        pages=pages, links=links, footer=footer, href=href, drawn=any(_drawn(page) for page in pages),
+        inline={key: Markup(text.replace("</script", "<\\/script")) for key, text in inline.items()},
+    )  # fmt: skip
+
+
+def assets(pages_drawn: bool) -> dict[str, str]:
+    """The files that all pages of a folder share, by name."""
+    shared = {SCRIPT: _script(), STYLE: _text("page.css")}
+    return shared | ({PLOTLY: get_plotlyjs()} if pages_drawn else {})
+
+
+def _drawn(page: Page) -> bool:
+    return any(section.plots for section in page.sections)
+
+
+def _text(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+@cache
+def _script() -> str:
+    return "\n".join(_text(name) for name in PARTS)
+
+
+def json_text(value: Any) -> Markup:
+    """A text of JSON that cannot end the script element it stands in."""
+    return Markup(str(value).replace("<", "\\u003c"))
+
+
+def plot(figure: Figure) -> dict[str, Any]:
+    """A figure as JSON, with its title and height taken out of it; the page gives it its colours."""
+    made: dict[str, Any] = figure if isinstance(figure, dict) else json.loads(figure.to_json(engine="json"))
+    layout = {key: value for key, value in made["layout"].items() if key not in ("title", "template")}
+    layout["margin"] = {"l": 84, "r": 14, "t": 34, "b": 50}
+    text = json.dumps({"data": made["data"], "layout": layout}, separators=(",", ":"))
+    return {"title": made["layout"]["title"]["text"], "height": layout["height"], "json": json_text(text)}
+
+
+def file_name(label: str) -> str:
+    """A label as the name of a file and an id: distinct for distinct labels, no path in it.
+
+    A colon becomes a dot; whatever else is not a letter, digit, hyphen or underscore, or is too long, is replaced and
+    told apart by a hash.
+    """
+    plain = label.replace(":", ".", 1)
+    if re.fullmatch(r"[A-Za-z0-9_-]{1,80}(\.[A-Za-z0-9_-]{1,80})?", plain) and "." not in label:
+        return plain
+    return f"{re.sub(r'[^A-Za-z0-9_-]+', '-', label)[:60]}-{hashlib.sha256(label.encode()).hexdigest()[:8]}"
+
+
+def slug(text: str) -> str:
+    """A text as a class or an id."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", text)
+
+
+def number(value: Any) -> str:
+    """A number for a table: four digits, a dash where there is none."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return f"{value:.4g}" if isinstance(value, (int, float)) and not isinstance(value, bool) else str(value)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import CrossbodyError
+from crossbody.cases import CrossbodyError, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports import scenes
 from crossbody.reports.pages.filled import filled
@@ -22,9 +22,12 @@ from crossbody.reports.runs.store import Trace
 ROOM = 280_000
 """Room of the motions on a page, bytes."""
 FEWEST, MOST = 60, 900
+BLOWS = 200
+"""Impulses of one engine that are drawn, evenly chosen of more."""
 TEXT = (
     "All engines over one clock, which the plots below share. Arrows are contact forces, as long as lam; each shows "
-    "the largest force since the picture before, so that no blow is missed."
+    "the largest force since the picture before, so that no blow is missed. A collision that takes no time has no "
+    "force but an impulse: a hollow arrow that fades."
 )
 
 
@@ -61,7 +64,8 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene) -> dict[str, Any]:
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
         "end": max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0),
-        "force": _scale(traces),
+        "force": typical(_largest(trace.run.lam) for trace in traces),
+        "impulse": typical(_largest(np.array([e.impulse for e in trace.run.events])) for trace in traces),
     }  # fmt: skip
 
 
@@ -75,7 +79,20 @@ def _track(trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, A
     return {
         "name": label(trace), "color": look["color"], "strokes": look["strokes"], "truth": label(trace) == TRUTH,
         "t": _base64(t[at]), "poses": _base64(poses), "arrows": _base64(arrows),
-    }  # fmt: skip
+    } | _blows(run, scene, parameters)  # fmt: skip
+
+
+def _blows(run: Trajectory, scene: scenes.Scene, parameters: Mapping[str, Any]) -> dict[str, str]:
+    """Collisions that took no time: their instants, and arrows of N s instead of N."""
+    struck = [event for event in run.events if event.impulse]
+    chosen_ = [struck[i] for i in np.unique(np.linspace(0, len(struck) - 1, min(len(struck), BLOWS)).astype(int))]
+    if not chosen_:
+        return {"struck": "", "blows": ""}
+    at = np.minimum(np.searchsorted(run.t, [event.t for event in chosen_]), len(run.t) - 1)
+    impulses = np.zeros((len(chosen_), run.lam.shape[1]))
+    impulses[np.arange(len(chosen_)), [event.contact for event in chosen_]] = [event.impulse for event in chosen_]
+    arrows = scene.arrows(run.q[at], impulses, parameters)
+    return {"struck": _base64(run.t[at]), "blows": _base64(arrows)}
 
 
 def chosen(t: Floats, events: Floats, frames: int) -> NDArray[np.intp]:
@@ -104,10 +121,14 @@ def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
     return found
 
 
-def _scale(traces: Sequence[Trace]) -> float:
-    """The force that is drawn as the longest arrow, N: the median of the largest of each engine that has one."""
-    largest = [float(np.max(np.abs(np.nan_to_num(trace.run.lam)), initial=0.0)) for trace in traces]
-    return float(np.median([x for x in largest if x > 0.0] or [1.0]))
+def typical(largest: Iterable[float]) -> float:
+    """What is drawn as the longest arrow: the median of the largest of each engine that has one; 0 if none has."""
+    found = [x for x in largest if x > 0.0]
+    return float(np.median(found)) if found else 0.0
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(np.nan_to_num(values)), initial=0.0))
 
 
 def _base64(array: Floats) -> str:

@@ -91,7 +91,7 @@ def _pair(n: str, name: str, domain: list[float], timed: bool) -> dict[str, Any]
     x: dict[str, Any] = {"anchor": f"y{n}", "domain": [0.0, 1.0], "showticklabels": timed}
     if n:
         x["matches"] = "x"
-    title = {"text": plain(name).replace("\n", "<br>"), "standoff": 2, "font": {"size": 12}}
+    title = {"text": plain(name).replace("\n", "<br>"), "standoff": 14, "font": {"size": 12}}
     y = {"anchor": f"x{n}", "domain": domain, "title": title, "exponentformat": "e", "tickfont": {"size": 10.5}}
     return {f"xaxis{n}": x, f"yaxis{n}": y}
 

@@ -23,24 +23,37 @@ MOST_CONTACTS = 8
 
 
 def modes(traces: Sequence[Trace], points: int = LONGEST) -> Figure:
-    """One strip a contact and engine."""
-    contacts = list(enumerate(traces[0].about["contacts"][:MOST_CONTACTS]))
-    shown: set[int] = set()
+    """One strip a contact and engine; contacts that are in one mode throughout are named instead."""
+    moving, still = changing(traces)
     bars: list[dict[str, Any]] = []
-    for k, contact in reversed(contacts):
+    shown: set[int] = set()
+    for k, contact in reversed(moving[:MOST_CONTACTS]):
         for trace in reversed(traces):
             for mode, spans in _by_mode(trace.run, k).items():
-                name = label(trace) if len(contacts) == 1 else f"{contact}, {label(trace)}"
+                name = label(trace) if len(moving) == 1 else f"{contact}, {label(trace)}"
                 bars.append(_bar(trace, name, mode, spans[:LONGEST]) | {"showlegend": mode not in shown})
                 shown.add(mode)
+    named = f". Throughout, in every engine: {', '.join(still)}" if still else ""
     layout = {
-        "title": {"text": "Modes of the state machine"}, "barmode": "overlay", "bargap": 0.25,
-        "height": 150 + 22 * len({bar["y"][0] for bar in bars}),
+        "title": {"text": f"Modes of the state machine{named}"}, "barmode": "overlay", "bargap": 0.25,
+        "height": 150 + 18 * len({bar["y"][0] for bar in bars}),
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
         "xaxis": {"title": {"text": "time [s]"}, "range": [0.0, float(traces[0].run.t[-1])]},
         "yaxis": {"automargin": True, "tickfont": {"size": 10}},
     }  # fmt: skip
     return {"data": bars, "layout": layout}
+
+
+def changing(traces: Sequence[Trace]) -> tuple[list[tuple[int, str]], list[str]]:
+    """Contacts (index, name) whose mode changes or differs among engines, and "name MODE" of the others."""
+    moving, still = [], []
+    for k, contact in enumerate(traces[0].about["contacts"]):
+        seen = {int(m) for trace in traces for m in np.unique(trace.run.mode[:, k]) if m >= 0}
+        if len(seen) > 1:
+            moving.append((k, contact))
+        else:
+            still += [f"{contact} {Mode(m).name}" for m in seen]
+    return moving, still
 
 
 def _bar(trace: Trace, name: str, mode: Mode, spans: Sequence[tuple[float, float]]) -> dict[str, Any]:

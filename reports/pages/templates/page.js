@@ -21,10 +21,10 @@ const crossbody = (() => {
 })();
 
 (() => {
-  // "#page--section~engine": the page that holds the section is shown, and its verdicts are those of the engine.
+  // "#page--section~engine~metric": the page that holds the section is shown, and its verdicts are those of both.
   const pages = [...document.querySelectorAll("[data-page]")];
   const go = () => {
-    const [id, engine] = decodeURIComponent(location.hash.slice(1)).split("~");
+    const [id, engine, metric] = decodeURIComponent(location.hash.slice(1)).split("~");
     const target = document.getElementById(id);
     const page = target ? target.closest("[data-page]") : null;
     if (pages.length > 1) pages.forEach((each) => { each.hidden = each !== (page || pages[0]); });
@@ -32,6 +32,7 @@ const crossbody = (() => {
       const select = page.querySelector('select[data-filter="engine"]');
       if (select && [...select.options].some((option) => option.value === engine)) {
         select.value = engine;
+        page.querySelector('input[data-filter="words"]').value = metric || "";
         select.dispatchEvent(new Event("change"));
       }
     }

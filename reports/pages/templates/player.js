@@ -14,10 +14,11 @@
   const start = (root) => {
     const scene = JSON.parse(root.querySelector("[data-scene]").textContent);
     const { stage, end } = scene;
+    const fade = end / 25; // how long an impulse is seen
     const space = stage.dimensions === 3;
     const tracks = scene.tracks.map((track) => {
-      const [t, poses, arrows] = [floats(track.t), floats(track.poses), floats(track.arrows)];
-      return { ...track, t, poses, arrows, width: poses.length / t.length, pushes: arrows.length / t.length };
+      const [t, poses, arrows, struck, blows] = ["t", "poses", "arrows", "struck", "blows"].map((name) => floats(track[name]));
+      return { ...track, t, poses, arrows, struck, blows, width: poses.length / t.length, pushes: arrows.length / t.length };
     });
     const find = (name) => root.querySelector(`[data-${name}]`);
     const [play, clock, readout, speed, view, forces, longer] = ["play", "clock", "readout", "speed", "view", "forces", "longer"].map(find);
@@ -61,7 +62,7 @@
       const share = gap > 0 ? Math.min(Math.max((t - times[low]) / gap, 0), 1) : 0;
       const mix = (k) => track.poses[low * track.width + k] * (1 - share) + track.poses[high * track.width + k] * share;
       const row = share > 0 ? high : low;
-      return { pose: mix, push: (k) => track.arrows[row * track.pushes + k] };
+      return { pose: mix, pushes: track.arrows.subarray(row * track.pushes, (row + 1) * track.pushes) };
     };
 
     const camera = (x0, y0, w, h) => {
@@ -99,10 +100,19 @@
       }
       g.stroke();
     };
-    const arrow = (from, to) => {
+    const arrow = (from, to, hollow) => {
       const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
       const length = Math.hypot(dx, dy);
       if (length < 2) return;
+      if (hollow) {
+        // The outline of a broad arrow: an impulse.
+        const [x, y, tip] = [dx / length, dy / length, Math.min(14, 0.5 * length)];
+        const at = (along, across) => [from[0] + along * x - across * y, from[1] + along * y + across * x];
+        trace([at(0, 4), at(length - tip, 4), at(length - tip, 9), at(length, 0), at(length - tip, -9), at(length - tip, -4), at(0, -4)]);
+        g.closePath();
+        g.stroke();
+        return;
+      }
       const [ux, uy, head] = [dx / length, dy / length, Math.min(8, 0.6 * length)];
       trace([from, to]);
       g.stroke();
@@ -112,8 +122,20 @@
       g.lineTo(to[0] - head * ux - 0.45 * head * uy, to[1] - head * uy + 0.45 * head * ux);
       g.fill();
     };
+    // Forces, or impulses as hollow arrows; the typical largest of them is drawn as long as 0.28 of the height.
+    const arrows = (to, h, largest, values, hollow) => {
+      const n = stage.dimensions;
+      for (let k = 0; k < values.length && largest; k += 2 * n) {
+        const [point, force] = [values.subarray(k, k + n), values.subarray(k + n, k + 2 * n)];
+        const from = to(point);
+        const unit = ((0.28 * h) / largest / (from[2] || 1)) * Number(longer.value);
+        const long = Math.hypot(...force) * unit * from[2];
+        const cut = long > 0.45 * h ? (0.45 * h) / long : 1;
+        arrow(from, to([...point].map((x, i) => x + force[i] * unit * cut)), hollow);
+      }
+    };
     const paint = (track, to, h, ghost) => {
-      const { pose, push } = at(track, now);
+      const { pose, pushes } = at(track, now);
       g.strokeStyle = g.fillStyle = track.color;
       g.lineWidth = track.truth ? 4 : 1.8;
       g.setLineDash(ghost && track.strokes !== "none" ? track.strokes.split(" ").map(Number) : []);
@@ -137,16 +159,14 @@
       g.setLineDash([]);
       if (!forces.checked) return;
       g.lineWidth = 2;
-      const n = stage.dimensions;
-      for (let k = 0; k < track.pushes; k += 2 * n) {
-        const point = [0, 1, 2].slice(0, n).map((i) => push(k + i));
-        const force = [0, 1, 2].slice(0, n).map((i) => push(k + n + i));
-        const from = to(point);
-        const unit = (0.28 * h) / scene.force / (from[2] || 1) * Number(longer.value);
-        const long = Math.hypot(...force) * unit * from[2];
-        const cut = long > 0.45 * h ? (0.45 * h) / long : 1;
-        arrow(from, to(point.map((x, i) => x + force[i] * unit * cut)));
-      }
+      arrows(to, h, scene.force, pushes, false);
+      const each = track.struck.length ? track.blows.length / track.struck.length : 0;
+      track.struck.forEach((t, i) => {
+        if (now < t || now > t + fade) return;
+        g.globalAlpha = 1 - (now - t) / fade;
+        arrows(to, h, scene.impulse, track.blows.subarray(i * each, (i + 1) * each), true);
+        g.globalAlpha = 1;
+      });
     };
     const still = (to) => {
       g.strokeStyle = g.fillStyle = colour("--soft");
@@ -154,21 +174,24 @@
       stage.still.forEach((each) => shape(each, (p) => p, to, true));
     };
     const bar = (to, x, y, h) => {
-      // A length and a force to measure by.
+      // A length, a force and an impulse to measure by.
       const scale = to([middle[0], middle[1], middle[2] || 0])[2];
-      const metres = nice(60 / scale);
-      const newton = (0.28 * h * Number(longer.value)) / scene.force;
-      const newtons = nice(60 / newton);
       g.fillStyle = g.strokeStyle = colour("--soft");
       g.lineWidth = 2;
       g.font = "12px system-ui, sans-serif";
-      const draw = (length, text, down) => {
-        trace([[x, y - down], [x + length, y - down]]);
+      let line = y;
+      const measure = (pixels, unit) => {
+        const value = nice(60 / pixels);
+        trace([[x, line], [x + value * pixels, line]]);
         g.stroke();
-        g.fillText(text, x + length + 6, y - down + 4);
+        g.fillText(`${shortNumber(value)} ${unit}`, x + value * pixels + 6, line + 4);
+        line -= 16;
       };
-      draw(metres * scale, `${shortNumber(metres)} m`, 0);
-      if (forces.checked) draw(newtons * newton, `${shortNumber(newtons)} N`, 16);
+      measure(scale, "m");
+      if (!forces.checked) return;
+      const longest = 0.28 * h * Number(longer.value);
+      if (scene.force) measure(longest / scene.force, "N");
+      if (scene.impulse) measure(longest / scene.impulse, "N s");
     };
     const draw = () => {
       const box = canvas.getBoundingClientRect();

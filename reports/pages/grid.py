@@ -1,0 +1,156 @@
+"""Engines across, cases or metrics down: the table that shows at one look what can be trusted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from crossbody.reports.judging.verdict import Word
+from crossbody.reports.pages.html import number
+
+WORST = (Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
+"""Judged verdicts, the worst first."""
+KEY = ("finished", "audit", "position", "velocity", "event_times", "lam_impulse", "energy_drift", "energy_integrator")
+"""Metrics that stand first in the table of a case."""
+
+
+Row = Mapping[str, Any]
+"""A verdict as a plain row, with `who` (engine:profile)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One engine in one line.
+
+    Attributes:
+        title: all that is known, in words.
+        word: verdict, "plain" for a number that is not judged; empty where there is nothing.
+        text, small: shown, and below it.
+        page, anchor: where it leads: the verdicts of a page, "engine" or "engine~metric".
+    """
+
+    title: str
+    word: str = ""
+    text: str = ""
+    small: str = ""
+    page: str = ""
+    anchor: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """One line: its name, what stands beside it, the page that it leads to, and a cell for every engine."""
+
+    text: str
+    cells: Sequence[Cell]
+    small: str = ""
+    page: str = ""
+
+
+def heads(engines: Sequence[str]) -> list[dict[str, Any]]:
+    """Engines over their profiles."""
+    groups: dict[str, list[str]] = {}
+    for who in engines:
+        engine, _, profile = who.partition(":")
+        groups.setdefault(engine, []).append(profile)
+    return [{"engine": engine, "profiles": profiles} for engine, profiles in groups.items()]
+
+
+def names(rows: Iterable[Row]) -> list[str]:
+    """Engines with their profiles, in the order of their rows, profiles of one engine side by side."""
+    found = dict.fromkeys(row["who"] for row in rows)
+    order = list(dict.fromkeys(who.partition(":")[0] for who in found))
+    return sorted(found, key=lambda who: order.index(who.partition(":")[0]))
+
+
+def of_engine(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """Rows of every engine."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row["who"], []).append(row)
+    return found
+
+
+def worst(rows: Sequence[Row]) -> tuple[str, str]:
+    """The worst word of some rows, and how many of how many judged have it."""
+    counts = Counter(row["verdict"] for row in rows)
+    total = sum(counts[word] for word in WORST)
+    word = next((word for word in WORST if counts[word]), Word.SKIPPED.value if counts["skipped"] else Word.INFO.value)
+    if not total:
+        return word, ""
+    return word, str(total) if word == Word.WITHIN.value else f"{counts[word]} of {total}"
+
+
+def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | None) -> Cell:
+    """The cell of one engine on one case: worst verdict, error of position and run time."""
+    if not rows:
+        return Cell(title=f"{who} was not asked for {label}.")
+    word, text = worst(rows)
+    error = next((row["value"] for row in rows if row["metric"] == "position"), None)
+    parts = ["" if error is None or error != error else f"{error:.0e}", duration(wall)]
+    said = "; ".join(dict.fromkeys(row["why"] for row in rows if row["verdict"] == word and row["why"]))
+    title = f"{who} on {label}: {text} {word}. {said[:300]}".strip()
+    small = " · ".join(part for part in parts if part)
+    return Cell(title=title, word=word, text=text, small=small, page=page, anchor=who)
+
+
+def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, float]) -> list[Line]:
+    """Lines of one case: all together, what it costs, and every metric that is judged for some engine.
+
+    Args:
+        rows: verdicts of the case.
+        page: name of its page.
+        label: of the case.
+        walls: run time of each engine, s.
+    """
+    engines, mine = names(rows), of_engine(rows)
+    least = min((wall for wall in walls.values() if wall), default=0.0)
+    together = [whole(label, page, who, mine[who], None) for who in engines]
+    costs = [_cost(walls.get(who), least) for who in engines]
+    return [
+        Line(text="all judged", small="error of position", cells=together),
+        Line(text="run time", small="over the least", cells=costs),
+        *_metrics(rows, mine, engines, page),
+    ]
+
+
+def _cost(wall: float | None, least: float) -> Cell:
+    if not wall:
+        return Cell(title="no run")
+    return Cell(title="", word="plain", text=duration(wall), small=f"{wall / least:.3g} times")
+
+
+def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
+    judged = {row["metric"]: row["unit"] for row in rows if row["verdict"] in WORST}
+    order = sorted(judged, key=lambda name: KEY.index(name) if name in KEY else len(KEY))
+    values = {who: {row["metric"]: row for row in mine[who]} for who in engines}
+    return [
+        Line(text=name, small=f"[{judged[name]}]", cells=[_value(values[who].get(name), page) for who in engines])
+        for name in order
+    ]
+
+
+def _value(row: Row | None, page: str) -> Cell:
+    if row is None:
+        return Cell(title="no such number")
+    limit = row["limit"]
+    allowed = f", limit {number(limit)}" if limit is not None and limit == limit else ""
+    title = f"{row['who']}, {row['metric']}: {number(row['value'])} {row['unit']}{allowed}. {row['why']}"
+    anchor = f"{row['who']}~{row['metric']}"
+    return Cell(title=title, word=row["verdict"], text=short(row["value"]), page=page, anchor=anchor)
+
+
+def short(value: float | None) -> str:
+    """A number in two or three digits."""
+    if value is None or value != value:
+        return "-"
+    return f"{value:.1e}" if value and not 1e-3 <= abs(value) < 1e4 else f"{value:.3g}"
+
+
+def duration(wall: float | None) -> str:
+    """A run time in three digits and its unit."""
+    if not wall:
+        return ""
+    return f"{wall:.3g} s" if wall >= 1.0 else f"{1e3 * wall:.3g} ms"

@@ -1,0 +1,98 @@
+"""Run time against error on the page of a case: whole ladders where a benchmark stands in the folder, else the runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from crossbody.reports.pages.section import Figure, Plot, Section
+from crossbody.reports.pages.sheet import plain
+from crossbody.reports.pages.styles import COLOURS
+from crossbody.reports.runs.study import read_json
+
+SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")
+FLOOR = 1e-16
+RUNS = (
+    "Each engine once, at its own setting: lower left is better. An engine without a position to compare is not shown, "
+    "one that is not finite is a cross at the right edge. Whole lines over ladders of tolerances and steps: "
+    "crossbody bench, then crossbody report --with."
+)
+LADDERS = (
+    "A line an engine, a point for every tolerance or step: lower left is better. Choose an error, then go up: the "
+    "lowest line there is the fastest engine for that accuracy."
+)
+
+
+def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: Mapping[str, float]) -> list[Section]:
+    """The section, if there is anything to show.
+
+    Args:
+        out: the folder, which may hold a benchmark.
+        label: of the case.
+        rows: verdicts of the case.
+        walls: run time of each engine, s.
+    """
+    ladders = _ladders(out, label)
+    if ladders is not None:
+        from crossbody.reports.bench.figure import work_precision
+
+        return [_section(work_precision(ladders), LADDERS)]
+    points = [
+        (row["who"], float(row["value"]), 1e3 * walls[row["who"]]) for row in rows
+        if row["metric"] == "position" and row["value"] is not None and walls.get(row["who"])
+    ]  # fmt: skip
+    return [_section(scatter(points), RUNS)] if points else []
+
+
+def _section(figure: Figure, text: str) -> Section:
+    plots = (Plot(name="plot-precision", figure=figure),)
+    return Section(name="precision", title="Run time against error", text=text, plots=plots)
+
+
+def _ladders(out: Path, label: str) -> pd.DataFrame | None:
+    if not (out / "bench.json").is_file():
+        return None
+    rows = pd.DataFrame(read_json(out / "bench.json")["rows"])
+    mine = rows[rows["case"] == label] if len(rows) else rows
+    return mine if len(mine) else None
+
+
+def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
+    """One mark an engine.
+
+    Args:
+        points: engine, error of position (relative), run time in ms.
+    """
+    finite = [error for _, error, _ in points if math.isfinite(error)]
+    edge = 10.0 * max([*finite, FLOOR])
+    data = [
+        {
+            "type": "scatter", "mode": "markers+text", "x": [max(error, FLOOR) if math.isfinite(error) else edge],
+            "y": [ms], "name": plain(who), "meta": who, "text": [plain(who)], "textposition": _side(error, edge),
+            "textfont": {"size": 11}, "cliponaxis": False,
+            "marker": {"size": 10, "color": COLOURS[i % len(COLOURS)],
+                       "symbol": SYMBOLS[i % len(SYMBOLS)] if math.isfinite(error) else "x"},
+        }
+        for i, (who, error, ms) in enumerate(points, start=1)
+    ]  # fmt: skip
+    layout = {
+        "title": {"text": "Run time against error of position"}, "height": 420, "showlegend": False,
+        "xaxis": _decades("relative error of position [1]", [max(error, FLOOR) for error in finite]),
+        "yaxis": _decades("run time [ms]", [ms for _, _, ms in points]),
+    }  # fmt: skip
+    return {"data": data, "layout": layout}
+
+
+def _decades(title: str, values: Sequence[float]) -> dict[str, Any]:
+    """A logarithmic axis; of more than a decade, labelled at whole ones alone."""
+    wide = bool(values) and max(values) > 20.0 * min(values)
+    return {"type": "log", "title": {"text": title}, "exponentformat": "power"} | ({"dtick": 1} if wide else {})
+
+
+def _side(error: float, edge: float) -> str:
+    """Names stand inside the plot."""
+    return "middle left" if not math.isfinite(error) or error > 1e-4 * edge else "middle right"

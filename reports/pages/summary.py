@@ -1,0 +1,87 @@
+"""Engines at a glance: for how many cases each can be trusted, how far it is off, and what it costs."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import pandas as pd
+
+from crossbody.reports.judging.verdict import Word
+from crossbody.reports.pages import grid
+from crossbody.reports.pages.results import Results
+from crossbody.reports.pages.section import Kind, Section, Table, columns
+from crossbody.reports.runs.study import read_json
+
+REFERENCE = "reference:compiled"
+TEXT = (
+    "A case is trusted with an engine if everything that is judged is within its limit. Errors are of position, "
+    "relative to its largest value. Run times are over those of reference:compiled for the same case, each at its own "
+    "setting and so at its own error; what the same error costs, a benchmark tells (crossbody bench, then "
+    "crossbody report --with)."
+)
+BENCH = (
+    "At its best error: the run time of the engine over that of the cheapest run of the reference that is at least as "
+    "accurate, median over the cases that were timed."
+)
+COLUMNS = columns(
+    worst=("Worst", Kind.VERDICT), who="Engine", within=("Cases trusted", Kind.NUMBER),
+    expected=("with known deviations", Kind.NUMBER), outside=("outside", Kind.NUMBER),
+    skipped=("not run", Kind.NUMBER), error=("Error, median [1]", Kind.NUMBER), most=("Error, worst [1]", Kind.NUMBER),
+    cost=("Run time over the reference's, median [1]", Kind.NUMBER),
+    ratio=("At its best error [1]", Kind.NUMBER),
+)  # fmt: skip
+
+
+def engines(found: Results) -> Section:
+    """The section; with the ratios of a benchmark where one stands in the folder."""
+    ratios = _ratios(found.out)
+    cells = _cells(found)
+    rows = [_row(found, who, mine) | {"ratio": ratios.get(who, math.nan)} for who, mine in cells.items()]
+    shown = [column for column in COLUMNS if column.key != "ratio" or ratios]
+    table = Table(title="Engines", columns=shown, rows=rows)
+    return Section(name="engines", title="Engines", text=f"{TEXT} {BENCH if ratios else ''}".strip(), tables=(table,))
+
+
+def _cells(found: Results) -> dict[str, dict[str, Sequence[Mapping[str, Any]]]]:
+    """Rows of every engine and, of those, of every case."""
+    cells: dict[str, dict[str, Sequence[Mapping[str, Any]]]] = {}
+    for label, rows in found.rows.items():
+        for who, mine in grid.of_engine(rows).items():
+            cells.setdefault(who, {})[label] = mine
+    return {who: cells[who] for who in grid.names({"who": who} for who in cells)}
+
+
+def _row(found: Results, who: str, mine: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]:
+    words = Counter(grid.worst(rows)[0] for rows in mine.values())
+    errors = [
+        float(row["value"]) for rows in mine.values() for row in rows
+        if row["metric"] == "position" and row["value"] is not None and math.isfinite(row["value"])
+    ]  # fmt: skip
+    costs = [cost for label in mine if (cost := _cost(found.walls, label, who))]
+    return {
+        "who": who, "worst": next((word for word in grid.WORST if words[word]), Word.SKIPPED.value),
+        "within": words["within"], "expected": words["expected-outside"], "outside": words["outside"],
+        "skipped": words["skipped"], "error": median(errors) if errors else math.nan,
+        "most": max(errors, default=math.nan), "cost": median(costs) if costs else math.nan,
+    }  # fmt: skip
+
+
+def _cost(walls: Mapping[tuple[str, str], float], label: str, who: str) -> float:
+    mine, theirs = walls.get((label, who)), walls.get((label, REFERENCE))
+    return mine / theirs if mine and theirs else 0.0
+
+
+def _ratios(out: Path) -> dict[str, float]:
+    """Of a benchmark: time at the engine's best error over the reference's, median over cases."""
+    if not (out / "headline.json").is_file():
+        return {}
+    rows = pd.DataFrame(read_json(out / "headline.json")["rows"])
+    if rows.empty or "ratio" not in rows:
+        return {}
+    found = rows.assign(who=rows["engine"] + ":" + rows["profile"]).groupby("who")["ratio"].median()
+    return {str(who): float(value) for who, value in found.dropna().items()}
