@@ -94,6 +94,25 @@ class Options:
             raise InvalidValue(f"samples must increase inside [0, {self.t_end:g}] s.")
         return times
 
+    def freezes(self, system: System) -> bool:
+        """Whether any row of the system collides at one instant.
+
+        Raises:
+            InvalidValue: for frozen collisions of another machine than level, or of a row whose fast law is not linear.
+        """
+        fast = np.asarray(system.b0) > 0.0
+        if self.collisions == "resolved" or not np.any(fast):
+            return False
+        asked = f"collisions={self.collisions!r}"
+        if self.fsm != "level":
+            raise InvalidValue(f"{asked} needs fsm='level', not {self.fsm!r}, which knows real time; use 'resolved'.")
+        cubic = np.flatnonzero(fast & (np.asarray(system.b2) > 0.0))
+        if len(cubic):
+            raise InvalidValue(
+                f"{asked} maps a collision by a linear law, but row {cubic[0]} has b2 > 0; valid: b2 = 0 or 'resolved'."
+            )
+        return True
+
     def schedule(self, system: System) -> tuple[Floats, Floats]:
         """Times (m,) and values (m, nu) of the inputs, checked."""
         if self.inputs is None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Event, InvalidValue, Ledger, Mode, Outcome, Switch, Trajectory
+from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
@@ -33,21 +33,6 @@ OUTCOMES = {
 }
 _COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions", "guards")
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
-
-
-def _frozen(system: System, options: Options) -> bool:
-    """Whether any row collides at one instant.
-
-    Raises:
-        InvalidValue: for frozen collisions under another machine than level.
-    """
-    frozen = options.collisions != "resolved" and bool(np.any(np.asarray(system.b0) > 0.0))
-    if frozen and options.fsm != "level":
-        raise InvalidValue(
-            f"collisions={options.collisions!r} needs fsm='level', not {options.fsm!r}: "
-            "the other machines know real time alone; use collisions='resolved'."
-        )
-    return frozen
 
 
 class CompiledRun:
@@ -92,7 +77,7 @@ class CompiledRun:
         values = {
             "n": system.n, "nc": system.nc, "nu": system.inputs, "k": system.mass_block, "nz": self.nz,
             "fsm": FSMS.index(options.fsm), "rule": COLLISIONS.index(options.collisions),
-            "frozen": _frozen(system, options), "has_switch": system.switch is not None,
+            "frozen": options.freezes(system), "has_switch": system.switch is not None,
             "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,

@@ -61,6 +61,16 @@ def test_wrong_option(options, error):
         simulate(ball(), [1.0], [0.0], **{"t_end": 1.0, **options})
 
 
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+@pytest.mark.parametrize("rule", ["sequential", "simultaneous"])
+def test_a_frozen_collision_needs_a_linear_law(solver, rule):
+    fast = {"b0": [1e4], "b1": [10.0], "b2": [1e9]}
+    system = System(n=1, parameters=[1.0, 9.81], a0=[100.0], a1=[20.0], **fast, **KERNELS)
+    with pytest.raises(InvalidValue, match="row 0 has b2 > 0; valid: b2 = 0 or 'resolved'"):
+        simulate(system, [1.0], [0.0], 1.0, collisions=rule, solver=solver)
+    assert simulate(system, [1.0], [0.0], 1.0, collisions="resolved", solver=solver).outcome.ok
+
+
 @pytest.mark.parametrize(("q0", "v0"), [([1.0, 2.0], [0.0]), ([1.0], []), ([np.nan], [0.0]), (["x"], [0.0])])
 def test_wrong_start(q0, v0):
     with pytest.raises(SceneError, match=r"simulate\.(q0|v0)"):

@@ -40,7 +40,7 @@ class SundialsRun:
         options: what is asked; solver "cvode" or "ida", fsm "level".
 
     Raises:
-        InvalidValue: for another machine than "level".
+        InvalidValue: for another machine than "level", or as `Options.freezes`.
         SceneError: if rows of index 3 do not hold at the start.
     """
 
@@ -80,8 +80,9 @@ class SundialsRun:
         self.told = 0  # events of which the mechanism's `switch` knows
 
     def _machine(self, e: Equations) -> LevelMachine:
-        rule, rtol = self.options.collisions, self.options.rtol
-        return LevelMachine(self.system, e) if rule == "resolved" else FrozenMachine(self.system, e, rule, rtol)
+        if not self.options.freezes(self.system):
+            return LevelMachine(self.system, e)
+        return FrozenMachine(self.system, e, self.options.collisions, self.options.rtol)
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
