@@ -27,6 +27,7 @@ class Spot:
         rows: those that are on, with the constants of CONTACT.
         lam: their multipliers, N.
         t: time at which what depends on it is frozen, s.
+        powered: whether the case's servos act beside u.
     """
 
     q: Floats
@@ -35,6 +36,7 @@ class Spot:
     rows: tuple[int, ...]
     lam: Floats
     t: float = 0.0
+    powered: bool = True
 
     def modes(self, case: Case) -> Modes:
         """Mode of every row."""

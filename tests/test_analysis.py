@@ -23,7 +23,7 @@ from crossbody.reference.linear import (
     trim,
 )
 from crossbody.reference.sundials.equations import Equations
-from crossbody.reports.analysis import numbers as analyse
+from crossbody.reports.analysis import places as analyse
 
 RNG = np.random.default_rng(27)
 

@@ -11,7 +11,7 @@ from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, UnknownName
 from crossbody.reference import System, delta, simulate
 from crossbody.reference.linear import Unknown, balanced, filtered, sensitivity
 from crossbody.reference.systems.ball import KERNELS
-from crossbody.reports.analysis import numbers as analyse
+from crossbody.reports.analysis import places as analyse
 
 
 def ends(system, q, v, t_end, **options):

@@ -11,6 +11,7 @@ from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import table
+from crossbody.engines._linear import Spot
 from crossbody.reference.delta import Robot, scene
 from crossbody.reference.systems import delta as kernels
 
@@ -95,15 +96,15 @@ def delta(case: Case) -> Delta:
     return Delta(robot=robot, r0=r0, rd0=rd0, drive=Drive(case), table=forces)
 
 
-def unpowered(case: Case, u: Floats) -> Delta:
-    """A case without its servos and controller, under the constant inputs u (6,).
+def steady(case: Case, spot: Spot) -> Delta:
+    """A case under constant inputs, without its controller; its servos act if the spot says so.
 
     Raises:
         SceneError: if the start does not close the loops.
     """
     own = delta(case)
-    own.drive.u[:] = u
-    return replace(own, table=table(own.robot, None))
+    own.drive.u[:] = spot.u
+    return own if spot.powered else replace(own, table=table(own.robot, None))
 
 
 def in_absolute(terms: Any) -> dict[str, Any]:

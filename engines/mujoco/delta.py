@@ -16,7 +16,7 @@ from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces
-from crossbody.engines._delta.scene import Delta, delta, in_absolute, unpowered
+from crossbody.engines._delta.scene import Delta, delta, in_absolute, steady
 from crossbody.engines._linear import Spot
 from crossbody.engines.mujoco._delta_model import compiled
 from crossbody.engines.mujoco._direct import law_of
@@ -64,11 +64,11 @@ def build(case: Case, profile: str, dt: float) -> Scene:
 
 
 def stand(case: Case, spot: Spot) -> Stand:
-    """The matched model at an equilibrium under constant torques, no servo and no controller."""
-    own, (r, rd) = unpowered(case, spot.u), chart.to_tree(spot.q, spot.v)
+    """The matched model at an equilibrium under constant inputs, without its controller."""
+    own, (r, rd) = steady(case, spot), chart.to_tree(spot.q, spot.v)
     model = compiled(own.robot, case.law)
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = r, rd
+    data.qpos[:], data.qvel[:], data.time = r, rd, spot.t
     data.xfrc_applied[[model.body(f"tip{i}").id for i in (1, 2, 3)], :3] = spot.u[3:] / 3
     return Stand(model=model, data=data, chart=chart.linear(r), hook=_hook(own, data))
 

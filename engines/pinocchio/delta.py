@@ -11,7 +11,7 @@ from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces
-from crossbody.engines._delta.scene import Delta, delta, in_absolute, unpowered
+from crossbody.engines._delta.scene import Delta, delta, in_absolute, steady
 from crossbody.engines._linear import Spot, Tangent
 from crossbody.engines.pinocchio._delta_model import Closed, by_hand, imported
 from crossbody.engines.pinocchio._linear import Stand
@@ -60,8 +60,8 @@ def smooth(case: Case, model: str) -> Smooth:
 
 
 def stand(case: Case, spot: Spot) -> Stand:
-    """The tree with its loops at an equilibrium under constant torques, no servo and no controller."""
-    own, (r, rd) = unpowered(case, spot.u), chart.to_tree(spot.q, spot.v)
+    """The tree with its loops at an equilibrium under constant inputs, without its controller."""
+    own, (r, rd) = steady(case, spot), chart.to_tree(spot.q, spot.v)
     closed = by_hand(own.robot, case.law)
 
     def force(r: Floats, rd: Floats) -> Floats:

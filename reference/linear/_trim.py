@@ -72,9 +72,13 @@ def trim(
     unknown = np.array([*moved, *range(2 * n + nu, 2 * n + nu + na)], dtype=np.int64)
     x = np.concatenate([at.q, at.v, at.u, np.zeros(na)])
     x[2 * n + nu :] = _multipliers(at, x)
-    outcome, left = _solved(at, x, unknown)
+    outcome, left, force = _solved(at, x, unknown)
     lam = x[2 * n + nu :]
-    pulls = (lam < 0.0) & np.asarray(system.unilateral, dtype=bool)[at.active] & (np.asarray(system.a0)[at.active] > 0)
+    pulls = (
+        (lam < -1e3 * SETTLED * force)
+        & np.asarray(system.unilateral, dtype=bool)[at.active]
+        & (np.asarray(system.a0)[at.active] > 0)
+    )
     return Trim(
         q=x[:n], v=x[n : 2 * n], u=x[2 * n : 2 * n + nu], lam=lam, active=at.active, residual=left, outcome=outcome,
         pulling=tuple(at.active[pulls].tolist()),
@@ -103,29 +107,37 @@ def _multipliers(at: Point, x: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(H.T, -f, rcond=None)[0], dtype=np.float64)
 
 
-def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float]:
-    """Improve x in place."""
+def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float, float]:
+    """Improve x in place; how it ended, what is left, and the size of the forces."""
     value, size = _balance(at, x)
     if not np.isfinite(value).all():
-        return Outcome.NOT_FINITE, np.inf
-    least = size  # forces that vanish in equilibrium leave no scale of their own
-    left = float(np.abs(value / size).max(initial=0.0))
+        return Outcome.NOT_FINITE, np.inf, np.inf
+    J = _jacobian(at, x, unknown)
+    # Forces that vanish in equilibrium leave no scale of their own: what they are made of does.
+    size[: at.system.n] = max(size[0], (np.abs(J[: at.system.n]) @ np.abs(x[unknown])).max(initial=0.0))
+    least, left = size, float(np.abs(value / size).max(initial=0.0))
     for _ in range(STEPS):
         if left <= SETTLED:
-            return Outcome.FINISHED, left
-        J = np.empty((len(value), len(unknown)))
-        for k, i in enumerate(unknown):
-            moved = x.astype(complex)
-            moved[i] += 1j * STEP
-            J[:, k] = _balance(at, moved)[0].imag / STEP
+            return Outcome.FINISHED, left, size[0]
         if not np.isfinite(J).all():
-            return Outcome.ILL_POSED, left
+            return Outcome.ILL_POSED, left, size[0]
         step: Floats = np.linalg.lstsq(J / size[:, None], -value / size, rcond=1e-12)[0].astype(np.float64)
         better = _searched(at, x, unknown, step, left, least)
         if better is None:
             break
         value, size, left = better
-    return (Outcome.FINISHED if left <= 1e3 * SETTLED else Outcome.STEP_LIMIT), left
+        J = _jacobian(at, x, unknown)
+    return (Outcome.FINISHED if left <= 1e3 * SETTLED else Outcome.STEP_LIMIT), left, size[0]
+
+
+def _jacobian(at: Point, x: Floats, unknown: Index) -> Floats:
+    """Derivative of the balance by the unknowns."""
+    columns = []
+    for i in unknown:
+        moved = x.astype(complex)
+        moved[i] += 1j * STEP
+        columns.append(_balance(at, moved)[0].imag / STEP)
+    return np.stack(columns, axis=-1) if columns else np.zeros((len(_balance(at, x)[0]), 0))
 
 
 def _searched(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -12,15 +13,23 @@ from crossbody import cases
 from crossbody.cases import InvalidValue
 from crossbody.reports import voice
 from crossbody.reports.analysis import numbers as work
+from crossbody.reports.analysis.counterparts import counterparts
+from crossbody.reports.analysis.places import places
+from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.pages import site as page
 from crossbody.reports.runs import jobs, output, study
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.sections.analysis import PREFIX
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
 OMEGA = np.geomspace(1e-2, 1e4, 301)
 LOCUS_POINTS = 61
 SHOWN = 40
 """Rows of a table that are printed."""
+BESIDE = ["place", "engine", "way", "slope", "poles", "verdict"]
+"""Columns that are printed of the differences of engines."""
 
 
 def parse_range(text: str) -> tuple[str, list[float]]:
@@ -70,14 +79,19 @@ def analyse(
         out: folder to write; nothing is written without it.
         command: what was typed, for provenance.
 
+    Returns:
+        1 if an engine's model is outside its limit without a known reason, else 0.
+
     Raises:
         CrossbodyError: for wrong use, before anything is written.
     """
     overrides, place = jobs.parse_settings(pairs), parse_place(at)
     case = cases.load(name, variant, **overrides)
-    found = work.places(case, place)
+    found = places(case, place)
+    engines, engine_poles = counterparts(found)
     tables = {
-        "equilibria": work.equilibria(found, case), "poles": work.poles(found), "ranks": work.ranks(found)
+        "equilibria": work.equilibria(found, case), "poles": work.poles(found), "ranks": work.ranks(found),
+        "engines": engines, "engine-poles": engine_poles,
     }  # fmt: skip
     if bode and len(rows := work.responses(found, OMEGA)):
         tables["responses"] = rows
@@ -92,7 +106,7 @@ def analyse(
         _show(case.label, tables)
         if out is not None:
             print(f"Report: {(out / page.PAGE).absolute()}")
-    return 0
+    return exit_code(engines["verdict"])
 
 
 def _write(out: Path, tables: Mapping[str, pd.DataFrame], command: str) -> None:
@@ -108,16 +122,25 @@ def _write(out: Path, tables: Mapping[str, pd.DataFrame], command: str) -> None:
 
 def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
     from rich.console import Console
-    from rich.table import Table
 
     console = Console()
     for key in ("equilibria", "poles", "ranks"):
-        rows = tables[key]
-        table = Table(title=f"{label}: {key}", title_justify="left")
-        for column in rows.columns:
-            table.add_column(column, justify="left" if rows[column].dtype == object else "right")
-        for record in rows.head(SHOWN).itertuples(index=False):
-            table.add_row(*(f"{x:.6g}" if isinstance(x, float) else str(x) for x in record))
-        console.print(table)
-        if len(rows) > SHOWN:
-            console.print(f"... {len(rows) - SHOWN} more rows; --out DIR keeps all.")
+        console.print(_printed(f"{label}: {key}", tables[key].head(SHOWN), digits=6))
+        if len(tables[key]) > SHOWN:
+            console.print(f"... {len(tables[key]) - SHOWN} more rows; --out DIR keeps all.")
+    engines = tables["engines"]
+    console.print(_printed(f"{label}: differences of engines", engines[BESIDE].head(SHOWN), digits=2))
+    for why in engines["why"].dropna().unique():
+        if why:
+            console.print(f"{', '.join(engines.loc[engines['why'] == why, 'engine'].unique())}: {why}")
+
+
+def _printed(title: str, rows: pd.DataFrame, digits: int) -> Table:
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for column in rows.columns:
+        table.add_column(column, justify="right" if pd.api.types.is_numeric_dtype(rows[column]) else "left")
+    for record in rows.itertuples(index=False):
+        table.add_row(*(f"{x:.{digits}g}" if isinstance(x, float) else str(x) for x in record))
+    return table

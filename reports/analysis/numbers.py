@@ -1,179 +1,24 @@
-"""Equilibria of a case with their linear models: trim, poles, ranks, responses, loci, stability maps (spec 2.7).
-
-A case offers places: equilibria in a mode set, each by its name. The model at a place is minimal: rows that are held
-stay held, unless their law is what is looked at (a ball in contact, soft fingers).
-"""
+"""What an analysis shows of equilibria: trim, poles, ranks, responses, loci, and a map of the workspace (spec 2.7)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from crossbody import cases
-from crossbody.cases import Case, CaseUnsupported, InvalidValue, UnknownName, Value
-from crossbody.engines._equations import system_of
-from crossbody.reference import System, delta
+from crossbody.cases import Case, CaseUnsupported, InvalidValue, Value
+from crossbody.reference import delta
 from crossbody.reference.delta import scene
-from crossbody.reference.linear import LinearModel, Trim, controllable, linearise, locus, modes, observable, poses, trim
+from crossbody.reference.linear import LinearModel, controllable, locus, modes, observable, poses
+from crossbody.reports.analysis.places import Place, places
 
 EQUILIBRIA = ("place", "outcome", "variable", "value")
 POLES = ("place", "real", "imag", "frequency", "damping", "led_by")
 RANKS = ("place", "states", "controllable", "observable", "growth")
 RESPONSES = ("place", "input", "output", "omega", "magnitude", "phase")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """An equilibrium in a mode set.
-
-    Attributes:
-        name: what it is.
-        trim: state, inputs and multipliers there.
-        model: its linear model, or None where there is no equilibrium.
-    """
-
-    name: str
-    trim: Trim
-    model: LinearModel | None
-
-
-def build(case: Case) -> System:
-    """The mechanism of a case, without a sampled controller."""
-    return system_of(case)
-
-
-def places(case: Case, at: Mapping[str, float] | None = None) -> tuple[Place, ...]:
-    """The equilibria of a case.
-
-    Args:
-        case: with its numbers.
-        at: where to look, for a mechanism that can stand in many places: x, y, z of the flange, m.
-
-    Raises:
-        CaseUnsupported: for a mechanism without a list of places.
-        UnknownName: for another coordinate than those.
-    """
-    if case.mechanism not in PLACES:
-        raise CaseUnsupported(f"There are no equilibria of {case.mechanism!r} here; there are of: {', '.join(PLACES)}.")
-    return tuple(PLACES[case.mechanism](case, _known(case, at or {})))
-
-
-def _known(case: Case, at: Mapping[str, float]) -> Mapping[str, float]:
-    valid = ("x", "y", "z") if case.mechanism == "delta" else ()
-    for name in at:
-        if name not in valid:
-            raise UnknownName(f"place of {case.name}", name, valid)
-    return at
-
-
-def _place(
-    case: Case, name: str, active: Sequence[int], *, held: bool = True, q: ArrayLike | None = None,
-    v: ArrayLike | None = None, t: float = 0.0, free: Sequence[int] | None = None, rates: Sequence[int] = (),
-    inputs: Sequence[int] = (), system: System | None = None,
-) -> Place:  # fmt: skip
-    made = build(case) if system is None else system
-    found = trim(
-        made, case.q0 if q is None else q, v, active=active, free=free, rates=rates, inputs=inputs, t=t
-    )  # fmt: skip
-    if not found.outcome.ok:
-        return Place(name=name, trim=found, model=None)
-    names = [coordinate.name for coordinate in case.coordinates]
-    model = linearise(made, found.q, found.v, found.u, active, names=names, reduce=held, t=t)
-    return Place(name=name, trim=found, model=model)
-
-
-def _ball(case: Case, at: Mapping[str, float]) -> list[Place]:
-    return [_place(case, "on the floor", [0], held=False)]
-
-
-def _delta(case: Case, at: Mapping[str, float]) -> list[Place]:
-    robot = scene.robot_of(case.parameters)
-    q = case.q0
-    if at:
-        here = dict(zip("xyz", delta.flange(robot, case.q0).tolist(), strict=True)) | dict(at)
-        q = delta.inverse(robot, [here[axis] for axis in "xyz"])
-    z = delta.flange(robot, q)
-    name = f"flange at ({z[0]:.4g}, {z[1]:.4g}, {z[2]:.4g}) m"
-    system = delta.system(robot, p=float(case.number("p")))
-    place = _place(case, name, range(6), q=q, free=[], inputs=[0, 1, 2], system=system)
-    if place.model is None:
-        return [place]
-    full = linearise(
-        system, place.trim.q, u=place.trim.u, outputs=("q",), reduce=True, names=[c.name for c in case.coordinates]
-    )  # fmt: skip
-    weights = np.asarray(delta.virtual_jacobian(robot, place.trim.q))
-    seen = full.combined(weights, [f"flange {axis} [m]" for axis in "xyz"])
-    return [Place(name=name, trim=place.trim, model=seen)]
-
-
-def _maze(case: Case, at: Mapping[str, float]) -> list[Place]:
-    """On top of every ring and at the bottom inside it, with the slip rows if there are any."""
-    found = []
-    slip = len(case.contacts) > 6
-    closed = case.parameters["controller"] == "continuous"
-    for ring in range(int(case.number("rings"))):
-        for side, row, follower in (("outer", 0, 6), ("inner", 3, 7)):
-            if closed and side == "inner":
-                continue
-            phase = {**case.parameters, "ring": ring, "side": side, "angle": 0.0, "theta": _solid(case, ring)}
-            here = cases.load(case.name, case.variant, **phase)
-            rows = [row, follower] if slip else [row]
-            where = "top" if side == "outer" else "bottom inside"
-            found.append(_place(here, f"ring {ring}, {where}", rows, free=[1, 2]))
-    return found
-
-
-def _solid(case: Case, ring: int) -> float:
-    """An angle of the maze at which a ring is solid at top and bottom: half a gap's spacing beside its gaps."""
-    gaps, phase = int(case.number(f"gaps{ring}")), np.radians(case.number(f"phase{ring}"))
-    spacing = 2.0 * np.pi / max(gaps, 1)
-    angles = np.linspace(0.0, spacing, 97)[:-1]
-    ends = np.array([0.5 * np.pi, -0.5 * np.pi])
-    off = np.abs((ends[None] - phase - angles[:, None] + 0.5 * spacing) % spacing - 0.5 * spacing).min(axis=1)
-    return float(angles[np.argmax(off)])
-
-
-def _soft(case: Case, at: Mapping[str, float]) -> list[Place]:
-    """Closed fingers in every mode set; positions, sensors and multipliers are found."""
-    from crossbody.cases._soft import closed_forms as closed
-    from crossbody.cases._soft.scene import numbers
-
-    p, found = numbers(case.parameters), []
-    for name, rows in (("grasp", [0, 1]), ("left finger", [0]), ("right finger", [1])):
-        q, v = closed.grasp(p) if len(rows) == 2 else closed.touching(p)
-        if name == "left finger":
-            q[1:3] += 0.01
-        steady = {"free": [0, 1, 2, 3, 4], "rates": [5, 6], "t": p["close_end"]}
-        found.append(_place(case, name, rows, held=False, q=q, v=v, **steady))  # type: ignore[arg-type]
-    return found
-
-
-def _red_body(case: Case, at: Mapping[str, float]) -> list[Place]:
-    p = case.parameters
-    level = np.array(case.q0)
-    level[2], level[5] = 0.0, 0.0
-    level[4] = float(p["slab_half_height"])
-    level[1] = 2.0 * level[4] + float(p["half_height"])
-    return [_place(case, "box level on the slab", [0, 1, 2, 3], q=level, held=False)]
-
-
-def _chain(case: Case, at: Mapping[str, float]) -> list[Place]:
-    """Hanging side by side, free and, if there is no gap between them, touching."""
-    n, rest = len(case.q0), np.zeros(len(case.q0))
-    found = [_place(case, "at rest, free", [], q=rest)]
-    if case.number("gap") == 0.0:
-        found.append(_place(case, "at rest, all touching", range(n - 1), q=rest, held=False))
-    return found
-
-
-PLACES: Mapping[str, Callable[[Case, Mapping[str, float]], list[Place]]] = {
-    "ball": _ball, "delta": _delta, "maze": _maze, "soft_contact": _soft, "red_body": _red_body, "sliders": _chain,
-    "pendulums": _chain,
-}  # fmt: skip
 
 
 def equilibria(found: Sequence[Place], case: Case) -> pd.DataFrame:

@@ -13,11 +13,18 @@ TITLE = "Equilibria and linear models"
 TEXT = (
     "Linear models about the equilibria of the case, in the modes named, by exact derivatives of the equations. Rows "
     "that are held are eliminated, so the law that holds them adds no poles, unless it is what is looked at. A pole to "
-    "the right of 0 grows; to the left it decays. Linear stability says nothing about how an equilibrium is reached."
+    "the right of 0 grows; to the left it decays. Linear stability says nothing about how an equilibrium is reached. "
+    "Engines are judged by their largest difference from the reference: of the derivatives of the accelerations, each "
+    "row as a part of its largest entry, and of the poles as a part of their modulus."
 )
 COLUMNS = columns(
     place="Equilibrium", states=("States", Kind.NUMBER), controllable=("Controllable", Kind.NUMBER),
     observable=("Observable", Kind.NUMBER), growth=("Growth [1/s]", Kind.NUMBER),
+)  # fmt: skip
+ENGINES = columns(
+    place="Equilibrium", engine="Engine", way="Way", slope=("Slope [1]", Kind.NUMBER), poles=("Poles [1]", Kind.NUMBER),
+    unexplained=("Unexplained [1]", Kind.NUMBER), limit=("Limit [1]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
+    why=("Why", Kind.LONG),
 )  # fmt: skip
 PREFIX = "analysis-"
 
@@ -37,8 +44,13 @@ def sections(out: Path) -> tuple[Section, ...]:
         for name, figure in drawn.items()
         if (out / f"{PREFIX}{name}.json").is_file()
     )
-    ranks = Table(title="Linear models", columns=COLUMNS, rows=records(_rows(out, "ranks")), file=f"{PREFIX}ranks.csv")
-    return (Section(name="analysis", title=TITLE, text=TEXT, plots=plots, tables=(ranks,)),)
+    shown = (("Linear models", COLUMNS, "ranks"), ("Linear models of engines", ENGINES, "engines"))
+    tables = tuple(
+        Table(title=title, columns=known, rows=records(_rows(out, name)), file=f"{PREFIX}{name}.csv")
+        for title, known, name in shown
+        if (out / f"{PREFIX}{name}.json").is_file()
+    )
+    return (Section(name="analysis", title=TITLE, text=TEXT, plots=plots, tables=tables),)
 
 
 def _rows(out: Path, name: str) -> pd.DataFrame:
