@@ -15,7 +15,8 @@ filtered, balanced    forces that were not measured, from motion and torque, wit
 
 from __future__ import annotations
 
-from crossbody.reference.linear._estimate import Estimate, Unknown, balanced, filtered
+from crossbody.reference.linear._balanced import balanced
+from crossbody.reference.linear._filtered import filtered
 from crossbody.reference.linear._linearise import linearise
 from crossbody.reference.linear._many import Tangents, tangents
 from crossbody.reference.linear._model import LinearModel
@@ -23,6 +24,7 @@ from crossbody.reference.linear._modes import Locus, Modes, controllable, locus,
 from crossbody.reference.linear._poses import Poses, poses
 from crossbody.reference.linear._sensitivity import Jump, Sensitivity, sensitivity
 from crossbody.reference.linear._trim import Trim, trim
+from crossbody.reference.linear._unmeasured import Estimate, Unknown
 
 __all__ = [
     "Estimate",

@@ -19,71 +19,65 @@ from crossbody.reference import kernels
 from crossbody.reference._cache import compiled
 from crossbody.reference._kinds import Array, Bytes, Floats, Index
 from crossbody.reference.linear._compiled import FOUND, ILL_POSED, MISSED, STEP, agrees, spread, steps
+from crossbody.reference.linear._elimination import admitted, eliminate, first_order
 
 
 @compiled
-def eliminate(A: Floats, n: int, rows: Index) -> int:
-    """Reduce A (na, n + m) to the identity in na of its first n columns, rows[c] their row, -1 the others'.
-
-    The largest element left is the pivot; 1 if the rank is less than na.
-    """
-    na, width = A.shape
-    rows[:] = -1
-    used = np.zeros(na, np.bool_)
-    largest = 0.0
-    for _ in range(na):
-        best, r, c = 0.0, 0, 0
-        for i in range(na):
-            if not used[i]:
-                for j in range(n):
-                    if abs(A[i, j]) > best:
-                        best, r, c = abs(A[i, j]), i, j
-        largest = max(largest, best)
-        if not best > 1e-10 * largest:
-            return 1
-        used[r], rows[c] = True, r
-        inverse = 1.0 / A[r, c]
-        for j in range(width):
-            A[r, j] *= inverse
-        for i in range(na):
-            if i != r and A[i, c] != 0.0:
-                factor = A[i, c]
-                for j in range(width):
-                    A[i, j] -= factor * A[r, j]
-    return 0
-
-
-@compiled
-def admitted(H: Array, T: Floats) -> int:
-    """T (n, m) with H T = 0, the identity in the coordinates that are free; 1 if H has not full rank."""
+def rows_at(rows: Any, t: float, x: Array, p: Array, w: Array, idx: Index, H: Array, h: Array, drift: Array) -> None:
+    """H, h and H' v of the active rows at x = (q, v)."""
     n = H.shape[1]
-    A, rows = H.real.copy(), np.empty(n, np.int64)
-    if eliminate(A, n, rows) != 0:
+    H[:] = 0.0
+    rows(t, x[:n], x[n:], p, w, idx, len(idx), H, h, drift)
+
+
+@compiled
+def pushed(
+    dynamics: Any, t: float, x: Array, p: Array, M: Array, f: Array, w: Array, u: Floats, hold: Index, K: Floats
+) -> None:
+    """First m columns of K: df/du of the inputs that hold; its last one: -f without them."""
+    n = len(f)
+    inputs = u.astype(np.complex128)
+    for c in range(len(hold)):
+        for other in range(len(hold)):
+            inputs[hold[other]] = 1j * STEP if other == c else 0.0
+        dynamics(t, x[:n], x[n:], inputs, p, M, f, w)
+        for i in range(n):
+            K[i, c], K[i, n] = f[i].imag / STEP, -f[i].real
+
+
+@compiled
+def balanced(H: Array, K: Floats, hold: Index, u: Floats, lam: Floats) -> int:
+    """The inputs and multipliers of equilibrium into u and lam; 1 if they are not determined."""
+    n, m = H.shape[1], len(hold)
+    order = np.empty(n, np.int64)
+    for a in range(n - m):
+        for i in range(n):
+            K[i, m + a] = H[a, i].real
+    if eliminate(K, n, order) != 0:
         return 1
-    k = 0
-    for free in range(n):
-        if rows[free] < 0:
-            for c in range(n):
-                T[c, k] = -A[rows[c], free] if rows[c] >= 0 else 0.0
-            T[free, k] = 1.0
-            k += 1
+    for c in range(m):
+        u[hold[c]] = K[order[c], n]
+    for a in range(n - m):
+        lam[a] = K[order[m + a], n]
     return 0
 
 
 @compiled
-def projected(T: Floats, F: Floats, out: Floats) -> None:
-    """Out (m, m) = T^T F T."""
-    n, m = T.shape
-    for a in range(m):
-        for b in range(m):
-            out[a, b] = 0.0
-    for i in range(n):
-        for b in range(m):
-            total = 0.0
-            for j in range(n):
-                total += F[i, j] * T[j, b]
-            for a in range(m):
-                out[a, b] += T[i, a] * total
+def force_slope(f: Array, H: Array, lam: Floats, out: Floats) -> None:
+    """Out (n,): the imaginary part of f + H^T lam over STEP."""
+    for i in range(len(f)):
+        total = f[i].imag
+        for a in range(len(lam)):
+            total += H[a, i].imag * lam[a]
+        out[i] = total / STEP
+
+
+@compiled
+def unpacked(M: Array, k: int, mass: Floats) -> None:
+    """The real block-diagonal matrix (n, n) of blocks (n, k)."""
+    for i in range(len(M)):
+        for j in range(k):
+            mass[i, i - i % k + j] = M[i, j].real
 
 
 def held(
@@ -113,79 +107,31 @@ def held(
         A: receives the matrix (N, 2 m, 2 m) of (y, y').
         codes: receives FOUND, ILL_POSED or MISSED (N,).
     """
-    n, na, m = Q.shape[1], len(idx), len(hold)
-    x, p, inputs = np.zeros(2 * n, np.complex128), np.zeros(P.shape[1], np.complex128), u[0].astype(np.complex128)
+    n, na = Q.shape[1], len(idx)
+    x, p = np.zeros(2 * n, np.complex128), np.zeros(P.shape[1], np.complex128)
     M, f = np.zeros((n, k), np.complex128), np.zeros(n, np.complex128)
     H, h, drift = np.zeros((na, n), np.complex128), np.zeros(na, np.complex128), np.zeros(na, np.complex128)
-    K, order, F, mass = np.zeros((n, n + 1)), np.empty(n, np.int64), np.zeros((n, 2 * n)), np.zeros((n, n))
+    K, F, mass = np.zeros((n, n + 1)), np.zeros((n, 2 * n)), np.zeros((n, n))
     packed, seeds, _ = steps(colours, count, probe, n, 0)
-    q, v = x[:n], x[n:]
-    small, R = np.zeros((m, m)), np.zeros((m, 3 * m))
     for s in range(len(Q)):
-        codes[s] = FOUND
         p[:] = P[min(s, len(P) - 1)]
-        for i in range(n):
-            x[i], x[n + i] = Q[s, i], 0.0
-        for c in range(m):
-            for j in range(len(inputs)):
-                inputs[j] = u[s, j]
-            inputs[hold[c]] = 1j * STEP
-            for other in range(m):
-                if other != c:
-                    inputs[hold[other]] = 0.0
-            dynamics(t, q, v, inputs, p, M, f, w)
-            for i in range(n):
-                K[i, c], K[i, n] = f[i].imag / STEP, -f[i].real
-        for a in range(na):
-            for i in range(n):
-                H[a, i] = 0.0
-        rows(t, q, v, p, w, idx, na, H, h, drift)
-        for a in range(na):
-            for i in range(n):
-                K[i, m + a] = H[a, i].real
-        T = basis[s]
-        if eliminate(K, n, order) != 0 or admitted(H, T) != 0:
+        x[:n], x[n:] = Q[s], 0.0
+        pushed(dynamics, t, x, p, M, f, w, u[s], hold, K)
+        rows_at(rows, t, x, p, w, idx, H, h, drift)
+        if balanced(H, K, hold, u[s], lam[s]) != 0 or admitted(H, basis[s]) != 0:
             codes[s] = ILL_POSED
             continue
-        for j in range(len(inputs)):
-            inputs[j] = u[s, j]
-        for c in range(m):
-            u[s, hold[c]] = K[order[c], n]
-            inputs[hold[c]] = K[order[c], n]
-        for a in range(na):
-            lam[s, a] = K[order[m + a], n]
-        for i in range(n):
-            b = i - i % k
-            for j in range(k):
-                mass[i, b + j] = M[i, j].real
+        unpacked(M, k, mass)
+        inputs = u[s].astype(np.complex128)
         for c in range(count + 1):
-            for j in range(2 * n):
-                x[j] = seeds[c, j] + (Q[s, j] if j < n else 0.0)
-            dynamics(t, q, v, inputs, p, M, f, w)
-            for a in range(na):
-                for i in range(n):
-                    H[a, i] = 0.0
-            rows(t, q, v, p, w, idx, na, H, h, drift)
-            for i in range(n):
-                total = f[i].imag
-                for a in range(na):
-                    total += H[a, i].imag * lam[s, a]
-                packed[c, i] = total / STEP
+            x[:n], x[n:] = Q[s] + seeds[c, :n], seeds[c, n:]
+            dynamics(t, x[:n], x[n:], inputs, p, M, f, w)
+            rows_at(rows, t, x, p, w, idx, H, h, drift)
+            force_slope(f, H, lam[s], packed[c])
         spread(packed, colours, pattern, F)
-        if not agrees(F, probe, packed[count]):
-            codes[s] = MISSED
-        for part in range(3):
-            projected(T, mass if part == 0 else F[:, (part - 1) * n : part * n].copy(), small)
-            for a in range(m):
-                for b in range(m):
-                    R[a, part * m + b] = small[a, b]
-        if eliminate(R, m, order[:m]) != 0:
+        codes[s] = FOUND if agrees(F, probe, packed[count]) else MISSED
+        if first_order(basis[s], mass, F, A[s]) != 0:
             codes[s] = ILL_POSED
-            continue
-        for a in range(m):
-            A[s, a, m + a] = 1.0
-            for b in range(m):
-                A[s, m + a, b], A[s, m + a, m + b] = R[order[a], m + b], R[order[a], 2 * m + b]
 
 
 _F, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]

@@ -1,0 +1,63 @@
+"""Forces from positions alone: an extended Kalman filter and a smoother over the record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from crossbody.cases import InvalidValue
+from crossbody.cases._arrays import frozen
+from crossbody.reference._kinds import Floats
+from crossbody.reference._system import System
+from crossbody.reference.linear._kalman import Filter
+from crossbody.reference.linear._linearise import point
+from crossbody.reference.linear._unmeasured import Estimate, Record, Unknown
+
+
+def filtered(
+    system: System, t: ArrayLike, y: ArrayLike, u: ArrayLike | None = None, *, unknown: Unknown,
+    measured: Sequence[int], std_y: ArrayLike, q0: ArrayLike, v0: ArrayLike | None = None, std_force: ArrayLike,
+    time_force: float, active: Sequence[int] | None = None, std_q0: float = 1e-3, std_v0: float = 1e-1,
+    smooth: bool = True,
+) -> Estimate:  # fmt: skip
+    """Forces from positions alone by an extended Kalman filter, and a smoother over the record.
+
+    Args:
+        system: the mechanism; its active rows keep one set through the record.
+        t: instants (N,), s, increasing.
+        y: measured positions (N, ny).
+        u: inputs (N, nu), each held from its instant on; zero if not given.
+        unknown: what is looked for.
+        measured: coordinates that y holds.
+        std_y: deviation of their errors, a number or (ny,).
+        q0: positions near the start (n,), on the active rows.
+        v0: velocities near the start (n,), zero if not given.
+        std_force: deviation of the unknown forces, a number or (k,).
+        time_force: their correlation time, s.
+        active: rows that are on beside the unknown ones; those that are always on, if not given.
+        std_q0: deviation of q0, in the coordinates that the rows leave free.
+        std_v0: deviation of v0.
+        smooth: use the whole record at every instant, else its past alone.
+
+    Raises:
+        SceneError: for arrays of another shape.
+        InvalidValue: for deviations or times that are not above 0, or instants that do not increase.
+    """
+    record = Record(system, t, u, unknown, active)
+    Y = frozen("filtered", "y", y, (len(record.t), len(measured)))
+    noise = np.broadcast_to(np.asarray(std_y, dtype=float), len(measured))
+    strength = np.broadcast_to(np.asarray(std_force, dtype=float), len(unknown))
+    _check_positive(std_y=noise, std_force=strength, time_force=np.array([time_force]))
+    if np.any(np.diff(record.t) <= 0.0):
+        raise InvalidValue("filtered: the instants t must increase.")
+    start = point(system, q0, v0, None, record.held.tolist(), float(record.t[0]))
+    run = Filter(record, start, np.asarray(measured, dtype=np.int64), noise, strength, time_force, (std_q0, std_v0))
+    return run.through(Y, smooth)
+
+
+def _check_positive(**given: Floats) -> None:
+    for name, values in given.items():
+        if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
+            raise InvalidValue(f"filtered: {name} is {values.tolist()}; it must be finite and above 0.")
