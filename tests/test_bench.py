@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,12 @@ import pandas as pd
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import InvalidValue, Outcome, OutputError, Trajectory
+from crossbody.cases import InvalidValue, Outcome, OutputError, Tier, Trajectory
 from crossbody.reports.bench import against as bench_against
-from crossbody.reports.bench.headline import headline
-from crossbody.reports.bench.ladder import COLUMNS, Effort, bench, joined
+from crossbody.reports.bench import scenes
+from crossbody.reports.bench.headline import REFERENCE, headline
+from crossbody.reports.bench.ladder import Effort, Ladder
+from crossbody.reports.bench.measure import COLUMNS, bench, joined
 from crossbody.reports.bench.order import says
 from crossbody.reports.bench.scenes import DROP, QUICK
 from crossbody.reports.bench.throughput import best_pair
@@ -120,7 +123,7 @@ def table(*rungs: tuple[str, float, float, float]) -> pd.DataFrame:
     profile = np.where(frame["engine"] == "reference", "compiled", "matched")
     return frame.assign(
         case="c", profile=profile, tier="A", against="the case", knob="rtol", call_ms=2.0 * frame["median_ms"],
-        outcome="finished", known_to=0.0,
+        outcome="finished", known_to=0.0, touches=0.0,
     )  # fmt: skip
 
 
@@ -137,7 +140,13 @@ def test_headline_takes_the_cheapest_run_that_is_as_accurate() -> None:
     assert found.loc["quick", ["ratio", "least_ratio", "least_error"]].to_list() == [4.0, 0.5, 1e-2]
     assert found["ahead"].dropna().to_dict() == {"slow": "yes", "exact": "yes", "quick": "no"}
     assert "no less than its cheapest run, 1 ms at 1.0e-05" in found.loc["quick", "says"]
-    assert "reaches no error" in found.loc["lost", "says"]
+    assert found.loc["lost", "says"] == "reaches no error: at rtol = 0.001 its run ends finished"
+
+
+def test_an_engine_with_other_events_reaches_no_error() -> None:
+    rows = table(("reference", 1e-4, 1e-5, 1.0), ("other", 1e-3, np.inf, 1.0), ("other", 1e-6, np.inf, 1.0))
+    says = headline(rows.assign(touches=[0.0, 5.0, 2.0]))["says"][0]
+    assert says == "reaches no error: at rtol = 1e-06 it touches +2 times beside the truth"
 
 
 def test_errors_below_what_the_truth_is_known_to_are_alike() -> None:
@@ -231,25 +240,90 @@ def test_wrong_use_is_one_sentence(
     assert not (tmp_path / "out").exists()
 
 
-def test_the_command_writes_tables_and_compares(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture
+def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+    """The command on one short scene, in a folder of its own; the exit code."""
     monkeypatch.chdir(tmp_path)
-    asked = ["bench", "bouncing_ball", "--variant", "linear", "--set", "t_end=0.6", "-e", "reference:compiled"]
+    monkeypatch.setattr(scenes, "QUICK_EFFORT", Effort(repeats=1, every=3))
 
-    def call(*more: str) -> int:
+    def run(*more: str, t_end: float = 0.6) -> int:
+        scene = ["bouncing_ball", "--variant", "listing", "--set", f"t_end={t_end}"]
         with pytest.raises(SystemExit) as end:
-            main([*asked, "--repeats", "1", *more])
+            main(["bench", *scene, "-e", "reference:compiled", "-e", "reference:cvode", "--quiet", *more])
         return int(end.value.code or 0)
 
+    return run
+
+
+def test_the_command_writes_tables_and_compares(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
     assert call("--out", "base") == 0
     for name in ("bench", "orders", "headline"):
         assert all(Path("base", f"{name}.{suffix}").is_file() for suffix in ("parquet", "csv", "json"))
+    rows, lines = (pd.read_parquet(f"base/{name}.parquet") for name in ("bench", "headline"))
+    lines.assign(ratio=lines["ratio"] / 100.0).to_parquet("base/headline.parquet")
     assert call("--out", "same", "--against", "base") == 0
-    assert "0 lost" in capsys.readouterr().out
-    now = pd.read_parquet("same/bench.parquet")
-    now.assign(error=1e-3, outcome="finished").to_parquet("base/bench.parquet")
-    monkeypatch.setattr(bench_against, "ACCURACY", 1e-15)
-    assert call("--out", "again", "--against", "base") == 1
-    assert "lost accuracy: bouncing_ball:linear reference:compiled: error" in capsys.readouterr().out
-    assert len(pd.read_parquet("again/lost.parquet")) == len(now)
+    rows.assign(error=rows["error"] / 100.0).to_parquet("base/bench.parquet")
+    assert call("--out", "worse", "--against", "base") == 1
+    assert "lost accuracy: bouncing_ball:listing(t_end=0.6) reference:compiled: error" in capsys.readouterr().out
+    assert set(pd.read_parquet("worse/lost.parquet")["what"]) == {"accuracy"}
+    rows.to_parquet("base/bench.parquet")
+    lines.assign(ratio=lines["ratio"] * 100.0).to_parquet("base/headline.parquet")
+    assert call("--out", "slower", "--against", "base") == 1
+    assert "lost ratio: bouncing_ball:listing(t_end=0.6) reference:cvode: the reference is" in capsys.readouterr().out
+
+
+def test_a_base_of_other_parameters_is_refused_before_anything_is_run(
+    call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("base").mkdir()
+    rows = table(("reference", 1e-9, 1e-10, 1.0)).assign(case="bouncing_ball:listing(t_end=0.6)")
+    rows.to_parquet("base/bench.parquet")
+    headline(rows).to_parquet("base/headline.parquet")
+    assert call("--against", "base", t_end=0.7) == 2
+    assert "has none of these cases; it has: bouncing_ball:listing(t_end=0.6)." in capsys.readouterr().err
+
+
+def test_every_case_with_a_closed_form_or_published_digits_is_timed_beside_another_engine() -> None:
+    full = {case.label: case for case in scenes.default(full=True)}
+    known = [cases.load(name, variant) for name in cases.names() for variant in cases.variants(name)]
+    judged = [case for case in known if case.closed_form or {claim.tier for claim in case.claims} & {Tier.A, Tier.B}]
+    assert len(judged) > 10
+    for case in judged:
+        assert case.label in full
+        others = [pick for pick in scenes.picks(["reference", "mujoco", "pinocchio"]) if not pick.skipped]
+        able = [pick for pick in others if engines.load(pick.engine).why_not(case, pick.profile) is None]
+        assert any((pick.engine, pick.profile) != REFERENCE for pick in able), case.label
+        assert any((pick.engine, pick.profile) == REFERENCE for pick in able), case.label
+
+
+@dataclass
+class SlowRun(FakeRun):
+    """Every step takes 10 ms, and half the step twice as many."""
+
+    def run(self) -> Trajectory:
+        steps = min(round(8e-3 / float(self.settings["dt"])), int(self.settings["max_steps"]))
+        time.sleep(0.01 * steps)
+        done = steps < int(self.settings["max_steps"])
+        outcome = Outcome.FINISHED if done else Outcome.STEP_LIMIT
+        return replace(truth_of(self.case).trajectory, steps=steps, wall_s=0.01 * steps, outcome=outcome)
+
+
+@pytest.mark.parametrize(("longest", "rungs"), [(0.01, 1), (0.06, 2), (1.0, 6)])
+def test_a_ladder_ends_before_the_rung_that_takes_too_long(
+    longest: float, rungs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow = FakeEngine()
+    monkeypatch.setattr(
+        slow, "prepare", lambda case, profile, **s: SlowRun(case, profile, {"dt": 1e-3, "max_steps": 10**6} | s),
+        raising=False,
+    )  # fmt: skip
+    monkeypatch.setattr(engines, "load", lambda name: slow)
+    case = cases.load("bouncing_ball", "linear", t_end=1.0)
+    climbed = Ladder(case, Pick(engine="fake", profile="second"), Effort(longest=longest))
+    found = []
+    for _, setting, run in climbed:
+        motion = run.run()
+        climbed.climbed(motion.wall_s, motion.steps)
+        found.append((setting, int(run.settings["max_steps"])))
+    assert len(found) == rungs
+    assert all(bound <= 2.0 * longest / 0.01 * 1.001 or bound <= 2**i for i, (_, bound) in enumerate(found[1:], 1))

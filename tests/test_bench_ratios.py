@@ -7,7 +7,8 @@ import pytest
 from crossbody.reports.bench import skip as skip
 from crossbody.reports.bench import throughput as throughput
 from crossbody.reports.bench.headline import headline
-from crossbody.reports.bench.ladder import Effort, bench
+from crossbody.reports.bench.ladder import Effort
+from crossbody.reports.bench.measure import bench
 from crossbody.reports.bench.scenes import DROP, PAIR, picks
 
 pytestmark = pytest.mark.bench

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +46,17 @@ def _table(path: Path) -> pd.DataFrame:
         return pd.read_parquet(path)
     except (OSError, ValueError):  # not there, or not Parquet
         raise OutputError(f"--against: {path} cannot be read; name a folder that crossbody bench wrote.") from None
+
+
+def check_common(base_rows: pd.DataFrame, labels: Iterable[str]) -> None:
+    """Before anything is run: whether an earlier benchmark has one of these cases, under the same parameters.
+
+    Raises:
+        InvalidValue: naming what it has.
+    """
+    known = base_rows["case"].unique().tolist()
+    if not set(labels) & set(known):
+        raise InvalidValue(f"--against: the earlier benchmark has none of these cases; it has: {', '.join(known)}.")
 
 
 def lost(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -12,7 +11,7 @@ import pandas as pd
 from crossbody.cases import CrossbodyError, InvalidValue
 from crossbody.reports import voice
 from crossbody.reports.bench import against as bench_against
-from crossbody.reports.bench import ladder, scenes
+from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
 from crossbody.reports.commands import where
 from crossbody.reports.pages import site as page
@@ -38,24 +37,21 @@ def run(
     Raises:
         CrossbodyError: for wrong use, before anything is run.
     """
-    cases = scenes.chosen(names, variant, jobs.parse_settings(pairs), full)
-    picks = scenes.picks(wanted)
+    cases, picks = scenes.chosen(names, variant, jobs.parse_settings(pairs), full), scenes.picks(wanted)
     base = None if against is None else bench_against.read(against)
-    effort = scenes.FULL_EFFORT if full else scenes.QUICK_EFFORT
-    effort = effort if repeats is None else replace(effort, repeats=repeats)
-    if names or variant or pairs:
-        effort = replace(effort, every=1)
+    if base is not None:
+        bench_against.check_common(base[0], [case.label for case in cases])
+    effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats)
     output.check(out)
     with progress(len(cases) * len(picks)) as tell:
-        found = [ladder.bench(case, picks, effort, tell) for case in cases]
-    rows, orders = ladder.joined(found)
+        rows, orders = measure.joined([measure.bench(case, picks, effort, tell) for case in cases])
     if not len(rows):
         raise InvalidValue(_nothing(picks))
     tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
-    losses = None if base is None else bench_against.lost(rows, tables["headline"], *base)
-    write(out, tables | ({} if losses is None else {"lost": losses}), provenance(command, repeats=effort.repeats))
-    show(tables | ({} if losses is None or not voice.as_json() else {"lost": losses}), out)
-    return 0 if losses is None else tell_losses(losses, against)
+    losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
+    write(out, tables | losses, provenance(command, repeats=effort.repeats))
+    show(tables | (losses if voice.as_json() else {}), out)
+    return tell_losses(losses["lost"], against) if losses else 0
 
 
 def _nothing(picks: Sequence[jobs.Pick]) -> str:
@@ -101,9 +97,7 @@ def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequen
     return int(bool(failed))
 
 
-def alone(
-    what: str, asked: tuple[object, ...], repeats: int | None, out: Path, command: str
-) -> int:  # fmt: skip
+def alone(what: str, asked: tuple[object, ...], repeats: int | None, out: Path, command: str) -> int:
     """The table of what is skipped, or of the throughput of many runs; the exit code.
 
     Raises:
@@ -112,13 +106,6 @@ def alone(
     if any(asked):
         raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
     output.check(out)
-    if what == "skip":
-        from crossbody.reports.bench import skip as bench_skip
-
-        rows = bench_skip.measure(repeats or 5)
-    else:
-        from crossbody.reports.bench import throughput as bench_throughput
-
-        rows = bench_throughput.measure(repeats or 5)
+    rows = (skip if what == "skip" else throughput).measure(repeats or 5)
     beyond = rows[~rows["held"].astype(bool)]
     return table(what, rows, out, command, [str(text) for text in beyond["what"]])

@@ -13,7 +13,7 @@ def work_precision(rows: pd.DataFrame) -> go.Figure:
     """Log-log lines labelled with tolerance or step; a failed run is a cross at the right edge.
 
     Args:
-        rows: as `crossbody.reports.bench.ladder.bench` gives them.
+        rows: as `crossbody.reports.bench.measure.bench` gives them.
     """
     figure = go.Figure()
     error = rows["error"].astype(float)

@@ -22,7 +22,7 @@ def headline(rows: pd.DataFrame) -> pd.DataFrame:
     """One row an engine and profile on a case: ratio of its time to the reference's at its best error.
 
     Args:
-        rows: as of `crossbody.reports.bench.ladder.bench`, with those of the compiled reference.
+        rows: as of `crossbody.reports.bench.measure.bench`, with those of the compiled reference.
 
     Returns:
         ratio: of the runs themselves; ratio_call: of the whole calls from Python; least_ratio: the smallest of all
@@ -46,8 +46,7 @@ def _ratios(ours: pd.DataFrame, rungs: pd.DataFrame) -> dict[str, Any]:
     about = {"tier": rungs["tier"].iloc[0], "against": rungs["against"].iloc[0]}
     done = rungs[np.isfinite(rungs["error"].astype(float))]
     if not len(done):
-        ended = ", ".join(sorted(set(rungs["outcome"])))
-        return about | {"says": f"reaches no error: every run ends {ended}, or with other events than the truth's"}
+        return about | {"says": _failed(rungs.iloc[-1])}
     levels = [_level(ours, rung) for rung in done.to_dict(orient="records")]
     best = min(levels, key=lambda level: (level["best_error"], level["engine_ms"]))
     least = min(levels, key=lambda level: (math.isfinite(level["ratio"]), level["ratio"]))
@@ -57,6 +56,14 @@ def _ratios(ours: pd.DataFrame, rungs: pd.DataFrame) -> dict[str, Any]:
         "ahead": "yes" if least["ratio"] > 1.0 else "no",
     }
     return about | best | found | {"says": _says(least, ours)}
+
+
+def _failed(finest: pd.Series[Any]) -> str:
+    """Why an engine reaches no error, by its finest run."""
+    at = f"at {finest['knob']} = {finest['setting']:g}" if finest["knob"] else "as it is"
+    if finest["touches"]:
+        return f"reaches no error: {at} it touches {finest['touches']:+g} times beside the truth"
+    return f"reaches no error: {at} its run ends {finest['outcome']}"
 
 
 def _level(ours: pd.DataFrame, rung: Mapping[Any, Any]) -> dict[str, Any]:

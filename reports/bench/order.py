@@ -43,7 +43,7 @@ def orders(rows: pd.DataFrame) -> pd.DataFrame:
     """One row an engine and profile on a case: observed and promised order, and in words what to think of it.
 
     Args:
-        rows: as of `crossbody.reports.bench.ladder.bench`.
+        rows: as of `crossbody.reports.bench.measure.bench`.
     """
     found = []
     for (case, engine, profile, knob), group in rows.groupby(["case", "engine", "profile", "knob"], sort=False):

@@ -28,10 +28,14 @@ class Scene:
     given: Mapping[str, Value] = field(default_factory=lambda: MappingProxyType({}))
 
     def case(self) -> Case:
-        """The case; its variant's name tells what was changed, so that no two rows share a label."""
-        found = cases.load(self.name, self.variant, **self.given)
-        changed = ",".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in self.given.items())
-        return replace(found, variant=f"{self.variant}({changed})") if changed else found
+        """The case."""
+        return labelled(cases.load(self.name, self.variant, **self.given), self.given)
+
+
+def labelled(case: Case, given: Mapping[str, Value]) -> Case:
+    """The case under a label that tells what was changed, so that no two scenes are taken for one."""
+    changed = ",".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in given.items())
+    return replace(case, variant=f"{case.variant}({changed})") if changed else case
 
 
 DROP = Scene(name="bouncing_ball", variant="elastic", given={"a0": 1e5, "a1": 0.0, "a2": 0.0, "t_end": 2.0})
@@ -62,7 +66,14 @@ def chosen(names: Sequence[str], variant: str | None, given: Mapping[str, Value]
     """The cases that were named, in the variant that was, else the default ones."""
     if not (names or variant or given):
         return default(full)
-    return jobs.load_cases(names, variant, given)
+    return tuple(labelled(case, given) for case in jobs.load_cases(names, variant, given))
+
+
+def effort(full: bool, every_rung: bool, repeats: int | None) -> Effort:
+    """What is spent on them; scenes that were named are run on every rung."""
+    chosen = FULL_EFFORT if full else QUICK_EFFORT
+    chosen = replace(chosen, every=1) if every_rung else chosen
+    return chosen if repeats is None else replace(chosen, repeats=repeats)
 
 
 def picks(wanted: Sequence[str]) -> tuple[jobs.Pick, ...]:

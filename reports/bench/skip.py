@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -152,12 +153,40 @@ def _shortcut(repeats: int) -> Iterator[dict[str, Any]]:
     yield lever.row(took["on"] / took["off"], "1", _beside(took, 1e6, "us"))
 
 
+def endless(bounces: int) -> Any:
+    """A prepared run of a ball that loses nothing, recorded by its end alone, over so many bounces.
+
+    From height h it meets a linear floor with v = sqrt(2 g h) every 2 v/g + pi/sqrt(a0) s.
+    """
+    h, g, a0 = 0.01, 9.81, 1e6
+    period = 2.0 * math.sqrt(2.0 * h / g) + math.pi / math.sqrt(a0)
+    case = cases.load("bouncing_ball", "elastic", height=h, a0=a0, a1=0.0, a2=0.0, t_end=bounces * period)
+    return _run(case, fsm="memoryless", samples=[case.t_end], events=False, rtol=1e-6, max_steps=10**9)
+
+
+def _bounces(_repeats: int) -> Iterator[dict[str, Any]]:
+    """A million bounces beside a hundred thousand."""
+    few, many = endless(100_000), endless(1_000_000)
+    took = _seconds({"few": few, "many": many}, 1)
+    held = {name: _bytes(run) for name, run in (("few", few), ("many", many))}
+    per = {"1e5": took["few"] / 1e5, "1e6": took["many"] / 1e6}
+    lever = Lever(what="time of a bounce, 1e6 over 1e5 of them", limit=1.2, how="a step costs the same at any time")
+    yield lever.row(per["1e6"] / per["1e5"], "1", _beside(per, 1e6, "us a bounce"))
+    lever = Lever(what="memory that 1e6 bounces take and 1e5 do not", limit=0.0, how="events counted, not kept")
+    yield lever.row(float(held["many"] - held["few"]), "B", f"{held['many']} B in all")
+
+
+def _bytes(run: Any) -> int:
+    """What a run holds, B."""
+    return sum(array.nbytes for arrays in (run.buffers, run.work) for array in arrays.values())
+
+
 def _beside(took: Mapping[str, float], factor: float, unit: str) -> str:
     return ", ".join(f"{name}: {factor * wall:.3g} {unit}" for name, wall in took.items())
 
 
 LEVERS: tuple[Callable[[int], Iterator[dict[str, Any]]], ...] = (
-    _rings, _idle_balls, _recording, _counted, _factorised, _shortcut,
+    _rings, _idle_balls, _recording, _counted, _factorised, _shortcut, _bounces,
 )  # fmt: skip
 
 

@@ -1,0 +1,146 @@
+"""Run time against error over ladders of tolerances and steps (spec 5.4).
+
+Models are built and warmed before the clock; the runs are interleaved, one round after another, so that a slow minute
+of the machine falls on all of them. Every row has two times: the run itself, as the engine's adapter clocks it, and
+the whole call from Python, whose excess is the cost of the call and of the trajectory that it builds.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from crossbody import engines
+from crossbody.cases import Case, CaseUnsupported, Trajectory
+from crossbody.reports.bench.errors import PARTS, Truths, errors, known_to
+from crossbody.reports.bench.ladder import Effort, Ladder
+from crossbody.reports.bench.order import orders
+from crossbody.reports.judging.truth import Truth
+from crossbody.reports.runs.jobs import Pick
+
+COLUMNS = (
+    "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "touches",
+    "honesty", "median_ms", "iqr_ms", "call_ms", "cores", "repeats", "steps", "outcome", "promised",
+)  # fmt: skip
+
+
+@dataclass(slots=True)
+class Rung:
+    """One engine at one setting, prepared; its errors from the warm-up, its times as they come."""
+
+    pick: Pick
+    against: str
+    truth: Truth
+    knob: str
+    setting: float
+    run: Any
+    first: Trajectory
+    errors: dict[str, float]
+    promised: float
+    inner: list[float] = field(default_factory=list)
+    call: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
+
+    def note(self, run: Trajectory, took: float, cores: float) -> None:
+        """One timed run: its own clock, the whole call, s, and processor time over wall time."""
+        self.inner.append(run.wall_s or took)
+        self.call.append(took)
+        self.cpu.append(cores)
+
+
+def _rungs(case: Case, picks: Sequence[Pick], effort: Effort, tell: Callable[[str], None]) -> Iterator[Rung]:
+    truths = Truths(case)
+    for pick in picks:
+        tell(f"{case.label}: {pick.engine}:{pick.profile}")
+        if not pick.skipped:
+            try:
+                yield from _climbed(case, pick, effort, truths)
+            except CaseUnsupported:
+                continue
+
+
+def _climbed(case: Case, pick: Pick, effort: Effort, truths: Truths) -> Iterator[Rung]:
+    """The rungs of one engine, up to the one that takes too long."""
+    promised = float(getattr(engines.load(pick.engine), "orders", {}).get(pick.profile, math.nan))
+    rungs = Ladder(case, pick, effort)
+    for knob, setting, run in rungs:
+        began = time.perf_counter()
+        first = run.run()
+        took = time.perf_counter() - began
+        rungs.climbed(took, first.steps)
+        against, truth = truths.of(run)
+        rung = Rung(pick, against, truth, knob, setting, run, first, errors(truth, first, case), promised)
+        if took > effort.slow:
+            rung.note(first, took, 1.0)
+        yield rung
+
+
+def _timed(rung: Rung) -> None:
+    cpu, began = time.process_time(), time.perf_counter()
+    run = rung.run.run()
+    took = time.perf_counter() - began
+    rung.note(run, took, (time.process_time() - cpu) / took)
+
+
+def _rounds(rungs: Sequence[Rung], effort: Effort) -> None:
+    """Time every rung that is not timed yet, in turns, again and again."""
+    quick = [rung for rung in rungs if not rung.call]
+    began = time.perf_counter()
+    gc.collect()
+    gc.disable()
+    try:
+        for i in range(effort.repeats):
+            if i and time.perf_counter() - began > effort.rounds:
+                return
+            for rung in quick:
+                _timed(rung)
+    finally:
+        gc.enable()
+
+
+def bench(
+    case: Case, picks: Sequence[Pick], effort: Effort | int = 5, tell: Callable[[str], None] = lambda _: None
+) -> pd.DataFrame:
+    """Time every rung of every engine.
+
+    Args:
+        case: the scene.
+        picks: engines and profiles; what is not installed or does not know the mechanism has no row.
+        effort: how much is measured, or the number of repeats.
+        tell: is told what is being done, once an engine.
+
+    Returns:
+        One row a rung, columns `COLUMNS`; errors and honesty (error over tolerance) are ratios, event times in s;
+        cores is processor time over wall time: 1 for one thread.
+    """
+    effort = Effort(repeats=effort) if isinstance(effort, int) else effort
+    rungs = list(_rungs(case, picks, effort, tell))
+    _rounds(rungs, effort)
+    return pd.DataFrame([_row(case, rung) for rung in rungs], columns=list(COLUMNS))
+
+
+def _row(case: Case, rung: Rung) -> dict[str, Any]:
+    low, median, high = (1e3 * float(x) for x in np.percentile(rung.inner, (25, 50, 75)))
+    return {
+        "case": case.label, "engine": rung.pick.engine, "profile": rung.pick.profile, "against": rung.against,
+        "tier": rung.truth.tier.value[0], "known_to": known_to(case, rung.truth), "knob": rung.knob,
+        "setting": rung.setting, **rung.errors,
+        "honesty": rung.errors["error"] / rung.setting if rung.knob == "rtol" else math.nan,
+        "median_ms": median, "iqr_ms": high - low, "call_ms": 1e3 * float(np.median(rung.call)),
+        "cores": float(np.median(rung.cpu)), "repeats": len(rung.call), "steps": rung.first.steps,
+        "outcome": rung.first.outcome.value, "promised": rung.promised,
+    }  # fmt: skip
+
+
+def joined(tables: Sequence[pd.DataFrame]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """All timings, and the observed order of each engine with what it says."""
+    filled = [table for table in tables if len(table)]
+    rows = pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COLUMNS))
+    return rows, orders(rows)
