@@ -71,19 +71,31 @@ def _shared(command: _Work) -> _Work:
     return command
 
 
+_AGAINST = click.option(
+    "--against", type=click.Path(path_type=Path), metavar="BASE",
+    help="Folder of an earlier run: the index says what has changed.",
+)  # fmt: skip
+_WITH = click.option(
+    "--with", "others", type=click.Path(path_type=Path), metavar="DIR", multiple=True,
+    help="Folder of a study (bench, stress, gapmap, ...): its pages stand beside; repeatable.",
+)  # fmt: skip
+
+
 @cli.command()
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@_AGAINST
+@_WITH
 @speaks
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, settings: tuple[str, ...],
+    rtol: float | None, settings: tuple[str, ...], against: Path | None, others: tuple[Path, ...],
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
     from crossbody.reports.commands import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, settings, _command())
+    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others)
 
 
 @cli.command()
@@ -203,13 +215,14 @@ def analyse(
 @cli.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--single-file", is_flag=True, help="One file with all pages, to be sent.")
-@click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier run to compare.")
+@_AGAINST
+@_WITH
 @speaks
-def report(folder: Path, single_file: bool, against: Path | None) -> int:
+def report(folder: Path, single_file: bool, against: Path | None, others: tuple[Path, ...]) -> int:
     """Make the pages of an earlier run again."""
-    from crossbody.reports.pages import site as page
+    from crossbody.reports.pages import site
 
-    made = page.write(folder, single_file=single_file, against=against).absolute()
+    made = site.write(folder, single_file=single_file, against=against, others=others).absolute()
     if as_json():
         click.echo(json.dumps({"report": str(made)}))
     elif not quiet():

@@ -13,7 +13,7 @@ from crossbody.cases import Case, InvalidValue
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.verdict import Word, exit_code
-from crossbody.reports.pages import site as page
+from crossbody.reports.pages import site
 from crossbody.reports.runs import jobs, output, study
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.voice import progress
@@ -29,9 +29,11 @@ COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yello
 
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    rtol: float | None, settings: Sequence[str], command: str,
+    rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
+
+    `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -41,13 +43,14 @@ def run(
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
     output.check(out)
+    site.check(against, others)
     with progress(len(cases) * (len(picks) + 1)) as tell:
         results = [jobs.run_case(case, picks, rtol, tell, asked) for case in cases]
     rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol, settings) for case in cases})
     told = provenance(command, rtol=rtol, seed=SEED)
     with output.folder(out) as made:
         study.write(made, results, rows, told)
-        page.write(made)
+        site.write(made, against=against, others=others)
     if voice.as_json():
         print(voice.rows_as_json(rows))
     else:
@@ -67,7 +70,7 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
     with output.folder(out) as made:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "gapmap", rows, told)
-        page.write(made)
+        site.write(made)
     if not voice.told_as_json({"gapmap": rows, "summary": gapmap.summary(rows)}):
         show_gap_map(gapmap.summary(rows), out)
     return 0
@@ -85,7 +88,7 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     with output.folder(out) as made:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "stability", rows, told)
-        page.write(made)
+        site.write(made)
     surprises = stability.surprises(rows)
     if not voice.told_as_json({"stability": rows, "surprises": surprises}):
         show_stability(rows, surprises, out)
@@ -126,7 +129,7 @@ def show(rows: pd.DataFrame, out: Path) -> None:
 def where(out: Path) -> None:
     """The path of the report, unless nothing but what is wrong is to be said."""
     if not voice.silent():
-        print(f"Report: {(out / page.PAGE).absolute()}")
+        print(f"Report: {(out / site.PAGE).absolute()}")
 
 
 def _summary(rows: pd.DataFrame) -> Any:

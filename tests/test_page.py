@@ -23,8 +23,7 @@ from crossbody.reports.bench.order import observed_order
 from crossbody.reports.judging.comparison import Entry, table
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Verdict, Word
-from crossbody.reports.pages import figures
-from crossbody.reports.pages import site as page
+from crossbody.reports.pages import figures, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns
@@ -43,7 +42,7 @@ def made(path: Path, results: Sequence[CaseResult], rows: pd.DataFrame | None = 
     told = {"command": f"crossbody run {HOSTILE}", "time": "", "versions": {"crossbody": "0.0.1"}}
     with folder(path) as out:
         study.write(out, results, study.judge(results, commands) if rows is None else rows, told)
-        page.write(out)
+        site.write(out)
     return path
 
 
@@ -51,7 +50,7 @@ def made(path: Path, results: Sequence[CaseResult], rows: pd.DataFrame | None = 
 def result() -> CaseResult:
     case = load("bouncing_ball", "linear")
     truth = truth_of(case)
-    off = replace(truth.trajectory, q=truth.trajectory.q + 1e-6)
+    off = replace(truth.trajectory, q=truth.trajectory.q + 1e-6, wall_s=2e-3)
     entries = (
         Entry(engine="fake", profile=HOSTILE, run=off, settings={"dt": 1e-3}),
         Entry(engine="absent", profile="*", skipped="It is not installed."),
@@ -89,7 +88,7 @@ def numbers(coded: dict[str, str]) -> np.ndarray:
 
 def test_every_figure_is_there_and_has_data(out: Path) -> None:
     found = plots(out)
-    assert set(found) == set(figures.FIGURES)
+    assert set(found) == {*figures.FIGURES, "precision"}
     for name, figure in found.items():
         assert figure["data"], name
 
@@ -191,7 +190,7 @@ def test_difference_to_the_truth_is_what_was_put_in(out: Path) -> None:
 
 def test_one_file_holds_all_pages(tmp_path: Path, result: CaseResult) -> None:
     out = made(tmp_path / "out", [result])
-    page.write(out, single_file=True)
+    site.write(out, single_file=True)
     assert [path.name for path in every(out)] == ["index.html"]
     text = (out / "index.html").read_text()
     tags = Tags(text).found
@@ -200,8 +199,98 @@ def test_one_file_holds_all_pages(tmp_path: Path, result: CaseResult) -> None:
     ]
     assert {a["id"] for _, a in tags if "data-page" in a} == {"index", CASE.removesuffix(".html")}
     assert_links_resolve(out)
-    page.write(out)
+    site.write(out)
     assert (out / CASE).is_file()
+
+
+def cells(out: Path, section: str) -> list[list[str]]:
+    """Text of every cell of a table of engines, line by line."""
+    text = (out / ("index.html" if section == "matrix" else CASE)).read_text()
+    part = text[text.index(f'--{section}">') :]
+    body = part[part.index("<tbody>") : part.index("</tbody>")]
+    return [re.findall(r'data-v="([^"]*)"', line) for line in body.split("</tr>")[:-1]]
+
+
+def test_a_case_begins_with_every_metric_of_every_engine(out: Path) -> None:
+    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["engine"] == "fake"]
+    judged = [row for row in rows if row["verdict"] in ("within", "outside", "expected-outside")]
+    shown = cells(out, "glance")
+    assert len(shown) == 2 + len(judged)
+    told = sorted(cell[0].split()[0] for cell in shown[2:])
+    assert told == sorted(row["verdict"] for row in judged)
+    text = (out / CASE).read_text()
+    assert text.index("At a glance") < text.index('class="verdicts"')
+
+
+def test_the_index_tells_error_and_cost_of_every_engine(out: Path) -> None:
+    text = (out / "index.html").read_text()
+    part = text[text.index('id="index--engines"') : text.index('id="index--matrix"')]
+    errors = {row["engine"]: row["value"] for row in json.loads((out / "verdicts.json").read_text())["rows"]
+              if row["metric"] == "position"}  # fmt: skip
+    assert f'data-v="{errors["fake"]}"' in part
+    assert "skipped" in part
+
+
+def test_run_time_is_drawn_against_error(out: Path) -> None:
+    (mark,) = plots(out)["precision"]["data"]
+    assert mark["name"] == "fake:&lt;script>alert(1)&lt;/script>"
+    assert mark["x"][0] == pytest.approx(1e-6, rel=0.1)
+
+
+def ladder(path: Path, rows: int = 3) -> Path:
+    """A folder as a benchmark of the case writes it."""
+    found = pd.DataFrame(
+        {
+            "case": "bouncing_ball:linear", "engine": "fake", "profile": "p", "against": "the case", "tier": "A",
+            "knob": "dt", "setting": 10.0 ** -np.arange(rows), "error": 10.0 ** -np.arange(rows), "error_q": 1.0,
+            "error_v": 1.0, "error_impulse": 1.0, "error_energy": 1.0, "error_times": 1.0, "honesty": np.nan,
+            "median_ms": 1.0 + np.arange(rows), "iqr_ms": 0.1, "call_ms": 2.0, "cores": 1.0, "repeats": 3,
+            "outcome": "finished",
+        }
+    )  # fmt: skip
+    lead = pd.DataFrame({"case": ["bouncing_ball:linear"], "engine": ["fake"], "profile": [HOSTILE], "ratio": [42.0]})
+    order = pd.DataFrame(columns=["case", "engine", "profile", "knob", "order", "promised", "says"])
+    told = {"command": "crossbody bench"}
+    with folder(path) as made_:
+        study.write(made_, [], study.judge([], {}), told)
+        for name, rows_ in (("bench", found), ("headline", lead), ("orders", order)):
+            study.write_table(made_ / name, rows_, told)
+    return path
+
+
+def test_studies_of_other_folders_stand_beside(tmp_path: Path, result: CaseResult) -> None:
+    out, bench = made(tmp_path / "out", [result]), ladder(tmp_path / "bench")
+    site.write(out, others=[bench])
+    assert "crossbody bench" in (out / "bench.html").read_text()
+    assert 'data-v="42.0"' in (out / "index.html").read_text()
+    drawn = plots(out)["precision"]["data"]
+    assert "lines" in drawn[0]["mode"]
+    assert_links_resolve(out)
+    before = (out / "verdicts.json").read_text()
+    site.write(out)
+    assert (out / "bench.html").is_file()
+    assert (out / "verdicts.json").read_text() == before
+
+
+def test_a_study_of_another_version_is_told(tmp_path: Path, result: CaseResult) -> None:
+    out = made(tmp_path / "out", [result])
+    (out / "gapmap.json").write_text(json.dumps({"provenance": {}, "rows": [{"n": 3}]}))
+    site.write(out)
+    assert "Another version of crossbody wrote these tables" in (out / "gapmap.html").read_text()
+    assert (out / CASE).is_file()
+
+
+@pytest.mark.parametrize(("make", "says"), [(Path.mkdir, "was not written by crossbody"), (None, "holds no study")])
+def test_a_folder_without_a_study_cannot_stand_beside(
+    tmp_path: Path, result: CaseResult, make: Callable[[Path], None] | None, says: str
+) -> None:
+    out, other = made(tmp_path / "out", [result]), tmp_path / "other"
+    if make is None:
+        made(other, [result])
+    else:
+        make(other)
+    with pytest.raises(OutputError, match=says):
+        site.write(out, others=[other])
 
 
 def test_what_changed_is_told(tmp_path: Path, result: CaseResult) -> None:
@@ -216,7 +305,7 @@ def test_what_changed_is_told(tmp_path: Path, result: CaseResult) -> None:
 
 
 def changed(out: Path, base: Path) -> str:
-    page.write(out, against=base)
+    site.write(out, against=base)
     found = re.search(r"Against .*? gone\.", (out / "index.html").read_text())
     assert found
     return found.group()
@@ -262,7 +351,7 @@ def test_a_motion_that_cannot_be_read_is_told(
 ) -> None:
     out = made(tmp_path / "out", [result])
     spoil(out / "traces" / "0001.parquet")
-    page.write(out)
+    site.write(out)
     text = (out / CASE).read_text()
     assert "No motion is stored for fake:" in text
     assert 'id="case-bouncing_ball.linear--plot-motion"' in text
@@ -275,7 +364,7 @@ def test_results_of_another_version_are_told(tmp_path: Path, result: CaseResult)
         del row["tier"]
     (out / "verdicts.json").write_text(json.dumps(rows))
     with pytest.raises(OutputError, match=r"written by crossbody 0\.0\.1: its verdicts have no tier"):
-        page.write(out)
+        site.write(out)
 
 
 def test_a_page_needs_no_engine(out: Path) -> None:
@@ -293,12 +382,12 @@ def test_a_page_of_given_sections(out: Path) -> None:
     given = Table(title="Numbers", columns=columns(a="A", b=("B [m]", Kind.NUMBER)), rows=rows)
     figure = go.Figure({"data": [{"y": [1, 2], "name": HOSTILE}], "layout": {"title": {"text": "T"}, "height": 300}})
     section = Section(name="s", title="S", plots=(Plot(name="p", figure=figure),), tables=(given,))
-    text = page.write_page(out, "replay", "Replay", [section]).read_text()
+    text = site.write_page(out, "replay", "Replay", [section]).read_text()
     assert "0.3333" in text
     assert 'data-v="0.3333333333333333"' in text
     assert HOSTILE not in text
     assert "\\u003cscript" in text
-    page.write(out)
+    site.write(out)
     assert not (out / "replay.html").is_file()
 
 
@@ -317,7 +406,7 @@ def test_long_steps_are_drawn_as_cubics(result: CaseResult) -> None:
 
 def test_a_folder_without_a_study_is_told(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="was not written by crossbody"):
-        page.write(tmp_path)
+        site.write(tmp_path)
 
 
 def test_thinning_keeps_spikes_and_all_samples_around_events() -> None:

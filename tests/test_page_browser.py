@@ -14,7 +14,7 @@ import pytest
 from crossbody.cases import load
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.pages import site as page
+from crossbody.reports.pages import site
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
@@ -43,7 +43,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("browser") / "out"
     with folder(path) as made:
         study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
-        page.write(made)
+        site.write(made)
     return path
 
 
@@ -165,7 +165,7 @@ def test_the_switch_turns_the_theme(out: Path, browser: chromium.Browser) -> Non
 
 
 def test_one_file_shows_one_page_at_a_time(out: Path, browser: chromium.Browser) -> None:
-    page.write(out, single_file=True)
+    site.write(out, single_file=True)
     try:
         browser.open(out / INDEX)
         shown = "[...document.querySelectorAll('[data-page]')].filter((p) => !p.hidden).map((p) => p.id).join()"
@@ -175,7 +175,7 @@ def test_one_file_shows_one_page_at_a_time(out: Path, browser: chromium.Browser)
         draw_all(browser)
         assert browser.complaints() == []
     finally:
-        page.write(out)
+        site.write(out)
 
 
 @pytest.mark.skipif(find_spec("axe_core_python") is None, reason="axe is not installed (pip install axe-core-python).")

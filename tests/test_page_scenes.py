@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from crossbody import cases
-from crossbody.cases import Case, Trajectory
+from crossbody.cases import Case, Event, Mode, Trajectory
 from crossbody.reports import scenes
+from crossbody.reports.pages.figures import impulse
 from crossbody.reports.pages.playback import chosen, packed, peaks, playback
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace
@@ -149,6 +150,28 @@ def test_playback_is_small_and_holds_the_motion(name: str, variant: str) -> None
     t = np.frombuffer(base64.b64decode(track["t"]), "<f4")
     assert t[0] == 0.0
     assert t[-1] == pytest.approx(case.t_end, rel=1e-6)
+
+
+def test_collisions_that_take_no_time_are_drawn_as_impulses() -> None:
+    case = cases.load("red_body", "frozen")
+    trace = trace_of(case)
+    events = (
+        Event(t=0.05, contact=2, before=Mode.FREE, after=Mode.COLLISION),
+        Event(t=0.05, contact=2, before=Mode.COLLISION, after=Mode.CONTACT, impulse=3.0),
+    )
+    struck = replace(trace, run=replace(trace.run, events=events, lam=0.0 * trace.run.lam))
+    scene = scenes.load(case.mechanism)
+    found = packed([struck], scene)
+    assert (found["force"], found["impulse"]) == (0.0, 3.0)
+    (track,) = found["tracks"]
+    blows = np.frombuffer(base64.b64decode(track["blows"]), "<f4").reshape(-1, 4)
+    at = np.frombuffer(base64.b64decode(track["struck"]), "<f4")
+    assert at == pytest.approx([0.05], abs=case.t_end / 49)
+    i = int(np.searchsorted(trace.run.t, 0.05))
+    wanted = scene.arrows(trace.run.q[i : i + 1], 3.0 * np.eye(len(case.contacts))[2:3], case.parameters)[0]
+    assert np.allclose(blows, wanted, atol=1e-6)
+    step = impulse(struck.run, events)
+    assert np.allclose(step[:, 2], np.where(struck.run.t >= 0.05, 3.0, 0.0))
 
 
 def test_an_unknown_mechanism_is_told() -> None:

@@ -82,12 +82,8 @@ def _glance(found: Results, case: CaseFiles) -> Section:
 
 def studied(out: Path, about: Mapping[str, Any]) -> list[Section]:
     """What studies in the same folder drew of this case."""
-    return [
-        replace(section, tables=())
-        for name in sections.names()
-        if about.get("case") in getattr(study := sections.load(name), "CASES", ())
-        for section in study.sections(out)
-    ]
+    mine = [name for name in sections.names() if about.get("case") in getattr(sections.load(name), "CASES", ())]
+    return [replace(section, tables=()) for name in mine for section in sections.shown(name, out)]
 
 
 def _verdicts(found: Results, case: CaseFiles) -> Section:

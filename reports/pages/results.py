@@ -13,7 +13,6 @@ from crossbody.cases import OutputError
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.pages.section import records
-from crossbody.reports.runs.output import MARKER
 from crossbody.reports.runs.store import Trace, load, peek
 from crossbody.reports.runs.study import read_json
 
@@ -79,13 +78,11 @@ def read(out: Path, against: Path | None = None) -> Results:
     Raises:
         OutputError: if a folder does not hold results that this version can read.
     """
-    if not (out / MARKER).is_file():
-        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
     told = read_json(out / "provenance.json")
-    verdicts = _verdicts(out)
+    verdicts = verdicts_of(out)
     audits = _by(read_json(out / "audit.json")["rows"], "case")
     cases, walls = _cases(out, verdicts)
-    base = None if against is None else _verdicts(against)
+    base = None if against is None else verdicts_of(against)
     return Results(
         out=out, verdicts=verdicts, rows=_by(records(verdicts), "label"), audits=audits, told=told,
         cases=cases, walls=walls, base=base,
@@ -101,8 +98,12 @@ def _by(rows: Iterable[dict[str, Any]], key: str) -> dict[str, list[dict[str, An
     return found
 
 
-def _verdicts(out: Path) -> pd.DataFrame:
-    """Verdicts with the case's label and the engine's as columns of their own."""
+def verdicts_of(out: Path) -> pd.DataFrame:
+    """Verdicts of a folder, with the case's label and the engine's as columns of their own.
+
+    Raises:
+        OutputError: if it does not hold verdicts that this version can read.
+    """
     table = read_json(out / "verdicts.json")
     rows = pd.DataFrame(table.get("rows", []) if isinstance(table, dict) else [])
     if rows.empty:

@@ -11,12 +11,14 @@ from pathlib import Path
 
 from crossbody.cases import OutputError
 from crossbody.reports import sections as studies
-from crossbody.reports.pages.case_page import case_page
+from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import PLOTLY, Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
-from crossbody.reports.pages.results import Results, read
+from crossbody.reports.pages.results import Results, read, verdicts_of
 from crossbody.reports.pages.section import Section
+from crossbody.reports.runs import beside
 from crossbody.reports.runs.output import MARKER, replace_text
+from crossbody.reports.runs.study import read_json
 
 INDEX = "index"
 PAGE = f"{INDEX}.html"
@@ -24,13 +26,26 @@ MADE = '<meta name="generator" content="crossbody">'
 """Stands in every page: what carries it may be replaced."""
 
 
-def write(out: Path, *, single_file: bool = False, against: Path | None = None) -> Path:
+def check(against: Path | None, others: Sequence[Path]) -> None:
+    """Say before anything is computed whether the folders to be shown beside can be read.
+
+    Raises:
+        OutputError: if they cannot.
+    """
+    if against is not None:
+        verdicts_of(against)
+    for other in others:
+        beside.tables(other)
+
+
+def write(out: Path, *, single_file: bool = False, against: Path | None = None, others: Sequence[Path] = ()) -> Path:
     """Make the pages of a folder that holds results.
 
     Args:
         out: written by a run, a bench or another study.
         single_file: whether one file holds all pages, style and scripts.
         against: folder of an earlier run; the index then says what has changed since.
+        others: folders of studies (a bench, a gap map, ...) whose tables are taken into this one.
 
     Returns:
         The index page.
@@ -38,6 +53,9 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None) 
     Raises:
         OutputError: if a folder does not hold results, or cannot be written.
     """
+    if not (out / MARKER).is_file():
+        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
+    beside.take(out, others)
     found = read(out, against)
     links = _links(found)
     footer = found.footer
@@ -92,21 +110,27 @@ def _sweep(out: Path, made: set[str], single_file: bool) -> None:
 
 def _studies(found: Results) -> Iterator[Page]:
     for name in studies.names():
-        study = studies.load(name)
-        if shown := study.sections(found.out):
-            yield Page(name=name, title=study.TITLE, sections=shown)
+        if shown := studies.shown(name, found.out):
+            yield Page(name=name, title=studies.load(name).TITLE, sections=[*shown, *_origin(found, shown)])
+
+
+def _origin(found: Results, shown: Sequence[Section]) -> list[Section]:
+    """Provenance of a study, which may come from another folder than the verdicts."""
+    file = next((table.file for section in shown for table in section.tables if table.file), "")
+    told = read_json((found.out / file).with_suffix(".json"))["provenance"] if file else found.told
+    return [] if not found.cases else [provenance(told)]
 
 
 def _pages(found: Results) -> Iterator[Page]:
     """Every page, made one after another; a folder of one study and no case is one page."""
-    beside = list(_studies(found))
-    alone = beside if not found.cases else []
+    studied = list(_studies(found))
+    alone = studied if not found.cases else []
     for page in index_pages(found):
         if page.name == INDEX:
             page = replace(page, sections=[*(s for study in alone for s in study.sections), *page.sections])
         yield page
     if not alone:
-        yield from beside
+        yield from studied
     for case in found.cases:
         yield case_page(found, case)
 

@@ -5,7 +5,10 @@ A module has a docstring whose first line says what it shows, and the public nam
     TITLE                           heading of its page and of the link to it
     sections(out)                   tuple of `Section`; empty where the folder has no such data
 
-It reads tables only (`crossbody.reports.runs.study.read_json`), never an engine: a page can be made again years later.
+and, if it is about some cases, CASES, their names: its figures then stand on their pages too.
+
+It reads tables only (`crossbody.reports.runs.study.read_json`), never an engine: a page can be made again years
+later. What it must know besides stands in the `provenance` of its tables, since a folder may hold several studies.
 """
 
 from __future__ import annotations
@@ -39,3 +42,13 @@ def load(name: str) -> Study:
         UnknownName: if there is no such study; the message lists the names.
     """
     return cast("Study", _registry.load_plugin("study", __name__, list(__path__), name))
+
+
+def shown(name: str, out: Path) -> tuple[Section, ...]:
+    """Sections of a study in a folder; where its tables are not what this version writes, one that says so."""
+    study = load(name)
+    try:
+        return study.sections(out)
+    except (KeyError, TypeError, ValueError) as error:
+        told = f"Another version of crossbody wrote these tables ({error} is not as expected): run the study again."
+        return (Section(name=name, title=study.TITLE, text=told),)

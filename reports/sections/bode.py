@@ -10,6 +10,7 @@ from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns,
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Frequency responses"
+CASES = ("soft_contact",)
 TEXT = (
     "The block held by both fingers, about the grasp: from the velocity of the fingers to the difference of the "
     "contact forces and to the velocity of the block. Derivatives of the model are exact in the modes of the grasp. "

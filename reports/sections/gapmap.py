@@ -10,6 +10,7 @@ from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns,
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Gap map"
+CASES = ("newtons_cradle",)
 TEXT = (
     "Sliders, one ball in, elastic; s = gap sqrt(a0) / v is the gap over the deepest penetration of one pair. Where "
     "collisions overlap the law itself makes energy and no row gives the ideal pattern; each line shows from which gap "

@@ -26,7 +26,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     if not (out / "identify.json").is_file():
         return ()
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
-    told = read_json(out / "provenance.json")["fit"]
+    told = read_json(out / "identify.json")["provenance"]["fit"]
     text = (
         f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}. {' '.join(told['warnings'])} "
         "Held-out windows were not fitted; their errors say what the estimates are worth."

@@ -38,7 +38,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     tables = [Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")]
     if len(found):
         tables.append(Table(title="Findings about the log", columns=FINDINGS, rows=records(found), file="findings.csv"))
-    about = read_json(out / "provenance.json")["log"]
+    about = read_json(out / "replay.json")["provenance"]["log"]
     origin = "SYNTHETIC, no measurement." if about["synthetic"] else "A measurement."
     text = f"{origin} {about['file']}: {about['about']} {TEXT}"
     return (Section(name="replay", title="Log and model", text=text, plots=plots, tables=tables),)

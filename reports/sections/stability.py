@@ -10,6 +10,7 @@ from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns,
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Stability map"
+CASES = ("ball_maze",)
 TEXT = (
     "The closed loop with one thing changed at a time: bounds, gains, the model that the controller believes in, the "
     "start, sampling and noise. Where the ball tumbles through several rings either end is possible."
