@@ -15,6 +15,8 @@ LADDERS = {
     "rtol": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13),
     "dt": (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4),
 }
+GROWTH = 3.0
+"""At most this many times what the last rung took is expected of the next: a run that failed early tells nothing."""
 PATIENCE = 2.0
 """A rung may take this many times the longest; its steps are bounded accordingly."""
 
@@ -73,7 +75,8 @@ class Ladder:
         if len(self.took) < 2:
             return bool(self.took) and self.took[-1] > self.effort.longest
         before, last = self.took[-2:]
-        return last * max(1.0, last / before) > self.effort.longest or sum(self.took) > self.effort.climb
+        growth = min(max(1.0, last / before), GROWTH)
+        return last * growth > self.effort.longest or sum(self.took) > self.effort.climb
 
     def _bound(self, plain: Any) -> dict[str, int]:
         """As many steps as may be taken in the longest time, by what a step cost so far."""
