@@ -7,7 +7,6 @@ T J diag(S, S) in the case's coordinates, whatever the second derivatives of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,12 +94,3 @@ def in_contact(case: Case) -> Case:
     """The case with the constants of CONTACT as the only ones of its rows."""
     law = case.law
     return replace(case, law=Law(a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral), claims=())
-
-
-def differences(function: Callable[[Floats], Floats], x: Floats, step: float) -> Floats:
-    """Derivative (m, n) of a function of x (n,) by central differences of fourth order."""
-    columns = []
-    for e in step * np.eye(len(x)):
-        near, far = function(x + e) - function(x - e), function(x + 2.0 * e) - function(x - 2.0 * e)
-        columns.append((8.0 * near - far) / (12.0 * step))
-    return np.stack(columns, axis=-1)

@@ -21,8 +21,9 @@ import pinocchio as pin
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
-from crossbody.engines._linear import Chart, Spot, Tangent, differences, in_contact, same
+from crossbody.engines._linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
+from crossbody.reference.linear._differences import differences
 
 STEP = 1e-3
 """Of the differences, as a part of the coordinates' sizes."""

@@ -149,7 +149,12 @@ class Program:
     tick: float
 
 
-def _knots(gains: Gains | Mapping[float, Gains]) -> Floats:
+def knots(gains: Gains | Mapping[float, Gains]) -> Floats:
+    """Instants and gains by rows (m, 28).
+
+    Raises:
+        InvalidValue: for instants that are not finite or do not increase.
+    """
     table = {0.0: gains} if isinstance(gains, Gains) else dict(gains)
     times = np.array(list(table), dtype=np.float64)
     if not len(times) or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0):
@@ -207,7 +212,7 @@ def program(
         InvalidValue: for a number outside its range or a path that cannot be followed.
     """
     timing = sampling or Sampling()
-    ticks, knots = timing.ticks(t_end), _knots(controller.gains)
+    ticks, table = timing.ticks(t_end), knots(controller.gains)
     linear = isinstance(controller, Linearising)
     reference = task_reference(robot, path, ticks) if linear else motor_reference(robot, path, ticks)
     header = {
@@ -216,13 +221,13 @@ def program(
         "delay": timing.delay,
         "limit": timing.limit or _NO_LIMIT,
         "ticks": len(ticks),
-        "knots": len(knots),
+        "knots": len(table),
         **({k: float(getattr(controller, k)) for k in ("clamp", "exact", "feedforward", "friction")} if linear else {}),
     }
     numbers = np.array([header.get(name, 0.0) for name in compiled.HEADER], dtype=np.float64)
     return Program(
         control=compiled.linearising if linear else compiled.proportional,
-        parameters=np.concatenate([robot.array(Servo()), numbers, knots.ravel(), reference.ravel()]),
+        parameters=np.concatenate([robot.array(Servo()), numbers, table.ravel(), reference.ravel()]),
         memory=compiled.STATE + 3 * timing.delay,
         tick=timing.period,
     )

@@ -76,6 +76,15 @@ def sampling_of(parameters: Numbers) -> control.Sampling:
     )
 
 
+def controller_of(parameters: Numbers) -> control.Linearising | control.Proportional:
+    """What a sampled controller computes."""
+    gains = control.Gains(**{name: float(parameters[name]) for name in ("kp", "kd", "ki")})
+    if parameters["controller"] != "linearising":
+        return control.Proportional(gains=gains)
+    exact = parameters["mass_matrix"] == "exact"
+    return control.Linearising(gains=gains, clamp=float(parameters["clamp"]), exact=exact)
+
+
 def program_of(parameters: Numbers) -> control.Program | None:
     """The sampled controller, or None.
 
@@ -85,15 +94,8 @@ def program_of(parameters: Numbers) -> control.Program | None:
     path = path_of(parameters)
     if path is None:
         return None
-    gains = control.Gains(**{name: float(parameters[name]) for name in ("kp", "kd", "ki")})
-    law: control.Linearising | control.Proportional = control.Proportional(gains=gains)
-    if parameters["controller"] == "linearising":
-        law = control.Linearising(
-            gains=gains, clamp=float(parameters["clamp"]), exact=parameters["mass_matrix"] == "exact"
-        )
-    return control.program(
-        robot_of(parameters), law, path, float(parameters["t_end"]), sampling_of(parameters)
-    )  # fmt: skip
+    law, t_end = controller_of(parameters), float(parameters["t_end"])
+    return control.program(robot_of(parameters), law, path, t_end, sampling_of(parameters))
 
 
 def build(parameters: Numbers, law: Law) -> System:

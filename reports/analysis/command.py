@@ -93,6 +93,8 @@ def analyse(
         "equilibria": work.equilibria(found, case), "poles": work.poles(found), "ranks": work.ranks(found),
         "engines": engines, "engine-poles": engine_poles,
     }  # fmt: skip
+    if len(rows := work.coefficients(found)):
+        tables["coefficients"] = rows
     if bode and len(rows := work.responses(found, OMEGA)):
         tables["responses"] = rows
     if locus:
@@ -124,7 +126,9 @@ def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
     from rich.console import Console
 
     console = Console()
-    for key in ("equilibria", "poles", "ranks"):
+    for key in ("equilibria", "poles", "ranks", "coefficients"):
+        if key not in tables:
+            continue
         console.print(_printed(f"{label}: {key}", tables[key].head(SHOWN), digits=6))
         if len(tables[key]) > SHOWN:
             console.print(f"... {len(tables[key]) - SHOWN} more rows; --out DIR keeps all.")

@@ -38,7 +38,7 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
     """Every way of every engine at every place.
 
     Args:
-        found: places of one case; those without an equilibrium are left out.
+        found: places of one case; those without an equilibrium, and loops, are left out.
         names: of engines; what one cannot do is a row with its sentence.
 
     Returns:
@@ -47,7 +47,7 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
     rows: list[dict[str, Any]] = []
     poles: list[dict[str, Any]] = []
     for place in found:
-        if place.model is None:
+        if place.spot is None:
             continue
         for name in names:
             about = {"place": place.name, "engine": name}

@@ -12,12 +12,14 @@ from crossbody import cases
 from crossbody.cases import Case, CaseUnsupported, InvalidValue, Value
 from crossbody.reference import delta
 from crossbody.reference.delta import scene
+from crossbody.reference.delta.loop import characteristic
 from crossbody.reference.linear import LinearModel, controllable, locus, modes, observable, poses
 from crossbody.reports.analysis.places import Place, places
 
 EQUILIBRIA = ("place", "outcome", "variable", "value")
 POLES = ("place", "real", "imag", "frequency", "damping", "led_by")
 RANKS = ("place", "states", "controllable", "observable", "growth")
+COEFFICIENTS = ("place", "axis", "s^2", "s", "1", "coupling")
 RESPONSES = ("place", "input", "output", "omega", "magnitude", "phase")
 
 
@@ -60,6 +62,24 @@ def ranks(found: Sequence[Place]) -> pd.DataFrame:
              "observable": observable(place.model), "growth": float(place.model.poles().real.max(initial=-np.inf))}
         )  # fmt: skip
     return pd.DataFrame(rows, columns=list(RANKS))
+
+
+def coefficients(found: Sequence[Place]) -> pd.DataFrame:
+    """The characteristic polynomial s^3 + ... of each axis of a controlled delta robot: one row an axis.
+
+    `coupling` is the largest coefficient by which another axis enters, as a part of the axis's own.
+    """
+    rows = []
+    for place in found:
+        if not (place.controlled and place.model is not None and len(place.model.states) == 9):
+            continue
+        c = characteristic(place.model)
+        own = np.diagonal(c, axis1=1, axis2=2)
+        across = np.abs(c - own[:, None, :] * np.eye(3)).max(axis=2) / np.abs(own)
+        for i, axis in enumerate("xyz"):
+            row = dict(zip(COEFFICIENTS[2:5], own[:, i].tolist(), strict=True))
+            rows.append({"place": place.name, "axis": axis, **row, "coupling": float(across[:, i].max())})
+    return pd.DataFrame(rows, columns=list(COEFFICIENTS))
 
 
 def responses(found: Sequence[Place], omega: ArrayLike) -> pd.DataFrame:

@@ -18,6 +18,7 @@ from crossbody.engines._equations import system_of
 from crossbody.engines._linear import Spot
 from crossbody.reference import System, delta
 from crossbody.reference.delta import scene
+from crossbody.reference.delta.loop import closed_loop
 from crossbody.reference.linear import LinearModel, Trim, linearise, trim
 
 ON = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
@@ -36,6 +37,7 @@ class Place:
         t: time at which what depends on it is frozen, s.
         held: whether the rows that are on are held, instead of following their law.
         powered: whether the case's servos act.
+        controlled: whether the model is that of a feedback loop around the equilibrium, in continuous time.
     """
 
     name: str
@@ -46,10 +48,13 @@ class Place:
     t: float
     held: bool
     powered: bool
+    controlled: bool = False
 
     @property
-    def spot(self) -> Spot:
-        """Where an engine has to linearise."""
+    def spot(self) -> Spot | None:
+        """Where an engine has to linearise; None where there is nothing, or what no engine has."""
+        if self.model is None or self.controlled:
+            return None
         found = self.trim
         rows = tuple(found.active.tolist())
         return Spot(q=found.q, v=found.v, u=found.u, rows=rows, lam=found.lam, t=self.t, powered=self.powered)
@@ -110,7 +115,7 @@ def _ball(case: Case, at: Mapping[str, float]) -> list[Place]:
 
 
 def _delta(case: Case, at: Mapping[str, float]) -> list[Place]:
-    """Held by constant torques; and where its servos end, if they move."""
+    """Held by constant torques; where its servos end, if they move; its feedback loop, if it has a controller."""
     robot = scene.robot_of(case.parameters)
     q = case.q0
     if at:
@@ -124,7 +129,11 @@ def _delta(case: Case, at: Mapping[str, float]) -> list[Place]:
         y = np.full(3, delta.elbow_angle(robot) + case.number("offset"))
         guess = delta.holding_pose(robot, float(y[0]))
         found.append(_place(case, "where the servos end", range(6), q=guess, t=case.t_end))
-    return [_of_flange(robot, place) for place in found]
+    seen = [_of_flange(robot, place) for place in found]
+    if "period" in case.parameters:
+        model = closed_loop(robot, q, scene.controller_of(case.parameters))
+        seen.append(replace(seen[0], name=f"{name}, controlled", model=model, controlled=True))
+    return seen
 
 
 def _of_flange(robot: delta.Robot, place: Place) -> Place:

@@ -26,6 +26,10 @@ ENGINES = columns(
     unexplained=("Unexplained [1]", Kind.NUMBER), limit=("Limit [1]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
     why=("Why", Kind.LONG),
 )  # fmt: skip
+COEFFICIENTS = columns(
+    place="Equilibrium", axis="Axis", **{"s^2": ("s^2 [1/s]", Kind.NUMBER), "s": ("s [1/s^2]", Kind.NUMBER)},
+    **{"1": ("1 [1/s^3]", Kind.NUMBER)}, coupling=("Coupling [1]", Kind.NUMBER),
+)  # fmt: skip
 PREFIX = "analysis-"
 
 
@@ -44,7 +48,10 @@ def sections(out: Path) -> tuple[Section, ...]:
         for name, figure in drawn.items()
         if (out / f"{PREFIX}{name}.json").is_file()
     )
-    shown = (("Linear models", COLUMNS, "ranks"), ("Linear models of engines", ENGINES, "engines"))
+    shown = (
+        ("Linear models", COLUMNS, "ranks"), ("Characteristic polynomials", COEFFICIENTS, "coefficients"),
+        ("Linear models of engines", ENGINES, "engines"),
+    )  # fmt: skip
     tables = tuple(
         Table(title=title, columns=known, rows=records(_rows(out, name)), file=f"{PREFIX}{name}.csv")
         for title, known, name in shown
