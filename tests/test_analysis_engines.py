@@ -103,8 +103,9 @@ def test_what_an_engine_cannot_do_is_a_row_with_its_sentence():
     assert set(skipped.index) == {"pymunk", "nobody"}
     assert "does not linearise" in skipped["pymunk"]
     assert set(poles["engine"]) == {"mujoco"}
-    with pytest.raises(CaseUnsupported, match="soft_delta"):
-        engines.load("mujoco").linearise(cases.load("soft_contact", "delta"), None)
+    for name in work.ENGINES:
+        with pytest.raises(CaseUnsupported, match="sampled"):
+            engines.load(name).linearise(cases.load("ball_maze", "solve", controller="sampled"), None)
 
 
 def test_poles_that_nearly_coincide_are_compared_by_their_mean():

@@ -26,7 +26,7 @@ import mujoco
 import numpy as np
 from scipy.linalg import logm
 
-from crossbody.cases import Case
+from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases._arrays import Floats
 from crossbody.engines._linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
@@ -91,7 +91,10 @@ def _same_coordinates(mechanism: ModuleType, dt: float) -> Callable[[Case, Spot]
     """The matched scene of a mechanism whose coordinates are the case's."""
 
     def stand(case: Case, spot: Spot) -> Stand:
-        scene = mechanism.build(case, "matched", dt)
+        build = getattr(mechanism, "build", None)
+        scene = build(case, "matched", dt) if build else None
+        if scene is None or scene.chart is not None:
+            raise CaseUnsupported(f"MuJoCo's model of {case.mechanism!r} has other coordinates, without a chart here.")
         scene.start()
         scene.data.qpos[:], scene.data.qvel[:] = spot.q, spot.v
         if scene.arm is not None:

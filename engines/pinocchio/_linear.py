@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases import Case
+from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases._arrays import Floats
 from crossbody.engines._linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
@@ -76,10 +76,23 @@ def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, .
         spot: the equilibrium.
     """
     case = in_contact(case)
-    own: Callable[[Case, Spot], Stand] | None = getattr(mechanism, "stand", None)
-    stand = own(case, spot) if own else of_rows(mechanism.build(case, "forwardDynamics").rows, spot)
+    own: Callable[[Case, Spot], Stand] = getattr(mechanism, "stand", None) or _same_coordinates(mechanism)
+    stand = own(case, spot)
     right = _by_rnea(stand) if spot.rows else _by_aba(stand)
     return tuple(stand.chart.tangent(way) for way in (right, *stand.more(stand, right.slope)))
+
+
+def _same_coordinates(mechanism: ModuleType) -> Callable[[Case, Spot], Stand]:
+    """The stand of a mechanism whose coordinates are the case's."""
+
+    def stand(case: Case, spot: Spot) -> Stand:
+        build = getattr(mechanism, "build", None)
+        scene = build(case, "forwardDynamics") if build else None
+        if scene is None or scene.chart is not None:
+            raise CaseUnsupported(f"Pinocchio's model of {case.mechanism!r} has other coordinates, no chart here.")
+        return of_rows(scene.rows, spot)
+
+    return stand
 
 
 def of_rows(rows: PinRows, spot: Spot, more: tuple[float, ...] = (), rates: tuple[float, ...] = ()) -> Stand:
