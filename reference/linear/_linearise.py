@@ -20,7 +20,7 @@ OUTPUTS = ("q", "v", "gap", "lam")
 def linearise(
     system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
     active: Sequence[int] | None = None, *, outputs: Sequence[str] = OUTPUTS, reduce: bool = False,
-    names: Sequence[str] | None = None, t: float = 0.0,
+    names: Sequence[str] | None = None, t: float = 0.0, colliding: Sequence[int] = (),
 ) -> LinearModel:  # fmt: skip
     """First-order model dx' = A dx + B du, dy = C dx + D du of v' = M^-1 (f + H_A^T lam) about a state, lam eliminated.
 
@@ -39,6 +39,7 @@ def linearise(
             without the law's own poles (Baumgarte's double pole of a closed loop, say).
         names: of the coordinates (n,); "q[0]", ... if not given.
         t: time, s.
+        colliding: active rows that follow their fast constants (COLLISION).
 
     Returns:
         x = (q, v), or the part of it that remains; inputs "u[0]", ...; a velocity is named as its coordinate, primed.
@@ -48,7 +49,7 @@ def linearise(
             that move.
         UnknownName: for another output.
     """
-    at = point(system, q, v, u, active, t)
+    at = point(system, q, v, u, active, t, colliding)
     found = derivatives(at)
     n, nu = system.n, system.inputs
     chosen = tuple(f"q[{i}]" for i in range(n)) if names is None else tuple(names)
@@ -64,20 +65,26 @@ def linearise(
 
 
 def point(
-    system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None, active: Sequence[int] | None, t: float
-) -> Point:
+    system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None, active: Sequence[int] | None, t: float,
+    colliding: Sequence[int] = (),
+) -> Point:  # fmt: skip
     """Where to linearise, checked.
 
     Raises:
-        SceneError: for a state of another shape, or rows that do not exist.
+        SceneError: for a state of another shape, rows that do not exist, or rows that collide without being on.
     """
     rows = np.flatnonzero(np.asarray(system.unilateral) == 0) if active is None else np.asarray(active, dtype=np.int64)
     if np.any(rows < 0) or np.any(rows >= system.nc) or len(np.unique(rows)) != len(rows):
         raise SceneError(f"linearise.active is {rows.tolist()}; valid: different rows below {system.nc}.")
+    if not set(colliding) <= set(rows.tolist()):
+        raise SceneError(f"linearise.colliding is {list(colliding)}; valid: rows of those on, {rows.tolist()}.")
+    alpha = np.array(system.alpha)
+    alpha[list(colliding)] = system.beta[list(colliding)]
     inputs: Floats = np.array(frozen("linearise", "u", np.zeros(system.inputs) if u is None else u, (system.inputs,)))
     return Point(
         system=system, t=t, q=system.checked_state("q", q),
         v=system.checked_state("v", np.zeros(system.n) if v is None else v), u=inputs, active=rows.astype(np.int64),
+        alpha=alpha if len(colliding) else None,
     )  # fmt: skip
 
 
