@@ -18,7 +18,7 @@ from crossbody.reports.pages.results import CaseFiles, Results
 from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.runs.store import Trace
 
-PLOTTED = 700_000
+PLOTTED = 900_000
 """Room for all plots of a page, bytes; the samples of each line follow from it."""
 RUNS = columns(
     who="Engine", outcome="Outcome", steps=("Steps [1]", Kind.NUMBER), events=("Transitions [1]", Kind.NUMBER),

@@ -17,11 +17,13 @@ from crossbody.reports.pages.styles import COLOURS, DASHES, TRUTH, label, style
 from crossbody.reports.pages.thin import POINTS
 from crossbody.reports.runs.store import Trace
 
-SAMPLE = 15
+SAMPLE = 16
 """Room of one sample of one line on a page, bytes (time and value as base64)."""
 FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
+MATCHED = 1e-7
+"""Of the horizon: instants that are no further apart are those of one event."""
 ROUNDING = 1e-17
 """Depth below which there is none, m."""
 
@@ -79,9 +81,12 @@ def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
 def impulse(run: Trajectory, events: Sequence[Event]) -> Floats:
     """INT lam dt of a motion (n, nc) with the impulses of collisions that took no time, N s."""
     total = cumulative(run)
+    near = MATCHED * float(run.t[-1]) if len(run.t) else 0.0
     for event in events:
-        if event.impulse:
-            total[run.t >= event.t, event.contact] += event.impulse
+        if event.impulse:  # of two samples at that instant the second is behind the step
+            last = int(np.searchsorted(run.t, event.t + near, side="right")) - 1
+            behind = last if last >= 0 and run.t[last] >= event.t - near else last + 1
+            total[behind:, event.contact] += event.impulse
     return total
 
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.reports.pages.styles import TRUTH, label, style
-from crossbody.reports.pages.thin import keep
+from crossbody.reports.pages.thin import AROUND, keep
 from crossbody.reports.runs.store import Trace
 
 FINE = 2e-5
 """Distance of samples over the horizon below which times are written in double precision."""
-EVENTS = 40
-"""Events around which all samples stay: the first of them where there are very many."""
+EVENTS, SHARE = 40, 0.4
+"""Events around which all samples stay, the first of them where there are very many, and their share of a line."""
 TOP, BOTTOM, PLOT, CLOSE, APART = 34, 50, 128, 16, 46
 """Above and below the plots of a figure, a plot, between plots of one group, between groups (with times), pixels."""
 
@@ -27,7 +27,7 @@ class Sheet:
     Args:
         rows: title of every plot's y axis, with its unit.
         title: of the figure.
-        points: samples a line, besides those around events.
+        points: samples a line.
         group: so many plots belong together: the last of them carries the times.
     """
 
@@ -45,7 +45,9 @@ class Sheet:
         t = trace.run.t if t is None else t
         if not len(t) or not np.isfinite(y).any():
             return
-        at = keep(t, y, np.unique([e.t for e in trace.run.events])[:EVENTS], self.points)
+        most = int(np.clip(SHARE * self.points / AROUND, 3, EVENTS))
+        events = np.unique([e.t for e in trace.run.events])[:most]
+        at = keep(t, y, events, self.points - AROUND * len(events))
         look = style(trace, i)
         line = {
             "type": "scatter", "x": coded(_times(t[at])), "y": coded(y[at].astype(np.float32)),

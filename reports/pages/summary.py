@@ -29,7 +29,7 @@ BENCH = (
     "accurate, median over the cases that were timed."
 )
 COLUMNS = columns(
-    worst=("Worst", Kind.VERDICT), who="Engine", within=("Cases trusted", Kind.NUMBER),
+    who="Engine", worst=("Worst", Kind.VERDICT), within=("Cases trusted", Kind.NUMBER),
     expected=("with known deviations", Kind.NUMBER), outside=("outside", Kind.NUMBER),
     skipped=("not run", Kind.NUMBER), error=("Error, median [1]", Kind.NUMBER), most=("Error, worst [1]", Kind.NUMBER),
     cost=("Run time over the reference's, median [1]", Kind.NUMBER),

@@ -9,7 +9,8 @@ from tsdownsample import MinMaxLTTBDownsampler
 from crossbody.cases._arrays import Floats
 
 POINTS = 1500
-AROUND = 5
+BEFORE, AROUND = 5, 12
+"""Samples that stay before an event, and in all."""
 
 
 def keep(t: Floats, y: Floats, events: Floats, points: int = POINTS) -> NDArray[np.intp]:
@@ -24,6 +25,6 @@ def keep(t: Floats, y: Floats, events: Floats, points: int = POINTS) -> NDArray[
     if len(t) <= points:
         return np.arange(len(t))
     chosen = MinMaxLTTBDownsampler().downsample(t, np.nan_to_num(y), n_out=points).astype(np.intp)
-    near = np.searchsorted(t, events)[:, None] + np.arange(-AROUND, AROUND + 2)
+    near = np.searchsorted(t, events)[:, None] + np.arange(-BEFORE, AROUND - BEFORE)
     kept: NDArray[np.intp] = np.unique(np.concatenate([chosen, near.ravel(), [0, len(t) - 1]]))
     return kept[(kept >= 0) & (kept < len(t))]

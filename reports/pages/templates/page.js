@@ -114,10 +114,23 @@ const crossbody = (() => {
     });
     table.closest(".scroll").after(button);
   });
-  let opened = [];
+})();
+
+(() => {
+  // On paper: light, every table open.
+  const root = document.documentElement;
+  let [kept, opened] = ["", []];
   addEventListener("beforeprint", () => {
-    opened = [...document.querySelectorAll("details:not([open])")];
+    kept = root.dataset.theme;
+    root.dataset.theme = "light";
+    opened = [...document.querySelectorAll("details.table:not([open])")];
     opened.forEach((each) => { each.open = true; });
+    crossbody.tell("theme");
   });
-  addEventListener("afterprint", () => opened.forEach((each) => { each.open = false; }));
+  addEventListener("afterprint", () => {
+    if (kept) root.dataset.theme = kept;
+    else delete root.dataset.theme;
+    opened.forEach((each) => { each.open = false; });
+    crossbody.tell("theme");
+  });
 })();

@@ -281,7 +281,8 @@
       });
     }
     crossbody.on("time", (t, from) => { if (from !== root && root.closest("[data-page]").contains(from)) seek(t, false); });
-    for (const what of ["engines", "theme", "page"]) crossbody.on(what, redraw);
+    for (const what of ["engines", "page"]) crossbody.on(what, redraw);
+    crossbody.on("theme", draw); // at once: a print does not wait for a frame
     new ResizeObserver(redraw).observe(canvas);
     redraw();
   };

@@ -1,5 +1,6 @@
 // Plots: drawn when they come near the screen, coloured by the theme, one cursor and one zoom over those that share time.
 (() => {
+  const PAPER = 680; // width of a plot in print, pixels
   const charts = new Map();
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const axes = (layout) => Object.keys(layout).filter((key) => /^[xy]axis\d*$/.test(key));
@@ -83,7 +84,12 @@
     }
   }, { rootMargin: "500px" });
   document.querySelectorAll(".plot").forEach((box) => watch.observe(box));
-  addEventListener("beforeprint", () => document.querySelectorAll(".plot").forEach(draw));
+  const sized = (size) => charts.forEach((_, box) => Plotly.relayout(box, size));
+  addEventListener("beforeprint", () => {
+    document.querySelectorAll(".plot").forEach(draw);
+    sized({ width: PAPER, autosize: false });
+  });
+  addEventListener("afterprint", () => sized({ width: null, autosize: true }));
   crossbody.on("theme", () => charts.forEach((_, box) => Plotly.relayout(box, scheme(box.layout))));
   crossbody.on("engines", () => charts.forEach((_, box) => Plotly.restyle(box, { visible: visible(box.data) })));
   let clock = null;
