@@ -24,6 +24,7 @@ from crossbody.reference.linear import (
 )
 from crossbody.reference.sundials.equations import Equations
 from crossbody.reports.analysis import places as analyse
+from crossbody.reports.analysis.loci import Family, limits
 
 RNG = np.random.default_rng(27)
 
@@ -271,6 +272,18 @@ def test_branches_of_a_locus_do_not_jump():
     assert np.abs(np.diff(found.poles, axis=0)).max() < 0.15
     with pytest.raises(InvalidValue, match="empty"):
         locus(lambda k: None, [])
+
+
+def test_where_a_gain_makes_an_equilibrium_unstable():
+    """A single finger from 5.95 (m/s)/N on, at 724 rad/s; two fingers never. The poles there stand on the axis."""
+    family = Family("soft_contact", "axis", {}, {}, "kstar")
+    rows = limits(family, [500.0, 650.0, 800.0]).set_index("place")
+    assert set(rows.index) == {"left finger", "right finger"}
+    np.testing.assert_allclose(rows["value"], 595.4, atol=0.1)
+    assert set(rows["unstable"]) == {"above"}
+    poles = family.model(1, float(rows.loc["left finger", "value"])).poles()
+    crossing = poles[np.argmin(np.abs(poles - 1j * rows.loc["left finger", "frequency"]))]
+    assert abs(crossing.real) < 1e-6 * abs(crossing)
 
 
 def test_the_models_are_read_by_scipy_and_by_python_control():

@@ -14,6 +14,7 @@ from crossbody.cases import InvalidValue
 from crossbody.reports import voice
 from crossbody.reports.analysis import numbers as work
 from crossbody.reports.analysis.counterparts import counterparts
+from crossbody.reports.analysis.loci import Family, limits, root_locus
 from crossbody.reports.analysis.places import places
 from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.pages import site as page
@@ -99,7 +100,8 @@ def analyse(
         tables["responses"] = rows
     if locus:
         parameter, values = parse_range(locus)
-        tables["locus"] = work.root_locus(name, variant, overrides, place, parameter, values)
+        family = Family(name, variant, overrides, place, parameter)
+        tables["locus"], tables["limits"] = root_locus(family, values), limits(family, values)
     if mapped:
         tables["map"] = work.workspace(case)
     if out is not None:
@@ -126,8 +128,8 @@ def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
     from rich.console import Console
 
     console = Console()
-    for key in ("equilibria", "poles", "ranks", "coefficients"):
-        if key not in tables:
+    for key in ("equilibria", "poles", "ranks", "coefficients", "limits"):
+        if not len(tables.get(key, ())):
             continue
         console.print(_printed(f"{label}: {key}", tables[key].head(SHOWN), digits=6))
         if len(tables[key]) > SHOWN:

@@ -1,20 +1,19 @@
-"""What an analysis shows of equilibria: trim, poles, ranks, responses, loci, and a map of the workspace (spec 2.7)."""
+"""What an analysis shows of equilibria: trim, poles, ranks, responses, and a map of the workspace (spec 2.7)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from crossbody import cases
-from crossbody.cases import Case, CaseUnsupported, InvalidValue, Value
+from crossbody.cases import Case, CaseUnsupported
 from crossbody.reference import delta
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.loop import characteristic
-from crossbody.reference.linear import LinearModel, controllable, locus, modes, observable, poses
-from crossbody.reports.analysis.places import Place, places
+from crossbody.reference.linear import controllable, modes, observable, poses
+from crossbody.reports.analysis.places import Place
 
 EQUILIBRIA = ("place", "outcome", "variable", "value")
 POLES = ("place", "real", "imag", "frequency", "damping", "led_by")
@@ -96,32 +95,6 @@ def responses(found: Sequence[Place], omega: ArrayLike) -> pd.DataFrame:
                 row = {"place": place.name, "input": source, "output": sink, "omega": w}
                 parts.append(pd.DataFrame({**row, "magnitude": np.abs(one), "phase": phase}))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(RESPONSES))
-
-
-def root_locus(
-    name: str, variant: str | None, overrides: Mapping[str, Value], at: Mapping[str, float], parameter: str,
-    values: Sequence[float],
-) -> pd.DataFrame:  # fmt: skip
-    """Poles of every place over a parameter of the case: columns place, parameter, value, branch, real, imag.
-
-    Raises:
-        InvalidValue: where a place has no equilibrium at some value.
-    """
-    first, parts = places(cases.load(name, variant, **{**overrides, parameter: values[0]}), at), []
-    for k, place in enumerate(first):
-
-        def model(value: float, k: int = k) -> LinearModel:
-            found = places(cases.load(name, variant, **{**overrides, parameter: value}), at)[k].model
-            if found is None:
-                raise InvalidValue(f"There is no equilibrium {first[k].name!r} at {parameter} = {value:g}.")
-            return found
-
-        found = locus(model, values)
-        for branch in range(found.poles.shape[1]):
-            line = found.poles[:, branch]
-            head = {"place": place.name, "parameter": parameter, "value": found.values, "branch": branch}
-            parts.append(pd.DataFrame({**head, "real": line.real, "imag": line.imag}))
-    return pd.concat(parts, ignore_index=True)
 
 
 def workspace(

@@ -30,6 +30,10 @@ COEFFICIENTS = columns(
     place="Equilibrium", axis="Axis", **{"s^2": ("s^2 [1/s]", Kind.NUMBER), "s": ("s [1/s^2]", Kind.NUMBER)},
     **{"1": ("1 [1/s^3]", Kind.NUMBER)}, coupling=("Coupling [1]", Kind.NUMBER),
 )  # fmt: skip
+LIMITS = columns(
+    place="Equilibrium", parameter="Parameter", value=("Limit of stability", Kind.NUMBER), unstable="Unstable",
+    frequency=("Frequency [rad/s]", Kind.NUMBER),
+)  # fmt: skip
 PREFIX = "analysis-"
 
 
@@ -50,7 +54,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     )
     shown = (
         ("Linear models", COLUMNS, "ranks"), ("Characteristic polynomials", COEFFICIENTS, "coefficients"),
-        ("Linear models of engines", ENGINES, "engines"),
+        ("Limits of stability", LIMITS, "limits"), ("Linear models of engines", ENGINES, "engines"),
     )  # fmt: skip
     tables = tuple(
         Table(title=title, columns=known, rows=records(_rows(out, name)), file=f"{PREFIX}{name}.csv")
