@@ -290,7 +290,11 @@ def test_the_models_are_read_by_scipy_and_by_python_control():
     found = model([[0.0, 1.0], [-1.0, -0.3]], [[0.0], [1.0]], [[1.0, 0.0]])
     np.testing.assert_array_equal(found.state_space().A, found.A)
     control = pytest.importorskip("control")
-    np.testing.assert_allclose(control.poles(found.control()), found.poles())
+    read = found.control()
+    assert (read.state_labels, read.input_labels, read.output_labels) == (["x0", "x1"], ["u0"], ["y0"])
+    np.testing.assert_allclose(control.poles(read), found.poles())
+    omega = np.array([0.3, 1.0, 30.0])
+    np.testing.assert_allclose(np.squeeze(read(1j * omega)), found.response(omega)[:, 0, 0])
 
 
 @pytest.mark.parametrize(
