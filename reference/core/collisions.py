@@ -38,6 +38,7 @@ from crossbody.reference.core.machine import DEEP, slow
 
 TIE = 1e-12  # rates closer than this are the same: the first row is struck first
 PULL = 1e-12  # part of the struck row's impulse below which a held row's is rounding
+STILL = 1e-15  # part of the largest rate seen: a rate below it is 0 but for rounding
 CEILING = 64  # collisions at one instant, times the square of the number of rows: more never end
 NOT, BOUNCES, STAYS = np.arange(3)  # how a row takes part: not, struck, or touching at rest
 
@@ -192,6 +193,39 @@ def _one(K: Any, s: Any, m: Model, w: Work, b: Buffers, known: bool) -> int:
     return 0
 
 
+@compiled
+def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Give rows that touch and whose gap stands still the rate 0, which they have but for `slow`.
+
+    Collisions that come ever faster (inelastic collapse) end there. The gaps would drift apart by more than rounding,
+    and the next impulse would cross the row in the order of these gaps instead of that of the rates.
+    """
+    n, still = s.n, False
+    for i in range(s.nc):
+        w.struck[i] = NOT
+        if STILL * s.speed < abs(w.rate[i]) <= slow(s) and _touches(s, m, w, b, i):
+            w.struck[i] = STAYS
+            still = True
+    if not still:
+        return 0
+    activate(s, m, w, b.mode)
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:n], w.y[n:], GENERAL) != 0:
+        return ILL_POSED
+    if n == 1:
+        w.L[0, 0] = np.sqrt(w.M[0, 0])
+    _list_rows(s, m, w, b)
+    if assemble(K.rows, s, m, w, s.t, w.y[:n], w.y[n:]) != 0:
+        return ILL_POSED
+    for j in range(s.na):
+        w.r[j], w.ha[j] = 0.0, -1.0
+        if w.struck[w.idx[j]] == STAYS:
+            w.r[j] = -w.hda[j]
+    solve_schur(w.G, s.na, w.reach, w.r, w.la)
+    _apply(s, m, w, b)
+    K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+    return 0
+
+
 @inlined
 def _name_touching(s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Mark the rows that collide for ever, for the message."""
@@ -223,4 +257,4 @@ def collide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         s.collisions_now += 1
         s.collisions += 1
         K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
-    return 0
+    return int(_stand_still(K, s, m, w, b)) if s.collisions_now > 0 else 0

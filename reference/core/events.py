@@ -49,6 +49,8 @@ from crossbody.reference.core.layout import (
 from crossbody.reference.core.machine import active_mode, released_mode, slow
 
 NEAR = 0.25  # of the range in the step: seen at twelve stages, a value does not come from farther to zero
+DIPS = 12  # parabolas that close in a minimum
+SHARP = 1e-7  # part of the step within which a minimum is known: its value is then known to rounding
 
 
 @inlined
@@ -129,26 +131,61 @@ def _by_nodes(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int)
 
 @inlined
 def _release(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
-    """First loss of pressure of an active row; a dip between nodes is looked for at its parabola's vertex."""
+    """First loss of pressure of an active row, in a dip between nodes too."""
     dead = dead_band(s, w, i)
     for node in range(NODES - 1):
         a, b = _place(node), _place(node + 1)
         la, lb = max(w.lams[node, i] + dead, 1e-300), w.lams[node + 1, i] + dead
         if not lb >= 0.0:
             return root(K, s, m, w, mode, RELEASE, i, a, la, b, lb)
-        if node + 2 < NODES and lb < la and lb < w.lams[node + 2, i] + dead:
-            dip = _vertex(b, b - a, la, lb, w.lams[node + 2, i] + dead)
-            value = guard(K, s, m, w, mode, RELEASE, i, dip)
+        if node + 2 < NODES:
+            place, value = _dip(K, s, m, w, mode, RELEASE, i, node, la, lb, w.lams[node + 2, i] + dead)
             if value < 0.0:
-                left, g_left = (a, la) if dip <= b else (b, max(lb, 1e-300))
-                return root(K, s, m, w, mode, RELEASE, i, left, g_left, dip, value)
+                left, g_left = (a, la) if place <= b else (b, max(lb, 1e-300))
+                return root(K, s, m, w, mode, RELEASE, i, left, g_left, place, value)
     return NEVER
 
 
+@compiled
+def _dip(
+    K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, node: int, f0: float, f1: float, f2: float
+) -> tuple[float, float]:
+    """A place between this node and the next but one where a guard is below zero; (NEVER, 1) if there is none.
+
+    The guard's minimum is closed in by parabolas, each through the least value found and the two beside it: a dip of a
+    millionth of what the guard varies by is enough to switch. That is done only where the first comes near to zero.
+    """
+    x0, x1, x2 = _place(node), _place(node + 1), _place(node + 2)
+    bend = f0 - 2.0 * f1 + f2
+    if not bend > 0.0 or f1 - (f0 - f2) ** 2 / (8.0 * bend) > NEAR * max(f0, f2):
+        return NEVER, 1.0
+    x = x1 + 0.5 * (x1 - x0) * (f0 - f2) / bend
+    for _ in range(DIPS):
+        if not (x0 < x < x2) or abs(x - x1) < SHARP:
+            break
+        f = guard(K, s, m, w, mode, kind, i, x)
+        if f < 0.0:
+            return x, f
+        if f < f1:
+            if x < x1:
+                x1, f1, x2, f2 = x, f, x1, f1
+            else:
+                x0, f0, x1, f1 = x1, f1, x, f
+        elif x < x1:
+            x0, f0 = x, f
+        else:
+            x2, f2 = x, f
+        x = _vertex(x0, f0, x1, f1, x2, f2)
+    return NEVER, 1.0
+
+
 @inlined
-def _vertex(x: float, step: float, left: float, middle: float, right: float) -> float:
-    """Lowest point of the parabola through three equidistant values of which the middle one is least."""
-    return x + 0.5 * step * (left - right) / (left - 2.0 * middle + right)
+def _vertex(x0: float, f0: float, x1: float, f1: float, x2: float, f2: float) -> float:
+    """Where the parabola through three points has its extremum; NEVER if they stand on a line."""
+    left, right = (x1 - x0) * (f1 - f2), (x1 - x2) * (f1 - f0)
+    if left == right:
+        return NEVER
+    return x1 - 0.5 * ((x1 - x0) * left - (x1 - x2) * right) / (left - right)
 
 
 @inlined
@@ -262,11 +299,11 @@ def _first_switch(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> flo
         ga, gb = w.guards[node, i], w.guards[node + 1, i]
         if ga > 0.0 and not gb > 0.0:
             return root(K, s, m, w, mode, SWITCH, i, a, ga, b, gb)
-        if node + 2 < NODES and 0.0 < gb < ga and gb < w.guards[node + 2, i]:
-            dip = _vertex(b, b - a, ga, gb, w.guards[node + 2, i])
-            value = guard(K, s, m, w, mode, SWITCH, i, dip)
-            if not value > 0.0:
-                return root(K, s, m, w, mode, SWITCH, i, min(a, dip), ga, dip, value)
+        if node + 2 < NODES and ga > 0.0 and gb > 0.0:
+            place, value = _dip(K, s, m, w, mode, SWITCH, i, node, ga, gb, w.guards[node + 2, i])
+            if value < 0.0:
+                left, g_left = (a, ga) if place <= b else (b, gb)
+                return root(K, s, m, w, mode, SWITCH, i, left, g_left, place, value)
     return NEVER
 
 
