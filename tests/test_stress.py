@@ -61,6 +61,7 @@ def test_an_axis_stays_inside_and_reaches_both_ends(axis: Any) -> None:
         (lambda: replace(FAMILY, grid={"a0": Levels((1.0,))}), "a0 is asked for twice"),
         (lambda: replace(FAMILY, fixed={"mass": 1.0}), "mass is asked for twice"),
         (lambda: Family(case="bouncing_ball", variant="linear"), "needs an axis"),
+        (lambda: replace(FAMILY, share=0), "share is 0"),
         (lambda: Suite(families=()), "at least one family"),
         (lambda: Suite(families=(FAMILY,), runs=0), "one run"),
         (lambda: drawn(runs=0), "at least 1"),
@@ -133,6 +134,16 @@ def test_the_longer_sweep_begins_with_the_shorter_one_and_engines_share_draws() 
     both = drawn(FAMILY, 5, 0, REFERENCE, Pick(engine="mujoco", profile="matched"))
     assert [s.parameters for s in both[:5]] == [s.parameters for s in both[5:]] == [s.parameters for s in short]
     assert [s.parameters for s in drawn(seed=1)] != [s.parameters for s in drawn(seed=0)]
+
+
+def test_families_share_the_runs_of_their_suite_and_other_engines_make_few() -> None:
+    suite = Suite(families=(FAMILY, replace(FAMILY, share=3)))
+    picks = (REFERENCE, Pick(engine="mujoco", profile="matched"))
+    specs = draw.specs([("one", suite)], {"one": picks}, 2000, 0, share=True)
+    counts = {(s.engine, s.draw // 1_000_000): 0 for s in specs}
+    for s in specs:
+        counts[s.engine, s.draw // 1_000_000] += 1
+    assert counts == {("reference", 0): 500, ("reference", 1): 1500, ("mujoco", 0): 3, ("mujoco", 1): 4}
 
 
 def test_a_grid_is_whole_once_and_its_first_part_is_spread() -> None:
@@ -239,6 +250,58 @@ def test_the_error_of_a_wrong_run_is_seen(fake: Callable[..., Spec]) -> None:
     missing = execute(fake(lambda: exact(events=())))
     assert "-1 contacts" in missing["why"] or "-2 contacts" in missing["why"]
     assert missing["error"] < 1e-13
+
+
+def test_a_truth_is_asked_for_no_longer_than_it_is_sharper_than_the_tolerance(
+    fake: Callable[..., Spec], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A truth whose neighbours part early excuses what comes after, and nothing before; a sharp one excuses nothing."""
+    half = 0.3
+
+    def late() -> Trajectory:
+        run = exact()
+        return replace(run, q=np.where(run.t[:, None] > half, 2.0, 1.0) * run.q)
+
+    assert execute(fake(late))["error"] > 0.1
+    real = cases.load("bouncing_ball", "linear", **drawn()[0].parameters)
+
+    def moved(times: Any) -> Trajectory:
+        run = real.closed_form(times)  # type: ignore[misc]
+        return replace(run, q=np.where(run.t[:, None] > half, 3.0, 1.0) * run.q)
+
+    monkeypatch.setattr("crossbody.reports.sweep.execute._beside", lambda *_: replace(real, closed_form=moved))
+    row = execute(fake(late))
+    assert row["error"] < 1e-13
+    assert half < row["until"] < half + 0.02
+    assert "diverges" in row["why"]
+    early = execute(fake(lambda: exact(q=1.01 * exact().q)))
+    assert early["error"] == pytest.approx(0.01, rel=0.05)
+
+
+@pytest.mark.parametrize("near", [1.0 - 1e-6, 1.0 + 1e-6, 1.0 + 1e-8])
+@pytest.mark.parametrize("a0", [2.1e4, 6.5e4, 1e8])
+def test_a_ball_a_millionth_above_its_threshold_leaves_and_one_below_stays(a0: float, near: float) -> None:
+    """The contact force dips below 0 by a millionth of the weight, between two steps' nodes."""
+    from crossbody.cases import _closed_forms as cf
+
+    a1 = 0.8 * math.sqrt(a0)
+    speed = near * cf.threshold_speed(a0, a1, 9.81)
+    fixed = {"height": 0.0, "t_end": 0.5, "a0": a0, "a1": a1, "speed": speed}
+    row = execute(replace(drawn()[0], parameters=fixed))
+    assert row["verdict"] == "within", row["why"]
+    assert (row["events"] > 1) == (near > 1.0)
+
+
+@pytest.mark.parametrize(("n", "lifted", "zeta"), [(5, 2, 0.8), (8, 3, 0.8), (12, 6, 0.28)])
+def test_a_row_that_has_collapsed_passes_an_impulse_on_as_one_that_touches(n: int, lifted: int, zeta: float) -> None:
+    """Inelastic collapse: endless collisions in a finite time, then the next strike on what stands together."""
+    case = cases.load("newtons_cradle", "sliders", n=n, lifted=lifted, zeta=zeta, gap=1e-3)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    assert case.closed_form is not None
+    truth = case.closed_form(run.t)
+    assert np.max(np.abs(run.q - truth.q)) < 1e-9 * np.max(np.abs(truth.q))
+    assert np.max(np.abs(run.v[-1] - truth.v[-1])) < 1e-9
+    assert run.v[-1].sum() == pytest.approx(lifted, rel=1e-12)  # momentum: equal masses, 1 m/s
 
 
 @pytest.mark.parametrize("spec", drawn(), ids=str)

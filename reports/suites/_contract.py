@@ -37,6 +37,10 @@ class Ladder:
                 raise InvalidValue(f"Ladder.{name} is {rungs}; it must fall, and stay above 0.")
 
 
+TIGHT = Ladder(rtol=(1e-12,), dt=(1e-4,))
+"""For scenes that multiply errors: asked for 1e-12, an error of 1e-6 is within reach where 1e-9 would not do."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
     """Scenes of one case.
@@ -56,6 +60,7 @@ class Family:
         ends: the end state alone is asked for: the reference runs them in threads, without a record and energy account.
         max_steps: bound on the steps of a run.
         time_limit: bound on its wall time, s.
+        share: how many of the suite's runs for one of a family with share 1: cheap scenes more.
     """
 
     case: str
@@ -71,13 +76,17 @@ class Family:
     ends: bool = False
     max_steps: int = 50_000
     time_limit: float = 10.0
+    share: int = 1
 
     def __post_init__(self) -> None:
         """Check that every name has one source.
 
         Raises:
-            InvalidValue: for a name that is drawn, fixed or in the grid twice, or a family with neither axes nor grid.
+            InvalidValue: for a name that is drawn, fixed or in the grid twice; for neither axes nor grid; for a share
+                below 1.
         """
+        if self.share < 1:
+            raise InvalidValue(f"{self.case}:{self.variant}: share is {self.share}; valid: 1 and more.")
         sources: list[Mapping[str, object]] = [self.axes, self.grid, self.fixed]
         for i, one in enumerate(sources):
             for other in sources[i + 1 :]:
@@ -103,7 +112,7 @@ class Suite:
     """Families that stress one thing.
 
     Attributes:
-        families: they share the runs evenly.
+        families: they share the runs, each by its own `share`.
         engines: what runs it unless the user says otherwise; the first makes every run, the others a share.
         runs: of the first engine if nothing is said; also its share in a number for several suites: cheap scenes more.
     """

@@ -16,5 +16,5 @@ SUITE = Suite(
             },
         ),
     ),
-    runs=100,
+    runs=120,
 )  # fmt: skip

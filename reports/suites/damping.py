@@ -24,5 +24,5 @@ SUITE = Suite(
             axes=_LAW, grid={"zeta": Levels((0.0, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 2.0))},
         ),
     ),
-    runs=1500,
+    runs=1400,
 )  # fmt: skip

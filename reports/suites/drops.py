@@ -17,14 +17,14 @@ SUITE = Suite(
             fixed={"t_end": 1.0}, max_steps=500_000,
         ),
         Family(
-            case="bouncing_ball", variant="linear", scene=damped, ends=True,
+            case="bouncing_ball", variant="linear", scene=damped, ends=True, share=12,
             axes={"a0": Log(1.0, 1e12), "zeta": Linear(0.5, 10.0), "mass": Log(1e-6, 1e6), "speed": Log(1e-6, 1e3)},
             grid={"gravity": Levels((9.81,)), "height": Levels((0.0, 0.1))}, fixed={"t_end": 1.0},
         ),
         Family(
-            case="bouncing_ball", variant="linear", scene=damped, fixed={"t_end": 0.5},
+            case="bouncing_ball", variant="linear", scene=damped, fixed={"t_end": 0.5}, share=12,
             axes={"a0": Log(1.0, 1e12), "zeta": Linear(0.0, 2.0), "height": Linear(-0.1, 0.0), "speed": Linear(-1, 1)},
         ),
     ),
-    runs=600,
+    runs=500,
 )  # fmt: skip

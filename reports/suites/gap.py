@@ -22,5 +22,5 @@ SUITE = Suite(
             axes={"n": Whole(2, 5), "gap": Log(1e-6, 1e-1), "angle": Linear(-1.0, -0.01)},
         ),
     ),
-    runs=210,
+    runs=160,
 )  # fmt: skip

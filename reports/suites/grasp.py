@@ -15,5 +15,5 @@ SUITE = Suite(
             },
         ),
     ),
-    runs=20,
+    runs=16,
 )  # fmt: skip

@@ -27,5 +27,5 @@ SUITE = Suite(
             axes={"impulse": Log(1e-6, 1e4)}, grid={"z": Levels((0.5, 0.6, 0.7))}, finishes=False,
         ),
     ),
-    runs=60,
+    runs=12,
 )  # fmt: skip

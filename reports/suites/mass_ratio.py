@@ -6,10 +6,11 @@ from crossbody.reports.suites._axis import Levels, Linear, Log, Whole
 from crossbody.reports.suites._contract import Family, Suite
 from crossbody.reports.suites._scenes import uneven
 
+# A light ball between heavy ones collides about pi sqrt(ratio) times: a bound on steps is met, not missed, by 1e12.
 SUITE = Suite(
     families=(
         Family(
-            case="newtons_cradle", variant="sliders", scene=uneven,
+            case="newtons_cradle", variant="sliders", scene=uneven, finishes=False,
             axes={"n": Whole(2, 4), "ratio": Log(1.0, 1e12), "speed": Log(1e-6, 1e3)},
             grid={"collisions": Levels(("sequential", "simultaneous")), "gap": Levels((0.0, 1e-3))},
         ),

@@ -19,5 +19,5 @@ SUITE = Suite(
         ),
         Family(case="red_body", variant="frozen", axes={**_FALL, **_RATIOS}, finishes=False),
     ),
-    runs=80,
+    runs=120,
 )  # fmt: skip

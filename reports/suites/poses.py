@@ -48,5 +48,5 @@ SUITE = Suite(
             axes={"x": Linear(-0.4, 0.4), "y": Linear(-0.4, 0.4), "z": Linear(0.1, 0.9)},
         ),
     ),
-    runs=60,
+    runs=80,
 )  # fmt: skip

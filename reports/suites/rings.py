@@ -28,5 +28,5 @@ SUITE = Suite(
             axes={"angle": Linear(-0.4, 0.4), "wn": Log(5.0, 200.0), "pole": Log(1.0, 20.0)},
         ),
     ),
-    runs=40,
+    runs=30,
 )  # fmt: skip

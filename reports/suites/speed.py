@@ -36,5 +36,5 @@ SUITE = Suite(
             axes={"speed": Log(1e-6, 1e3), "a0": Log(1.0, 1e12), "zeta": Linear(0.0, 2.0)},
         ),
     ),
-    runs=480,
+    runs=560,
 )  # fmt: skip

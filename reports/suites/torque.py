@@ -20,5 +20,5 @@ SUITE = Suite(
             axes={"radius": Linear(0.01, 0.15), "frequency": Log(0.1, 20.0), "limit": Log(1e-2, 1e2)},
         ),
     ),
-    runs=45,
+    runs=12,
 )  # fmt: skip

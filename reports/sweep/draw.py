@@ -20,8 +20,9 @@ from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.suites._contract import Family, Suite
 from crossbody.reports.sweep.spec import Spec
 
-SHARE = 20
-"""One run of another engine beside so many of the first, where the user names no engine."""
+SHARE = 400
+LEAST = 3
+"""One run of another engine beside so many of the first, and at least so many, where the user names no engine."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,9 +120,9 @@ def specs(
     whole = sum(suite.runs for _, suite in suites)
     for name, suite in suites:
         own = suite.runs if runs is None else -(-runs * suite.runs // whole)
-        each = -(-own // len(suite.families))
+        parts = sum(family.share for family in suite.families)
         for place, family in enumerate(suite.families):
-            drawn = list(scenes(name, family, place, each, seed))
+            drawn = list(scenes(name, family, place, -(-own * family.share // parts), seed))
             for i, pick in enumerate(engines[name]):
                 kept = _share(family, len(drawn)) if share and i > 0 else len(drawn)
                 found += [_spec(name, family, place, scene, pick, next(number)) for scene in drawn[:kept]]
@@ -130,7 +131,7 @@ def specs(
 
 def _share(family: Family, runs: int) -> int:
     """How many of the runs the other engines make: all of a ladder, because that is the stability map."""
-    return max(family.points if family.ladder is not None else 1, -(-runs // SHARE))
+    return min(runs, max(family.points if family.ladder is not None else LEAST, -(-runs // SHARE)))
 
 
 def _spec(suite: str, family: Family, place: int, scene: Scene, pick: Pick, index: int) -> Spec:

@@ -18,9 +18,11 @@ from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, EngineUnavailable, Outcome, Trajectory, UnknownName
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.bounds import Overdue, bounded, killed, overheard
-from crossbody.reports.sweep.measure import Error, against_closed_form, against_second, instants, residual
+from crossbody.reports.sweep.measure import Asked, Error, error, instants, residual
 from crossbody.reports.sweep.spec import Spec
 
+RTOL = 1e-9
+"""Of the reference, if nothing is said."""
 ACCOUNT = 10.0
 """The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
 REFUSED, SKIPPED, EXCEPTION, CRASHED = "refused", "skipped", "exception", "crashed"
@@ -63,9 +65,9 @@ def execute(spec: Spec, alone: bool = False) -> dict[str, Any]:
             stack.enter_context(killed(spec.time_limit))
             stack.enter_context(overheard(heard))
         tried = _try(spec)
-        error = _error(spec, tried)
+        found = _error(spec, tried)
     heard += [f"{each.category.__name__}: {each.message}" for each in said]
-    return row(spec, tried, error, heard)
+    return row(spec, tried, found, heard)
 
 
 def _try(spec: Spec) -> Tried:
@@ -116,15 +118,35 @@ def _error(spec: Spec, tried: Tried) -> Error:
     run, case = tried.run, tried.case
     if run is None or case is None or not run.outcome.ok or tried.broken or unsound(run, case, spec.engine):
         return Error()
+    second = (10 * spec.max_steps, 3.0 * spec.time_limit) if spec.second else None
+    asked = Asked(limit=limit(spec, tried.settings), near=lambda: _beside(spec, case, tried.settings), second=second)
     try:
-        found = against_closed_form(case, run)
-        if spec.second and not found.tier:
-            return against_second(case, run, 10 * spec.max_steps, 3.0 * spec.time_limit)
-        return found
-    except Exception as error:  # a truth that cannot be worked out is a finding as well
-        tried.broken = "".join(traceback.format_tb(error.__traceback__)[-2:]).strip()
-        tried.message = f"measuring: {type(error).__name__}: {error}"
+        return error(case, run, asked)
+    except Exception as fault:  # a truth that cannot be worked out is a finding as well
+        tried.broken = "".join(traceback.format_tb(fault.__traceback__)[-2:]).strip()
+        tried.message = f"measuring: {type(fault).__name__}: {fault}"
         return Error()
+
+
+def limit(spec: Spec, settings: Mapping[str, float] | None) -> float:
+    """Largest error of the reference, in proportion to the tolerance where that is coarser than its default."""
+    return spec.limit * max(1.0, _rtol(settings) / RTOL)
+
+
+def _rtol(settings: Mapping[str, float] | None) -> float:
+    return float((settings or {}).get("rtol", RTOL))
+
+
+def _beside(spec: Spec, case: Case, settings: Mapping[str, float] | None) -> Case:
+    """The scene with every number moved by as much as the tolerance of the run, up or down."""
+    signs = np.random.default_rng(spec.seed)
+    near: dict[str, cases.Value] = {
+        name: value * (1.0 + _rtol(settings) * float(signs.choice((-1.0, 1.0)))) if isinstance(value, float) else value
+        for name, value in spec.parameters.items()
+    }
+    if "t_end" in case.parameters:
+        near["t_end"] = case.t_end
+    return cases.load(spec.case, spec.variant, **near)
 
 
 def unsound(run: Trajectory, case: Case, engine: str) -> str:
@@ -142,26 +164,26 @@ def row(spec: Spec, tried: Tried, error: Error, heard: list[str]) -> dict[str, A
     """The row of a run."""
     run, case = tried.run, tried.case
     settings = dict(tried.settings or {})
-    limit = spec.limit * max(1.0, float(settings.get("rtol", 0.0)) / 1e-9)
+    most = limit(spec, settings)
     open_ = residual(run) if run is not None and run.outcome.ok else math.nan
     faults = [f"leaked: {' '.join(text.split())[:300]}" for text in heard]
     if run is not None and case is not None:
         faults += [text for text in (unsound(run, case, spec.engine),) if text]
     if tried.broken:
         faults.append(tried.message)
-    verdict, why = _verdict(spec, tried, error, limit, open_, faults)
+    verdict, why = _verdict(spec, tried, error, most, open_, faults)
     return {
         "index": spec.index, "suite": spec.suite, "draw": spec.draw, "case": spec.case, "variant": spec.variant,
         "parameters": json.dumps(dict(spec.parameters)), "engine": spec.engine, "profile": spec.profile,
         "settings": json.dumps(settings), "rung": spec.rung, "seed": spec.seed, "outcome": tried.outcome,
         "t": float(run.t[-1]) if run is not None and len(run.t) else math.nan,
         "steps": run.steps if run is not None else 0, "events": len(run.events) if run is not None else 0,
-        "tier": error.tier, "error": error.value, "until": error.until, "residual": open_, "limit": limit,
+        "tier": error.tier, "error": error.value, "until": error.until, "residual": open_, "limit": most,
         "verdict": verdict.value, "why": why, "command": spec.command(settings), "wall_ms": 1e3 * tried.wall_s,
     }  # fmt: skip
 
 
-def _verdict(spec: Spec, tried: Tried, error: Error, limit: float, open_: float, faults: list[str]) -> tuple[Word, str]:
+def _verdict(spec: Spec, tried: Tried, error: Error, most: float, open_: float, faults: list[str]) -> tuple[Word, str]:
     """Dishonest ends are outside for everybody, inaccuracy for the reference; an engine's is shown, not judged."""
     if faults:
         return Word.OUTSIDE, "; ".join(faults)
@@ -170,9 +192,9 @@ def _verdict(spec: Spec, tried: Tried, error: Error, limit: float, open_: float,
     reference = spec.engine == "reference"
     if tried.outcome != Outcome.FINISHED:
         return (Word.OUTSIDE if reference and spec.finishes else Word.INFO), tried.message[:500]
-    if reference and error.value > limit:
+    if reference and error.value > most:
         return Word.OUTSIDE, error.why or f"error {error.value:.2e}"
-    if reference and open_ > ACCOUNT * limit:
+    if reference and open_ > ACCOUNT * most:
         return Word.OUTSIDE, f"the energy account leaves {open_:.2e} open"
     judged = reference and (error.tier or not math.isnan(open_))
     return (Word.WITHIN if judged else Word.INFO), error.why

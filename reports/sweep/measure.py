@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from crossbody import engines
-from crossbody.cases import Case, Event, Mode, Tier, Trajectory
+from crossbody.cases import Case, CrossbodyError, Event, Mode, Tier, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import PARTED, Truth, from_run
+from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.metrics._contacts import contacts
 
 SHARES = (33, 49)
 """How many instants of a run are looked at, evenly and from 1e-12 of the horizon on by their logarithm."""
 SECOND_RTOL = 1e-11
 """Tolerance of the independent integrator."""
-AFTER = 1.5
-"""Motions that part from their own neighbours no later than this times when they part from another's are chaotic."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What is asked of a run.
+
+    Attributes:
+        limit: largest error, relative.
+        near: builds a scene that differs by the tolerance of the run.
+        second: bounds on steps and on time, s, of the independent integrator, asked where there is no closed form.
+    """
+
+    limit: float
+    near: Callable[[], Case]
+    second: tuple[int, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,15 +59,69 @@ def instants(t_end: float) -> Floats:
     return np.unique(np.concatenate([np.linspace(0.0, t_end, even), t_end * np.logspace(-12.0, 0.0, early)]))
 
 
-def against_closed_form(case: Case, run: Trajectory) -> Error:
-    """Against the exact motion, if the case has one that reaches the horizon."""
-    if case.closed_form is None or not len(run.t):
+def error(case: Case, run: Trajectory, asked: Asked) -> Error:
+    """Against the best truth at hand, up to the divergence time.
+
+    A run further from the truth than its limit is inaccurate only where the truth itself is sharper than that: up to
+    the time at which it has parted by the limit from the truth of a scene that differs by the run's tolerance.
+    """
+    if not len(run.t):
         return Error()
-    exact = case.closed_form(run.t)
-    if not exact.outcome.ok:
-        return Error(why=f"no truth: {exact.message}")
-    truth = replace(from_run(exact, Tier.A, "closed form"), at=case.closed_form)
-    return _against(truth, run, case)
+    truth = _truth(case, run.t, asked)
+    if isinstance(truth, str):
+        return Error(why=truth)
+    found = _against(truth, run, case)
+    if not found.value > asked.limit:
+        return found
+    until = _divergence(truth, run.t, asked)
+    if until > case.t_end:
+        return found
+    before = run.t < until
+    value = float(np.max(_distance(truth.at(run.t), run, run.t)[before], initial=0.0))
+    return Error(value=value, tier=found.tier, until=until, why=f"diverges at t = {until:.3g} s; behind, {found.why}")
+
+
+def _truth(case: Case, times: Floats, asked: Asked) -> Truth | str:
+    """The closed form, else the independent integrator; a sentence (empty: not asked) where neither is at hand."""
+    found = "" if case.closed_form is None else _exact(case, times)
+    if isinstance(found, str) and asked.second is not None:
+        return _second(case, times, *asked.second)
+    return found
+
+
+def _exact(case: Case, times: Floats) -> Truth | str:
+    assert case.closed_form is not None
+    motion = case.closed_form(times)
+    if not motion.outcome.ok:
+        return f"no truth: {motion.message}"
+    return replace(from_run(motion, Tier.A, "closed form"), at=case.closed_form)
+
+
+def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Truth | str:
+    """The same equations by SUNDIALS."""
+    engine = engines.load("reference")
+    reason = engine.why_not(case, "cvode")
+    if reason is not None:
+        return reason
+    rtol = max(SECOND_RTOL, case.tight)
+    other = engine.prepare(
+        case, "cvode", rtol=rtol, samples=np.unique(times), max_steps=max_steps, time_limit=time_limit, ledger=False
+    ).run()
+    if not other.outcome.ok:
+        return f"no truth: the independent integrator ended with {other.outcome.value}"
+    return from_run(other, Tier.C, "compiled against CVODE")
+
+
+def _divergence(truth: Truth, times: Floats, asked: Asked) -> float:
+    """When the truth has parted by the limit from that of the scene beside it, s; infinite if it never does."""
+    try:
+        near = _truth(asked.near(), times, asked)
+    except CrossbodyError:  # the scene stands at the edge of what can be built
+        return math.inf
+    if isinstance(near, str):
+        return math.inf
+    off = _distance(truth.at(times), near.at(times), times) > asked.limit
+    return float(times[np.argmax(off)]) if off.any() else math.inf
 
 
 def at_the_end(case: Case, q: Floats, v: Floats) -> Error:
@@ -70,34 +138,6 @@ def at_the_end(case: Case, q: Floats, v: Floats) -> Error:
     return Error(value=max(parts), tier=Tier.A.value, until=case.t_end)
 
 
-def against_second(case: Case, run: Trajectory, max_steps: int, time_limit: float) -> Error:
-    """Against the same equations by SUNDIALS, up to where the two part for good (chaos)."""
-    engine = engines.load("reference")
-    reason = engine.why_not(case, "cvode")
-    if reason is not None or not len(run.t):
-        return Error(why=reason or "")
-    times = np.unique(run.t)
-    rtol = max(SECOND_RTOL, case.tight)
-    other = engine.prepare(
-        case, "cvode", rtol=rtol, samples=times, max_steps=max_steps, time_limit=time_limit, ledger=False
-    ).run()
-    if not other.outcome.ok:
-        return Error(why=f"no truth: the independent integrator ended with {other.outcome.value}")
-    truth = from_run(other, Tier.C, "compiled against CVODE")
-    parted = _parted(other, run, times)
-    if math.isinf(parted):
-        return _against(truth, run, case)
-    again = engine.prepare(
-        case, "compiled", rtol=rtol, samples=times, max_steps=max_steps, time_limit=time_limit, ledger=False
-    ).run()
-    if _parted(again, run, times) > AFTER * parted:
-        return Error(
-            value=_distance(other, run, times).max(), tier=truth.tier.value, until=parted,
-            why=f"parts from the independent integrator at t = {parted:.4g} s, though not from itself",
-        )  # fmt: skip
-    return _before(replace(truth, trusted=parted), run, case)
-
-
 def _against(truth: Truth, run: Trajectory, case: Case) -> Error:
     """Positions on matched arcs and instants of contact.
 
@@ -107,7 +147,7 @@ def _against(truth: Truth, run: Trajectory, case: Case) -> Error:
     truth, run = replace(truth, trajectory=lasting(truth.trajectory)), lasting(run)
     more = len(contacts(run)) - len(contacts(truth.trajectory))
     if not more:
-        return _before(truth, run, case)
+        return _matched(truth, run, case)
     value = float(_distance(truth.at(run.t), run, run.t).max())
     return Error(value=value, tier=truth.tier.value, until=case.t_end, why=f"{more:+d} contacts, error {value:.2e}")
 
@@ -130,13 +170,12 @@ def lasting(run: Trajectory) -> Trajectory:
     return replace(run, events=tuple(kept))
 
 
-def _before(truth: Truth, run: Trajectory, case: Case) -> Error:
-    until = min(truth.trusted, case.t_end)
+def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
     position = metrics.load("position").measure(truth, run, case)
-    shift = metrics.load("event_times").measure(truth, run, case) if math.isinf(truth.trusted) else None
-    parts = [position, None if shift is None else shift / case.t_end]
-    known = [part for part in parts if part is not None]
-    return Error(value=max(known, default=math.nan), tier=truth.tier.value if known else "", until=until)
+    shift = metrics.load("event_times").measure(truth, run, case)
+    known = [part for part in (position, None if shift is None else shift / case.t_end) if part is not None]
+    value = max(known, default=math.nan)
+    return Error(value=value, tier=truth.tier.value if known else "", until=case.t_end, why=f"error {value:.2e}")
 
 
 def _distance(other: Trajectory, run: Trajectory, times: Floats) -> Floats:
@@ -147,12 +186,6 @@ def _distance(other: Trajectory, run: Trajectory, times: Floats) -> Floats:
         found.append(each.q[rows])
     scale = float(np.max(np.abs(found[1]), initial=0.0)) or 1.0
     return np.asarray(np.max(np.abs(found[0] - found[1]), axis=1, initial=0.0) / scale)
-
-
-def _parted(other: Trajectory, run: Trajectory, times: Floats) -> float:
-    """When two runs part by more than `PARTED`, s; infinite if they never do."""
-    off = _distance(other, run, times) > PARTED
-    return float(times[np.argmax(off)]) if off.any() else math.inf
 
 
 def residual(run: Trajectory) -> float:
