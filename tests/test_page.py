@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 import pytest
+from ladder import ladder
 
 from crossbody.cases import OutputError, load
 from crossbody.reports.bench.order import observed_order
@@ -237,29 +238,8 @@ def test_run_time_is_drawn_against_error(out: Path) -> None:
     assert mark["x"][0] == pytest.approx(1e-6, rel=0.1)
 
 
-def ladder(path: Path, rows: int = 3) -> Path:
-    """A folder as a benchmark of the case writes it."""
-    found = pd.DataFrame(
-        {
-            "case": "bouncing_ball:linear", "engine": "fake", "profile": "p", "against": "the case", "tier": "A",
-            "knob": "dt", "setting": 10.0 ** -np.arange(rows), "error": 10.0 ** -np.arange(rows), "error_q": 1.0,
-            "error_v": 1.0, "error_impulse": 1.0, "error_energy": 1.0, "error_times": 1.0, "honesty": np.nan,
-            "median_ms": 1.0 + np.arange(rows), "iqr_ms": 0.1, "call_ms": 2.0, "cores": 1.0, "repeats": 3,
-            "outcome": "finished",
-        }
-    )  # fmt: skip
-    lead = pd.DataFrame({"case": ["bouncing_ball:linear"], "engine": ["fake"], "profile": [HOSTILE], "ratio": [42.0]})
-    order = pd.DataFrame(columns=["case", "engine", "profile", "knob", "order", "promised", "says"])
-    told = {"command": "crossbody bench"}
-    with folder(path) as made_:
-        study.write(made_, [], study.judge([], {}), told)
-        for name, rows_ in (("bench", found), ("headline", lead), ("orders", order)):
-            study.write_table(made_ / name, rows_, told)
-    return path
-
-
 def test_studies_of_other_folders_stand_beside(tmp_path: Path, result: CaseResult) -> None:
-    out, bench = made(tmp_path / "out", [result]), ladder(tmp_path / "bench")
+    out, bench = made(tmp_path / "out", [result]), ladder(tmp_path / "bench", "bouncing_ball:linear", HOSTILE)
     site.write(out, others=[bench])
     assert "crossbody bench" in (out / "bench.html").read_text()
     assert 'data-v="42.0"' in (out / "index.html").read_text()
