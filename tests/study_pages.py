@@ -1,0 +1,49 @@
+"""A folder of every study that has a page, each as small as it can be, by the commands themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from crossbody.reports.cli import main
+
+MAP = """[time]
+column = "t [s]"
+unit = "s"
+
+[coordinates.th1]
+column = "angle [deg]"
+unit = "deg"
+"""
+ONE = ("-e", "reference:compiled")
+
+
+def rig(folder: Path) -> tuple[str, ...]:
+    """A log of a pendulum, made up, and what the commands for logs must know of it."""
+    t = np.arange(2000) * 2e-3
+    swing = solve_ivp(lambda _, y: [y[1], 58.0 * np.sin(y[0]) - 0.2 * y[1]], (0.0, t[-1]), [2.5, 0.0], t_eval=t)
+    rows = np.stack([t, np.rad2deg(swing.y[0])], axis=1)
+    np.savetxt(folder / "rig.csv", rows, delimiter=",", header="t [s],angle [deg]", comments="")
+    (folder / "rig.toml").write_text(MAP, encoding="utf-8")
+    return str(folder / "rig.csv"), "-m", "single_pendulum", "--columns", str(folder / "rig.toml"), "--restart", "2"
+
+
+def studies(folder: Path) -> list[Path]:
+    """Folders of gap map, frequency responses, analysis, stress, replay and identification."""
+    log = rig(folder)
+    commands = {
+        "gapmap": (*ONE, "--n", "3", "--points", "5"),
+        "bode": ("soft_contact",),
+        "analyse": ("delta_impulse", "--at", "z=0.4", "--bode"),
+        "stress": ("gap", *ONE, "--runs", "4", "--jobs", "1"),
+        "replay": (*log, *ONE),
+        "identify": (*log, "-f", "k1"),
+    }
+    for name, arguments in commands.items():
+        with pytest.raises(SystemExit) as end:
+            main([name, *arguments, "--quiet", "--out", str(folder / name)])
+        assert not end.value.code, name
+    return [folder / name for name in commands]
