@@ -49,6 +49,7 @@ $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --no-deps axe-playwright-python # for its axe.min.js alone; needs no playwright
 	touch $(READY)
 
 clean:
