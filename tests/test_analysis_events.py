@@ -101,6 +101,52 @@ def test_monodromy_of_a_cradle_keeps_volume():
     assert np.linalg.det(found.by_start) == pytest.approx(1.0, rel=1e-8)
 
 
+def period_of(length, angle, gravity):
+    """Of a pendulum released at rest, exactly: 2 pi sqrt(L/g) over the arithmetic-geometric mean of 1, cos(angle/2)."""
+    a, b = 1.0, np.cos(0.5 * angle)
+    while abs(a - b) > 1e-16:
+        a, b = 0.5 * (a + b), np.sqrt(a * b)
+    return 2.0 * np.pi * np.sqrt(length / gravity) / a
+
+
+def test_monodromy_of_a_periodic_cradle():
+    """Two balls that touch at rest change places twice a period: what shifts the time alone comes back as it was."""
+    case = cases.load("newtons_cradle", variant="pendulums", n=2, gap=0.0)
+    system, x = analyse.build(case), np.concatenate([case.q0, case.v0])
+    period = period_of(case.number("length"), case.number("angle"), case.number("gravity"))
+    found = sensitivity(system, case.q0, case.v0, period)
+    assert len(found.jumps) == 2
+    np.testing.assert_allclose(found.state, x, atol=1e-8)
+    flow = np.concatenate([case.v0, [case.number("gravity") / case.number("length") * np.sin(-case.q0[0]), 0.0]])
+    np.testing.assert_allclose(found.by_start @ flow, flow, rtol=1e-6, atol=1e-6 * np.abs(flow).max())
+    np.testing.assert_allclose(np.abs(found.multipliers), 1.0, atol=1e-3)  # two of them are 1: scattered by the root
+    assert np.linalg.det(found.by_start) == pytest.approx(1.0, rel=1e-8)
+    fd = differences(lambda y: ends(system, y[:2], y[2:], period), x, 1e-6)
+    np.testing.assert_allclose(found.by_start, fd, atol=1e-6 * np.abs(fd).max())
+
+
+def test_a_row_of_balls_that_touch_is_passed_one_collision_after_another():
+    """Four jumps at one instant; against one-sided differences along what parts the balls."""
+    case = cases.load("newtons_cradle", variant="pendulums", n=5, gap=0.0)
+    system, t_end, step = analyse.build(case), 0.45, 1e-5
+    found = sensitivity(system, case.q0, case.v0, t_end)
+    assert [(jump.t, jump.contact) for jump in found.jumps] == [(found.jumps[0].t, i) for i in range(4)]
+    parts, lift = np.zeros(10), np.zeros(10)
+    parts[6:], lift[0] = np.arange(1.0, 5.0), -1.0
+    for along in (parts, parts + lift):
+        values = [ends(system, case.q0 + k * step * along[:5], case.v0 + k * step * along[5:], t_end) for k in range(5)]
+        fd = np.array([-25.0 / 12.0, 4.0, -3.0, 4.0 / 3.0, -0.25]) @ values / step
+        np.testing.assert_allclose(found.by_start @ along, fd, atol=1e-6 * np.abs(fd).max())
+
+
+@pytest.mark.parametrize("variant", ["sliders", "pendulums"])
+def test_rows_that_strike_as_one_have_no_derivative(variant):
+    """Three balls, one in: a deviation makes of (-1/3, 2/3, 2/3) the sequence that gives (0, 0, 1)."""
+    case = cases.load("newtons_cradle", variant=variant, n=3, gap=0.0)
+    with pytest.raises(SceneError, match="which of them comes first"):
+        sensitivity(analyse.build(case), case.q0, case.v0, 0.3, collisions="simultaneous")
+
+
 def test_wrong_use_is_told():
     system = ball()
     with pytest.raises(UnknownName, match="a0"):

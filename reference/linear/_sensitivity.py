@@ -32,6 +32,13 @@ ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
 GRAZING = 1e-12  # part of the terms of g_x f below which an event is only grazed
 
 
+AS_ONE = (
+    "sensitivity: several rows strike as one; a deviation parts them, and what follows then depends on which of them "
+    'comes first, so there is no derivative. Use collisions="sequential".'
+)
+SAME = 1e-3  # part of the motion's size by which its end may differ from the one that was passed through
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Jump:
     """What an event does to small deviations.
@@ -85,6 +92,9 @@ def sensitivity(
 ) -> Sensitivity:  # fmt: skip
     """Integrate a motion with its variational equations; every event multiplies them by its saltation matrix.
 
+    Collisions that follow one another at one instant, as through balls that touch, are passed one by one: the
+    derivative is then that of deviations that part the balls, as long as those do not meet again.
+
     Args:
         system: the mechanism, without a sampled controller.
         q0: positions at the start (n,).
@@ -93,12 +103,11 @@ def sensitivity(
         parameters: by name, "p[k]", or "a0[i]", "a1[i]", "a2[i]" of row i's slow law.
         u: constant inputs (nu,), zero if not given.
         rtol: tolerance of the motion and of its derivatives.
-        collisions: rule for several contacts; "simultaneous" with one collision at a time only.
+        collisions: rule for several contacts; under "simultaneous" one collision at a time only.
         max_steps: bound on the steps of the motion.
 
     Raises:
-        SceneError: for a sampled controller, or a motion that switches discrete variables or strikes several rows
-            together: their instants have no derivative here.
+        SceneError: for a sampled controller, a motion that switches discrete variables, or rows that strike as one.
         UnknownName: for a parameter that is not there.
     """
     over, at = theta(system, parameters), point(system, q0, v0, u, [], 0.0)
@@ -110,14 +119,20 @@ def sensitivity(
     if any(switch.t > 0.0 for switch in run.switches):
         raise SceneError("sensitivity: the motion switches discrete variables; end it before the first switch.")
     walk = _Walk(at, over, rtol)
-    outcome = walk.along(run, t_end) if run.outcome.ok else run.outcome
+    outcome, n = walk.along(run, t_end) if run.outcome.ok else run.outcome, system.n
     if not outcome.ok:
         walk.S[:] = np.nan
-    n = system.n
+    elif not (_same(walk.x[:n], run.q) and _same(walk.x[n:], run.v)):
+        raise SceneError(AS_ONE)  # touching rows share an impulse of which one event tells
     return Sensitivity(
         run=run, state=walk.x, by_start=walk.S[:, : 2 * n], by_parameters=walk.S[:, 2 * n :], names=over.names,
         jumps=tuple(walk.jumps), outcome=outcome,
     )  # fmt: skip
+
+
+def _same(end: Floats, motion: Floats) -> bool:
+    """Whether a motion (N, n) ends there."""
+    return bool(np.abs(end - motion[-1]).max() <= SAME * np.abs(motion).max(initial=1e-300))
 
 
 class _Walk:
@@ -237,7 +252,7 @@ def _pieces(events: list[Event]) -> Iterator[list[Event]]:
         ends = [e for e in events[k + 1 :] if e.contact == events[k].contact and e.before is Mode.COLLISION]
         if events[k].after is Mode.COLLISION and ends:
             if events[k + 1] is not ends[0]:
-                raise SceneError("sensitivity: several rows strike together; their instants have no common derivative.")
+                raise SceneError(AS_ONE)
             size = 2
             while k + size < len(events) and events[k + size].before is Mode.CONTACT:
                 size += 1
