@@ -59,7 +59,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         collisions="resolved",
         tight=1e-11 if whole else 1e-12,
         claims=claimed,
-        limits=limits(claimed, p["kstar"]),
+        limits=limits(variant, claimed, p["kstar"]),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )
 

@@ -7,6 +7,7 @@ time: what the jaws and the probe do is then a force that depends on the state.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,12 +18,54 @@ from crossbody.cases._soft.scene import numbers
 
 NAMES = ("flange", "left pad", "right pad", "block", "error", "left sensor", "right sensor", "shift", "clock")
 CLOCK = len(NAMES) - 1
+Numbers = Mapping[str, float]
+Motion = tuple[float, float]
+"""Place, m, and velocity, m/s."""
 
 
-def smooth(t: float, start: float, stop: float) -> tuple[float, float]:
-    """Step u^3 (10 - 15 u + 6 u^2) from 0 to 1 between two instants, s, and its rate."""
-    u = min(max((t - start) / (stop - start), 0.0), 1.0)
-    return u**3 * (10.0 - 15.0 * u + 6.0 * u * u), 30.0 * (u * (1.0 - u)) ** 2 / (stop - start)
+def smooth(t: float, start: float, stop: float) -> tuple[float, float, float]:
+    """Step u^3 (10 - 15 u + 6 u^2) from 0 to 1 between two instants, s, its rate and its second derivative."""
+    length = stop - start
+    u = min(max((t - start) / length, 0.0), 1.0)
+    rate, bend = 30.0 * (u * (1.0 - u)) ** 2, 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u * u), rate / length, bend / length**2
+
+
+def jaw(p: Numbers, t: float) -> tuple[float, float]:
+    """Offset of a finger from the place where it just touches a centred block, m, and its rate."""
+    close, rate, _ = smooth(t, p["close_start"], p["close_end"])
+    if p["release"]:
+        opened, back, _ = smooth(t, p["release"], p["release"] + p["release_time"])
+        close, rate = close - opened, rate - back
+    stroke = p["jaw"] + p["squeeze"]
+    return p["jaw"] - stroke * close, -stroke * rate
+
+
+def fingers(p: Numbers, t: float, middle: Motion, left: Motion, right: Motion) -> tuple[float, float]:
+    """Forces of both fingers on their pads, N, from place and velocity of the middle between them and of the pads."""
+    w, wd = jaw(p, t)
+    reach, kp, cp, (x, xd) = w + 0.5 * p["width"], p["kp"], p["cp"], middle
+    return (
+        kp * (x - reach - left[0]) + cp * (xd - wd - left[1]),
+        kp * (x + reach - right[0]) + cp * (xd + wd - right[1]),
+    )
+
+
+def instants(p: Numbers, t_end: float) -> tuple[float, ...]:
+    """Where the third derivative of the jaws' motion jumps, s: no step of Runge-Kutta crosses one."""
+    ends = {p["close_start"], p["close_end"]}
+    if p["release"]:
+        ends |= {p["release"], p["release"] + p["release_time"]}
+    return tuple(sorted(t for t in ends if 0.0 < t < t_end))
+
+
+def fastest(p: Numbers, flange_mass: float) -> float:
+    """Fastest rate of both pads against the flange, the loop, the sensors and the rows, 1/s."""
+    mass = 1.0 / (1.0 / p["pad_mass"] + 2.0 / flange_mass)
+    pad = (p["cp"] + math.sqrt(max(p["cp"] ** 2 - 4.0 * p["kp"] * mass, 0.0))) / (2.0 * mass)
+    return max(
+        pad, math.sqrt(p["kp"] / mass), p["bt"] / p["block_mass"], p["ks"], p["gain_d"], p["a1"], math.sqrt(p["a0"])
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,26 +82,13 @@ class SoftContact:
     masses: Floats
     H: Floats
 
-    def jaw(self, t: float) -> tuple[float, float]:
-        """Offset of a finger, m, and its rate."""
-        p = self.p
-        close, rate = smooth(t, p["close_start"], p["close_end"])
-        if p["release"]:
-            opened, back = smooth(t, p["release"], p["release"] + p["release_time"])
-            close, rate = close - opened, rate - back
-        stroke = p["jaw"] + p["squeeze"]
-        return p["jaw"] - stroke * close, -stroke * rate
-
     def forces(self, q: Floats, v: Floats, tau: Floats) -> None:
         """Write the force on every slider (9,), N."""
         p = self.p
         x, pl, pr, _, integral, _, _, _, t = q.tolist()
         xd, pld, prd, bd, error, sl, sr, z, _ = v.tolist()
-        w, wd = self.jaw(t)
-        u = p["probe"] * math.sin(p["probe_rate"] * t)
-        reach, kp, cp, shift = w + 0.5 * p["width"], p["kp"], p["cp"], p["ks"] * p["pad_mass"]
-        left = kp * (x + z - reach - pl) + cp * (xd + u - wd - pld)
-        right = kp * (x + z + reach - pr) + cp * (xd + u + wd - prd)
+        u, shift = p["probe"] * math.sin(p["probe_rate"] * t), p["ks"] * p["pad_mass"]
+        left, right = fingers(p, t, (x + z, xd + u), (pl, pld), (pr, prd))
         yl, yr = sl - shift * pld, sr + shift * prd
         moved = p["k"] * (yr - yl)
         asked = p["gain_i"] * integral + p["gain_p"] * error + p["gain_d"] * (p["rate_share"] * moved - xd)

@@ -77,10 +77,17 @@ def test_mujoco_keeps_order_four_through_touch_and_release():
     assert mujoco.get_mjcb_control() is None
 
 
-@pytest.mark.parametrize(("engine", "profile"), [("pinocchio", "law"), ("mujoco", "matched")])
-def test_engines_hold_the_same_physics(engine, profile):
+@pytest.mark.parametrize(
+    ("engine", "profile", "changed"),
+    [
+        ("pinocchio", "law", {"width": 0.03, "rate_share": 0.5}),
+        ("mujoco", "matched", {"width": 0.03, "rate_share": 0.5}),
+        ("mujoco", "matched", {"variant": "delta", "width": 0.03, "d1": 0.1, "d2": 0.02, "d3": 0.03}),
+    ],
+)
+def test_engines_hold_the_same_physics(engine, profile, changed):
     pytest.importorskip(engine)
-    case = cases.load("soft_contact", width=0.03, rate_share=0.5)
+    case = cases.load("soft_contact", **changed)
     theirs = load("reference").prepare(case).audit()
     rows = audit(load(engine).prepare(case, profile).audit(), theirs, case)
     assert {row.quantity for row in rows} >= {"masses", "M", "bias", "H", "lam"}
@@ -103,6 +110,22 @@ def test_the_obvious_model_in_mujoco_is_the_same_mechanism_with_softer_contacts(
     assert 0.05 < run.lam[-1].max() / (case.number("kp") * case.number("squeeze")) < 0.15
 
 
+HASTE = {"descent": 0.1, "rise": 0.8, "rise_time": 0.3}
+
+
+def test_mujoco_gives_the_run_of_the_reference_on_the_whole_robot():
+    """Robot, loops, pads, block and table: touches, releases and the end of a quick grasp."""
+    pytest.importorskip("mujoco")
+    case = cases.load("soft_contact", "delta", **QUICK, **HASTE)
+    ours = load("reference").prepare(case, rtol=1e-11).run()
+    theirs = load("mujoco").prepare(case).run()
+    assert theirs.outcome is Outcome.FINISHED
+    assert_same_touches(theirs, ours, 1e-6)
+    assert {c for c, _ in touches(theirs)} == {6, 7, 8}
+    np.testing.assert_allclose(theirs.q[-1], ours.q[-1], atol=1e-8)
+    np.testing.assert_allclose(theirs.lam[-1], ours.lam[-1], atol=1e-6)
+
+
 def test_what_an_engine_cannot_do_is_said():
     pytest.importorskip("pinocchio")
     axis, robot = cases.load("soft_contact"), cases.load("soft_contact", "delta")
@@ -115,7 +138,6 @@ def test_what_an_engine_cannot_do_is_said():
 
 def test_what_mujoco_cannot_do_is_said():
     pytest.importorskip("mujoco")
-    with pytest.raises(CaseUnsupported, match="soft_delta"):
-        load("mujoco").prepare(cases.load("soft_contact", "delta"))
-    with pytest.raises(CaseUnsupported, match="machine 'level'"):
-        load("mujoco").prepare(replace(cases.load("soft_contact"), fsm="edge"))
+    for variant in ("axis", "delta"):
+        with pytest.raises(CaseUnsupported, match="machine 'level'"):
+            load("mujoco").prepare(replace(cases.load("soft_contact", variant), fsm="edge"))

@@ -75,11 +75,17 @@ class Delta:
 
     def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Gaps (n, 6), m, and energies (n, 2), J, of absolute angles and rates."""
-        p, gap, rate, energy = self.robot.array(), np.empty((len(q), 6)), np.empty(6), np.empty((len(q), 2))
-        for i in range(len(q)):
-            kernels.gaps(0.0, q[i], v[i], p, gap[i], rate)
-            kernels.energy(q[i], v[i], p, energy[i])
-        return gap, energy
+        return closures(self.robot, q, v)
+
+
+def closures(robot: Robot, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Gaps (n, 6), m, of the loops and energies (n, 2), J, of absolute angles and rates (n, 9)."""
+    p, gap, rate, energy = robot.array(), np.empty((len(q), 6)), np.empty(6), np.empty((len(q), 2))
+    q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
+    for i in range(len(q)):
+        kernels.gaps(0.0, q[i], v[i], p, gap[i], rate)
+        kernels.energy(q[i], v[i], p, energy[i])
+    return gap, energy
 
 
 def delta(case: Case) -> Delta:

@@ -12,6 +12,7 @@ from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, direct_solref, witho
 from crossbody.reference.delta import Robot
 
 _MATCHED = 'integrator="RK4" jacobian="dense" solver="Newton" iterations="3" tolerance="0"'
+FLAGS = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND)
 
 
 def compiled(robot: Robot, law: Law | None = None) -> Any:
@@ -24,12 +25,18 @@ def compiled(robot: Robot, law: Law | None = None) -> Any:
     Raises:
         ValueError: MuJoCo's own, for a model that it refuses.
     """
+    model = mujoco.MjModel.from_xml_string(text(robot, law))
+    if law is not None:
+        model.opt.disableflags |= FLAGS
+        without_regularisation(model)
+    return model
+
+
+def text(robot: Robot, law: Law | None) -> str:
+    """The model as MJCF, see `compiled`; `FLAGS` and the regularisation are still to be set where there is a law."""
     if law is None:
-        return mujoco.MjModel.from_xml_string(mjcf(robot))
+        return mjcf(robot)
     stiffness, damping = direct_solref(law, 0)
     d = MAX_IMPEDANCE
     solve = f'solref="{stiffness!r} {damping!r}" solimp="{d} {d} 0.001 0.5 1"'
-    model = mujoco.MjModel.from_xml_string(mjcf(robot, option=_MATCHED, solve=solve))
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
-    without_regularisation(model)
-    return model
+    return mjcf(robot, option=_MATCHED, solve=solve)

@@ -110,11 +110,10 @@ class Pairs:
                 d.efc_aref[at] -= self.drift()[rows]
 
 
-def add_pairs(spec: Any, geoms: Sequence[tuple[str, str]], law: Law) -> None:
-    """One frictionless pair a row, with that row's law, for geoms that collide with nothing else."""
+def add_pairs(spec: Any, geoms: Sequence[tuple[str, str]], law: Law | None) -> None:
+    """One frictionless pair a row, for geoms that collide with nothing else; None leaves MuJoCo's own softness."""
     for i, (left, right) in enumerate(geoms):
         for name in (left, right):
             spec.geom(name).contype = spec.geom(name).conaffinity = 0
-        spec.add_pair(
-            name=f"pair {i}", geomname1=left, geomname2=right, condim=1, solref=direct_solref(law, i), solimp=IMPEDANCE
-        )
+        own = {} if law is None else {"solref": direct_solref(law, i), "solimp": IMPEDANCE}
+        spec.add_pair(name=f"pair {i}", geomname1=left, geomname2=right, condim=1, **own)

@@ -7,7 +7,6 @@ that the flange carries, with the contact constants, integrator and step that Mu
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -52,12 +51,7 @@ def default_step(case: Case, profile: str) -> float:
     stable up to 2.8 time constants.
     """
     p = soft.soft_contact(case).p
-    mass = 1.0 / (1.0 / p["pad_mass"] + 2.0 / p["flange_mass"])  # both pads against the flange
-    pad = (p["cp"] + math.sqrt(max(p["cp"] ** 2 - 4.0 * p["kp"] * mass, 0.0))) / (2.0 * mass)
-    rates = (
-        pad, math.sqrt(p["kp"] / mass), p["bt"] / p["block_mass"], p["ks"], p["gain_d"], p["a1"], math.sqrt(p["a0"]),
-    )  # fmt: skip
-    return 2e-3 if profile == "default" else min(1e-3, 1.5 / max(rates))
+    return 2e-3 if profile == "default" else min(1e-3, 1.5 / soft.fastest(p, p["flange_mass"]))
 
 
 def build(case: Case, profile: str, dt: float) -> Scene:
@@ -108,7 +102,7 @@ def _matched(own: SoftContact, case: Case) -> Scene:
 
     scene = Scene(
         model=model, data=data, nc=2, start=start, modes=pairs.modes, lam=pairs.lam, safe=_guard(own, data),
-        observe=own.observe, chart=soft.chart, instants=_instants(own, case), hook=hook, always=True,
+        observe=own.observe, chart=soft.chart, instants=soft.instants(own.p, case.t_end), hook=hook, always=True,
         arm=pairs.arm(reach=own.sizes[0][0]), margins=pairs.margins, machine="level",
     )  # fmt: skip
     scene.audit = _listed(scene, own, case, np.eye(len(NAMES))) | _listed_rows(scene, pairs)
@@ -200,15 +194,6 @@ def _start(own: SoftContact, case: Case, model: Any, data: Any, tree: Floats) ->
         data.qpos[:], data.qvel[:] = q0, v0
 
     return start
-
-
-def _instants(own: SoftContact, case: Case) -> tuple[float, ...]:
-    """Where the third derivative of the jaws' motion jumps, s: no step of Runge-Kutta crosses one."""
-    p = own.p
-    ends = {p["close_start"], p["close_end"]}
-    if p["release"]:
-        ends |= {p["release"], p["release"] + p["release_time"]}
-    return tuple(sorted(t for t in ends if 0.0 < t < case.t_end))
 
 
 def _guard(own: SoftContact, data: Any) -> Callable[[], bool]:
