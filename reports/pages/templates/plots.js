@@ -59,9 +59,21 @@
     return bottom > 0 && top < innerHeight;
   };
 
+  // On a narrow screen a legend beside the plot would take its room: it goes below, a line an entry.
+  const narrow = (box, { data, layout }) => {
+    const entries = data.filter((line) => line.name && line.showlegend !== false).length;
+    if (box.clientWidth > 700 || layout.showlegend === false || layout.legend?.orientation === "h" || entries < 2) return;
+    const room = 20 * entries;
+    layout.legend = { orientation: "h", x: 0, yref: "container", y: 0, yanchor: "bottom", entrywidth: 1, entrywidthmode: "fraction" };
+    layout.margin = { ...layout.margin, b: layout.margin.b + room };
+    layout.height += room;
+    box.style.height = `${layout.height}px`;
+  };
+
   const draw = (box) => {
     if (charts.has(box)) return charts.get(box).ready;
     const figure = JSON.parse(document.querySelector(`script[data-plot="${CSS.escape(box.id)}"]`).textContent);
+    narrow(box, figure);
     const mark = document.createElement("div");
     mark.className = "cursor";
     const shown = visible(figure.data);
