@@ -82,6 +82,7 @@ def test_mujoco_keeps_order_four_through_touch_and_release():
     [
         ("pinocchio", "law", {"width": 0.03, "rate_share": 0.5}),
         ("mujoco", "matched", {"width": 0.03, "rate_share": 0.5}),
+        ("pinocchio", "law", {"variant": "delta", "width": 0.03, "d1": 0.1, "d2": 0.02, "d3": 0.03}),
         ("mujoco", "matched", {"variant": "delta", "width": 0.03, "d1": 0.1, "d2": 0.02, "d3": 0.03}),
     ],
 )
@@ -113,12 +114,13 @@ def test_the_obvious_model_in_mujoco_is_the_same_mechanism_with_softer_contacts(
 HASTE = {"descent": 0.1, "rise": 0.8, "rise_time": 0.3}
 
 
-def test_mujoco_gives_the_run_of_the_reference_on_the_whole_robot():
+@pytest.mark.parametrize(("engine", "settings"), [("mujoco", {}), ("pinocchio", {"rtol": 1e-8, "method": "BDF"})])
+def test_engines_give_the_run_of_the_reference_on_the_whole_robot(engine, settings):
     """Robot, loops, pads, block and table: touches, releases and the end of a quick grasp."""
-    pytest.importorskip("mujoco")
+    pytest.importorskip(engine)
     case = cases.load("soft_contact", "delta", **QUICK, **HASTE)
     ours = load("reference").prepare(case, rtol=1e-11).run()
-    theirs = load("mujoco").prepare(case).run()
+    theirs = load(engine).prepare(case, **settings).run()
     assert theirs.outcome is Outcome.FINISHED
     assert_same_touches(theirs, ours, 1e-6)
     assert {c for c, _ in touches(theirs)} == {6, 7, 8}
@@ -128,12 +130,10 @@ def test_mujoco_gives_the_run_of_the_reference_on_the_whole_robot():
 
 def test_what_an_engine_cannot_do_is_said():
     pytest.importorskip("pinocchio")
-    axis, robot = cases.load("soft_contact"), cases.load("soft_contact", "delta")
-    for profile in ("impulse", "impulse_simultaneous", "admm"):
-        with pytest.raises(CaseUnsupported, match="sensors read forces"):
-            load("pinocchio").prepare(axis, profile)
-    with pytest.raises(CaseUnsupported, match="soft_delta"):
-        load("pinocchio").prepare(robot, "law")
+    for variant in ("axis", "delta"):
+        for profile in ("impulse", "impulse_simultaneous", "admm"):
+            with pytest.raises(CaseUnsupported, match="sensors read forces"):
+                load("pinocchio").prepare(cases.load("soft_contact", variant), profile)
 
 
 def test_what_mujoco_cannot_do_is_said():

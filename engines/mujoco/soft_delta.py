@@ -30,7 +30,7 @@ from crossbody.engines._soft_delta import (
 )
 from crossbody.engines.mujoco._delta_model import FLAGS, text
 from crossbody.engines.mujoco._direct import law_of, without_regularisation
-from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._globals import Hook, captured, hooked
 from crossbody.engines.mujoco._pairs import Pairs, add_pairs
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._two_sets import TwoSets
@@ -89,7 +89,7 @@ def _matched(own: SoftDelta, case: Case) -> Scene:
         weights=weights,
     )  # fmt: skip
     scene = _scene(own, case, model, data, pairs)
-    reset, forces, arm = scene.start, scene.hook, pairs.arm(reach)
+    reset, forces, arm = scene.start, _forces(own, data), pairs.arm(reach)
 
     def start() -> None:
         reset()
@@ -144,24 +144,30 @@ def _beside(spec: Any, own: SoftDelta) -> None:
 def _scene(own: SoftDelta, case: Case, model: Any, data: Any, pairs: Pairs) -> Scene:
     """What both profiles share; no row opens or closes by the level machine yet."""
     q0, v0 = own.start(case)
-    rates, out, passive = data.qvel, data.qfrc_applied, data.qfrc_passive
-    tau = np.zeros(NV)
+    rates = data.qvel
 
     def start() -> None:
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = q0, v0
 
-    def hook(_model: Any, _data: Any) -> None:
-        own.forces(data.qpos, rates, tau)
-        out[:] = tau - passive
-
     return Scene(
-        model=model, data=data, nc=LOOPS + len(GEOMS), start=start, hook=hook, always=True,
+        model=model, data=data, nc=LOOPS + len(GEOMS), start=start, hook=_forces(own, data), always=True,
         modes=lambda: HELD + pairs.modes(),
         lam=lambda: np.append(data.efc_force[:LOOPS], pairs.lam()),
         safe=lambda: bool((np.abs(rates) < FASTEST).all()),
         observe=own.observe, chart=of_case, instants=own.instants(case.t_end),
     )  # fmt: skip
+
+
+def _forces(own: SoftDelta, data: Any) -> Hook:
+    """Set what the model's own dampers leave of the forces of this stage."""
+    q, v, out, passive, tau = data.qpos, data.qvel, data.qfrc_applied, data.qfrc_passive, np.zeros(NV)
+
+    def hook(_model: Any, _data: Any) -> None:
+        own.forces(q, v, tau)
+        out[:] = tau - passive
+
+    return hook
 
 
 def _look(scene: Scene, q: Floats, v: Floats) -> tuple[Floats, Floats]:

@@ -55,6 +55,12 @@ class Closed:
 
     def law(self, r: Floats, rd: Floats) -> Floats:
         """H' r' + a1 h' + a0 h (6,) of the loops."""
+        (h, hd, drift), own = self.loops(r, rd), self.constants()
+        gamma: Floats = drift + own["a1"] * hd + own["a0"] * h
+        return gamma
+
+    def loops(self, r: Floats, rd: Floats) -> tuple[Floats, Floats, Floats]:
+        """H (6,), m, h' and H' r' of the loops."""
         pin.forwardKinematics(self.model, self.data, r, rd, np.zeros(9))
         pin.updateFramePlacements(self.model, self.data)
         ends = self.ends
@@ -64,9 +70,7 @@ class Closed:
             [np.array(get(self.model, self.data, i, pin.LOCAL_WORLD_ALIGNED).linear) for i in ends] for get in kinds
         )
         h, hd, Hdv = (np.concatenate((x[0] - x[1], x[0] - x[2])) for x in (at, rate, drift))
-        own = self.constants()
-        gamma: Floats = Hdv + own["a1"] * hd + own["a0"] * h
-        return gamma
+        return h, hd, Hdv
 
     def derivatives(self, r: Floats, rd: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
         """Of the accelerations by r, r' and tau (9, 9), as `computeConstraintDynamicsDerivatives` has them."""
@@ -114,10 +118,14 @@ class Closed:
         M = pin.crba(self.model, self.data, r)
         M = np.triu(M) + np.triu(M, 1).T
         bias = pin.nonLinearEffects(self.model, self.data, r, rd).copy()
+        return M, bias, self.jacobian(r)
+
+    def jacobian(self, r: Floats) -> Floats:
+        """H (6, 9) of the loops."""
         pin.computeJointJacobians(self.model, self.data, r)
         pin.updateFramePlacements(self.model, self.data)
         ends = [pin.getFrameJacobian(self.model, self.data, i, pin.LOCAL_WORLD_ALIGNED)[:3] for i in self.ends]
-        return M, bias, np.vstack([ends[0] - ends[1], ends[0] - ends[2]])
+        return np.vstack([ends[0] - ends[1], ends[0] - ends[2]])
 
 
 def imported(robot: Robot, law: Law) -> Closed:
