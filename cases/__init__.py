@@ -14,7 +14,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from crossbody.cases import _installed, _registry
+from crossbody.cases import _registry
 from crossbody.cases._errors import (
     CaseUnsupported,
     ColumnMapError,
@@ -82,13 +82,11 @@ def __getattr__(name: str) -> Any:
 
 def names() -> tuple[str, ...]:
     """Names of all cases, those of other distributions too; imports none of them."""
-    return tuple(sorted({*_registry.plugin_names(__name__, list(__path__)), *_installed.installed()}))
+    return _registry.plugin_names(__name__, list(__path__))
 
 
 def summary(name: str) -> str:
     """What a case is, in one line; imports nothing."""
-    if name not in _registry.plugin_names(__name__, list(__path__)):
-        return f"from {_installed.installed().get(name, 'nowhere')}"
     return _registry.summary(__name__, list(__path__), name)
 
 

@@ -1,24 +1,23 @@
-"""Cases that other distributions bring: modules named by entry points of the group `crossbody.cases`.
+"""Plug-ins that other distributions bring: modules named by entry points, in a group called like our package.
 
-Its pyproject.toml says `gripper = "my_package.gripper"` under `[project.entry-points."crossbody.cases"]`.
+The pyproject.toml of one says, for example,
+
+    [project.entry-points."crossbody.cases"]
+    gripper = "my_package.gripper"
+
+and likewise for "crossbody.engines", "crossbody.reports.metrics", "crossbody.hw.formats" and every other folder of
+plug-ins.
 """
 
 from __future__ import annotations
 
-import importlib
-from types import ModuleType
-
-GROUP = "crossbody.cases"
+from collections.abc import Mapping
+from functools import cache
 
 
-def installed() -> dict[str, str]:
-    """Name of a case -> its module, sorted; nothing is imported."""
-    from importlib.metadata import entry_points  # reads what is installed: only where a name is not one of ours
+@cache
+def modules(group: str) -> Mapping[str, str]:
+    """Name of a plug-in -> its module; nothing is imported."""
+    from importlib.metadata import entry_points  # reads what is installed: once a process and group
 
-    return {point.name: point.module for point in sorted(entry_points(group=GROUP), key=lambda x: x.name)}
-
-
-def load(name: str) -> ModuleType | None:
-    """The module of an installed case; None if there is none of that name."""
-    found = installed().get(name)
-    return None if found is None else importlib.import_module(found)
+    return {point.name: point.module for point in entry_points(group=group)}

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 from crossbody import cases
-from crossbody.cases import _installed, _registry
+from crossbody.cases import _registry
 from crossbody.cases._case import Case, Parameter, Value
 from crossbody.cases._errors import SceneError, UnknownName
 
@@ -24,13 +24,7 @@ def module(name: str) -> ModuleType:
 
 
 def _named(name: str) -> ModuleType:
-    try:
-        return _registry.load_plugin("case", cases.__name__, list(cases.__path__), name)
-    except UnknownName:
-        found = _installed.load(name)
-        if found is None:
-            raise UnknownName("case", name, cases.names()) from None
-        return found
+    return _registry.load_plugin("case", cases.__name__, list(cases.__path__), name)
 
 
 def from_file(kind: str, path: Path) -> ModuleType:

@@ -34,9 +34,10 @@ def load(name: str) -> Engine:
         package = (error.name or "").partition(".")[0]
         if package in ("", "crossbody"):
             raise
+        known = name in _registry.own_names(list(__path__))
+        brings = f"crossbody[{name}]" if known else package
         raise EngineUnavailable(
-            f"Engine {name!r} needs the package {package!r}, which is not installed: "
-            f"pip install 'crossbody[{name}]' brings it."
+            f"Engine {name!r} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."
         ) from None
     engine: Engine = module.ENGINE
     return engine

@@ -182,13 +182,51 @@ def test_a_fixture_without_a_case_says_how_to_name_one(pytester: pytest.Pytester
     done.stdout.fnmatch_lines(["*No case is named: use --crossbody-case CASE*"])
 
 
-def test_a_case_of_another_distribution_is_found_by_its_entry_point(
+ENTRIES = """[crossbody.cases]
+their_case = theirs
+[crossbody.engines]
+their_engine = their_engines
+absent_engine = needs_nothing_known
+[crossbody.reports.metrics]
+their_metric = their_metrics
+[crossbody.hw.formats]
+their_format = theirs
+"""
+ENGINE = """
+from crossbody.engines import load
+ENGINE = load("reference")
+"""
+METRIC = '''
+"""Where it ends."""
+UNIT, CLAIMED = "m", False
+def measure(truth, run, case):
+    return float(run.q[-1, 0])
+'''
+
+
+def test_plug_ins_of_another_distribution_are_found_by_their_entry_points(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     about = pytester.mkdir("theirs-1.0.dist-info")
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text("[crossbody.cases]\ntheir_case = theirs\n")
-    (pytester.path / "theirs.py").write_text(OWN.read_text())
+    (about / "entry_points.txt").write_text(ENTRIES)
+    pytester.makepyfile(theirs=OWN.read_text(), their_engines=ENGINE, their_metrics=METRIC)
+    pytester.makepyfile(needs_nothing_known="import no_such_package")
+    pytester.makepyfile(
+        test_mine="""
+        import pytest
+        from crossbody import engines
+        from crossbody.cases import EngineUnavailable
+        from crossbody.hw import formats
+
+        @pytest.mark.crossbody("their_case:right", engines=["their_engine:compiled"])
+        def test_named(crossbody_verdicts):
+            assert crossbody_verdicts["their_metric"].unit == "m"
+            assert "their_format" in formats.names()
+            with pytest.raises(EngineUnavailable, match="pip install 'no_such_package' brings it"):
+                engines.load("absent_engine")
+        """
+    )
     monkeypatch.setenv("PYTHONPATH", str(pytester.path))
-    done = run(pytester, "--crossbody-case", "their_case:right", *REFERENCE, "-k", "position")
-    done.assert_outcomes(passed=1, deselected=4)
+    done = run(pytester, "--crossbody-case", "their_case:right", *REFERENCE, "-k", "position or named")
+    done.assert_outcomes(passed=2, deselected=4)
