@@ -19,6 +19,7 @@ from crossbody.engines import _soft_contact as soft
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces, table
 from crossbody.engines._delta.scene import closures
+from crossbody.engines._linear import Chart
 from crossbody.reference.delta import Robot, scene
 from crossbody.reference.delta.kinematics import MOTORS, rotations
 from crossbody.reference.systems import _delta_kinematics as kinematics
@@ -183,6 +184,13 @@ def _add(total: list[float], turn: tuple[float, float], local: tuple[float, floa
     total[0] += c * x + s * y
     total[1] += c * y - s * x
     total[2] += z
+
+
+def small_motions(q: Floats) -> Chart:
+    """The chart of small motions about one position q (19,) of the engine; the clock is no coordinate of the case."""
+    hinges, (T, S) = chart.linear(q[:HINGES]), (np.eye(CLOCK, NV), np.eye(NV, CLOCK))
+    T[:HINGES, :HINGES], S[:HINGES, :HINGES] = hinges.T, hinges.S
+    return Chart(T=T, S=S)
 
 
 def joined(q: Floats, v: Floats, t: float) -> tuple[Floats, Floats]:

@@ -30,6 +30,7 @@ SCENES = [
     ("red_body", None, {}),
     ("soft_contact", "axis", {}),
     ("soft_contact", "axis", {"kstar": 0.0}),
+    ("soft_contact", "delta", {}),
     ("ball_maze", "outside", {}),
     ("ball_maze", "free", {}),
     ("ball_maze", "free", {"rolling": 0}),

@@ -15,6 +15,7 @@ import numpy as np
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _soft_contact as soft
+from crossbody.engines._linear import Spot
 from crossbody.engines._soft_delta import (
     AXES,
     HINGES,
@@ -26,11 +27,13 @@ from crossbody.engines._soft_delta import (
     linear,
     of_case,
     rows_of_case,
+    small_motions,
     soft_delta,
 )
 from crossbody.engines.mujoco._delta_model import FLAGS, text
 from crossbody.engines.mujoco._direct import law_of, without_regularisation
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
+from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._pairs import Pairs, add_pairs
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._two_sets import TwoSets
@@ -70,6 +73,16 @@ def build(case: Case, profile: str, dt: float) -> Scene:
     """
     own = soft_delta(case)
     return _matched(own, case) if profile == "matched" else _obvious(own, case)
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The matched model at an equilibrium, the clock at its time."""
+    scene = _matched(soft_delta(case), case)
+    scene.start()
+    scene.data.qpos[:], scene.data.qvel[:] = joined(spot.q, spot.v, spot.t)
+    if scene.arm is not None:
+        scene.arm(spot.modes(case))
+    return Stand(model=scene.model, data=scene.data, chart=small_motions(scene.data.qpos), hook=scene.hook)
 
 
 def _matched(own: SoftDelta, case: Case) -> Scene:

@@ -6,6 +6,7 @@ v' and all multipliers.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import pinocchio as pin
 
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
+from crossbody.engines._linear import Spot
 from crossbody.engines._soft_delta import (
     CLOCK,
     HINGES,
@@ -24,9 +26,11 @@ from crossbody.engines._soft_delta import (
     linear,
     of_case,
     rows_of_case,
+    small_motions,
     soft_delta,
 )
 from crossbody.engines.pinocchio._delta_model import Closed, by_hand
+from crossbody.engines.pinocchio._linear import Stand, of_rows
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene
 from crossbody.engines.pinocchio.soft_contact import why_not as why_not
@@ -60,6 +64,12 @@ def build(case: Case, algebra: str) -> Scene:
         rows=rows, observe=own.observe, sizes=own.sizes, start=own.start(case), chart=of_case,
         audit=_listed(rows, closed, own),
     )  # fmt: skip
+
+
+def stand(case: Case, spot: Spot) -> Stand:
+    """The model at an equilibrium, the clock at its time."""
+    q, v = joined(spot.q, spot.v, spot.t)
+    return replace(of_rows(build(case, "forwardDynamics").rows, spot), q=q, v=v, chart=small_motions(q))
 
 
 def _beside(closed: Closed, own: SoftDelta) -> Any:
