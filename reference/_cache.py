@@ -69,11 +69,22 @@ def compiled(function: Callable[..., Any], signatures: Any = None, *, nogil: boo
     before = numba_config.CACHE_DIR
     place = folder(sources) if sources else None
     numba_config.CACHE_DIR = str(place) if place else before
+    done = _mark(place, function, signatures) if place and signatures else None
     try:
-        with _alone(place if signatures else None):
-            return numba.njit(signatures, cache=bool(sources), error_model="numpy", nogil=nogil)(function)
+        with _alone(place if done and not done.exists() else None):
+            found = numba.njit(signatures, cache=bool(sources), error_model="numpy", nogil=nogil)(function)
+        if done and not done.exists():
+            done.touch()
+        return found
     finally:
         numba_config.CACHE_DIR = before
+
+
+def _mark(place: Path, function: Callable[..., Any], signatures: Any) -> Path:
+    """The file that says that this code is there: who only reads it back need not wait for others that compile."""
+    code = function.__code__
+    what = f"{code.co_filename}:{code.co_firstlineno} {function.__qualname__} {signatures}"
+    return place / f"{hashlib.sha256(what.encode()).hexdigest()[:16]}.compiled"
 
 
 _INSIDE = threading.RLock()
