@@ -38,7 +38,7 @@ from crossbody.reference.core.machine import DEEP, slow
 
 TIE = 1e-12  # rates closer than this are the same: the first row is struck first
 PULL = 1e-12  # part of the struck row's impulse below which a held row's is rounding
-STILL = 1e-15  # part of the largest rate seen: a rate below it is 0 but for rounding
+STILL = 1e-13  # part of the largest rate seen: a rate below it is 0 but for rounding
 CEILING = 64  # collisions at one instant, times the square of the number of rows: more never end
 NOT, BOUNCES, STAYS = np.arange(3)  # how a row takes part: not, struck, or touching at rest
 
@@ -193,6 +193,11 @@ def _one(K: Any, s: Any, m: Model, w: Work, b: Buffers, known: bool) -> int:
     return 0
 
 
+@inlined
+def _endless(s: Any) -> bool:
+    return bool(s.collisions_now > CEILING * (s.nc * s.nc + 16))
+
+
 @compiled
 def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Give rows that touch and whose gap stands still the rate 0, which they have but for `slow`.
@@ -206,7 +211,7 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         if STILL * s.speed < abs(w.rate[i]) <= slow(s) and _touches(s, m, w, b, i):
             w.struck[i] = STAYS
             still = True
-    if not still:
+    if not still or _endless(s):
         return 0
     activate(s, m, w, b.mode)
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:n], w.y[n:], GENERAL) != 0:
@@ -223,6 +228,8 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     solve_schur(w.G, s.na, w.reach, w.r, w.la)
     _apply(s, m, w, b)
     K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+    s.collisions_now += 1
+    s.collisions += 1
     return 0
 
 
@@ -247,7 +254,7 @@ def collide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     while _choose(s, m, w, b) >= 0:
         if full(s, b):
             return EVENTS_FULL
-        if s.collisions_now > CEILING * (s.nc * s.nc + 16):
+        if _endless(s):
             _name_touching(s, m, w, b)
             return MODE_CYCLE
         code = _one(K, s, m, w, b, known)
@@ -257,4 +264,4 @@ def collide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         s.collisions_now += 1
         s.collisions += 1
         K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
-    return int(_stand_still(K, s, m, w, b)) if s.collisions_now > 0 else 0
+    return int(_stand_still(K, s, m, w, b))
