@@ -111,6 +111,31 @@ def test_wrong_use_is_one_sentence_and_changes_nothing(
     assert {path: path.stat().st_mtime_ns for path in whole.rglob("*")} == before
 
 
+@pytest.mark.parametrize(
+    ("axes", "says"),
+    [
+        ("axes={'a0': Log(1.0, 2.0)}, grid={'a0': Levels((1.0,))}", "a0 is asked for twice"),
+        ("axes={'a0': Log(2.0, 1.0)}", "its low end must be finite and below its high end"),
+        ("grid={'a0': Levels(())}", "at least one value"),
+        ("", "needs an axis, a grid or a ladder"),
+    ],
+)
+def test_a_contradictory_grid_is_one_sentence(
+    tmp_path: Path, axes: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from crossbody.reports.suites._axis import Levels, Log\n"
+        "from crossbody.reports.suites._contract import Family, Suite\n"
+        f"SUITE = Suite(families=(Family(case='bouncing_ball', variant='linear', {axes}),))\n"
+    )
+    assert call("stress", str(path), "--out", str(tmp_path / "out")) == 2
+    told = capsys.readouterr().err
+    assert says in told
+    assert told.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
 def test_another_version_and_foreign_folders_are_not_touched(whole: Path, tmp_path: Path) -> None:
     specs = plan(Ask(names=("damping",), runs=5, wanted=("reference:compiled",)))
     about = identity(specs, 4, {"seed": 0})
@@ -199,7 +224,7 @@ def test_a_scheduler_that_does_not_answer_is_told_within_its_time(tmp_path: Path
         began = time.monotonic()
         with pytest.raises(SchedulerUnavailable, match="No dask scheduler answers"):
             pools.connect(address)
-        assert time.monotonic() - began < 2.0 * pools.ANSWER
+        assert time.monotonic() - began < 10.0
     with pytest.raises(SchedulerUnavailable):
         pools.connect("nonsense://")
     assert call(*WORDS, "--scheduler", "tcp://127.0.0.1:1", "--out", str(tmp_path / "out")) == 2
@@ -247,15 +272,15 @@ def test_a_sweep_that_is_killed_goes_on_to_the_same_table(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_twenty_kills_change_nothing(tmp_path: Path) -> None:
-    ended(tmp_path / "whole", "drops", 6000, 2)
+    ended(tmp_path / "whole", "speed", 6000, 2)
     rng, hits, place = random.Random(5), 0, 0
     while hits < 20:
         out = tmp_path / f"killed{place}"
-        hits += strike(out, "drops", 6000, 2, rng)
+        hits += strike(out, "speed", 6000, 2, rng)
         if (out / "stress.parquet").is_file():
             same(tmp_path / "whole", out)
             place += 1
-    ended(out, "drops", 6000, 2)
+    ended(out, "speed", 6000, 2)
     same(tmp_path / "whole", out)
 
 
@@ -272,7 +297,7 @@ def cluster() -> Iterator[Any]:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_worker_killed_in_a_cluster_loses_no_result(cluster: Any, tmp_path: Path) -> None:
-    specs = plan(Ask(names=("drops",), runs=1500, wanted=("reference:compiled",)))
+    specs = plan(Ask(names=("speed",), runs=1500, wanted=("reference:compiled",)))
     stores = {name: Store(tmp_path / name, identity(specs, 20, {"seed": 0})) for name in ("here", "there")}
     sweep(stores["here"], specs, 20, Pool(count=1), quiet=True)
     client = pools.connect(cluster.scheduler_address)

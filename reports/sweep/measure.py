@@ -13,6 +13,7 @@ from crossbody.cases import Case, CrossbodyError, Event, Mode, Tier, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import Truth, from_run
+from crossbody.reports.metrics._align import matched
 from crossbody.reports.metrics._contacts import contacts
 
 SHARES = (33, 49)
@@ -73,11 +74,12 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     found = _against(truth, run, case)
     if not found.value > asked.limit:
         return found
-    until = _divergence(truth, run.t, asked)
+    until = _divergence(truth, run.t, asked, case.t_end)
     if until > case.t_end:
         return found
-    before = run.t < until
-    value = float(np.max(_distance(truth.at(run.t), run, run.t)[before], initial=0.0))
+    shifts = [shift for start, shift in _shifts(truth, run) if start < until]
+    apart = _distance(truth.at(run.t), run, run.t)[run.t < until]
+    value = max(float(np.max(apart, initial=0.0)), max(shifts, default=0.0) / case.t_end)
     return Error(value=value, tier=found.tier, until=until, why=f"diverges at t = {until:.3g} s; behind, {found.why}")
 
 
@@ -112,8 +114,11 @@ def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Tru
     return from_run(other, Tier.C, "compiled against CVODE")
 
 
-def _divergence(truth: Truth, times: Floats, asked: Asked) -> float:
-    """When the truth has parted by the limit from that of the scene beside it, s; infinite if it never does."""
+def _divergence(truth: Truth, times: Floats, asked: Asked, t_end: float) -> float:
+    """When the truth has parted by the limit from that of the scene beside it, s; infinite if it never does.
+
+    That may be in a coordinate, or in the time of a touch: a gap that closes slowly closes at a time hardly known.
+    """
     try:
         near = _truth(asked.near(), times, asked)
     except CrossbodyError:  # the scene stands at the edge of what can be built
@@ -121,7 +126,13 @@ def _divergence(truth: Truth, times: Floats, asked: Asked) -> float:
     if isinstance(near, str):
         return math.inf
     off = _distance(truth.at(times), near.at(times), times) > asked.limit
-    return float(times[np.argmax(off)]) if off.any() else math.inf
+    late = [start for start, shift in _shifts(truth, near.trajectory) if shift > asked.limit * t_end]
+    return min(float(times[np.argmax(off)]) if off.any() else math.inf, *late, math.inf)
+
+
+def _shifts(truth: Truth, run: Trajectory) -> list[tuple[float, float]]:
+    """Of every contact that both have: when it begins, and by how much it is shifted, s."""
+    return [(min(a.touch, b.touch), abs(a.touch - b.touch)) for a, b in matched(truth, run)]
 
 
 def at_the_end(case: Case, q: Floats, v: Floats) -> Error:
