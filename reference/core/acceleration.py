@@ -14,7 +14,7 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes, Floats
-from crossbody.reference.core.algebra import factor_mass, factor_schur, solve_mass, solve_schur
+from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 
 # numba compiles a function anew for every literal that it is called with; numpy's integers are values, not literals.
@@ -29,7 +29,13 @@ def is_active(mode: int) -> bool:
 
 @inlined
 def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """The fast constants for a row in COLLISION that has any (one that follows it may not), else the slow ones."""
+    """The fast constants for a row in COLLISION that has any (one that follows it may not), else the slow ones.
+
+    Frozen collisions take no time, so that the slow ones are in force throughout.
+    """
+    if s.frozen and s.have_laws:
+        return
+    s.have_laws = 1
     for i in range(s.nc):
         fast = mode[i] == COLLISION and (m.beta[i, 0] > 0.0 or m.beta[i, 1] > 0.0)
         for j in range(3):
@@ -63,9 +69,10 @@ def add_row(m: Model, w: Work, j: int, i: int) -> None:
 def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     """List the active rows and put their constants in force; a row that follows another shares its mode."""
     na = 0
+    follows = m.follows
     for i in range(s.nc):
-        if m.follows[i] >= 0:
-            mode[i] = mode[m.follows[i]]
+        if follows[i] >= 0:
+            mode[i] = mode[follows[i]]
         if is_active(mode[i]):
             add_row(m, w, na, i)
             na += 1
@@ -76,15 +83,19 @@ def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
 @inlined
 def scatter(s: Any, w: Work, lam: Array) -> None:
     """Lam of all rows from lam of the active ones."""
+    la, idx = w.la, w.idx
     for i in range(s.nc):
         lam[i] = 0.0
     for j in range(s.na):
-        lam[w.idx[j]] = w.la[j]
+        lam[idx[j]] = la[j]
 
 
 @inlined
 def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
-    """Vd = M^-1 f; leaves the factor of M."""
+    """Vd = M^-1 f; leaves the factor of M. In an affine scene it is worked out once for every set of inputs."""
+    if s.have_free:
+        copy(w.free, w.vd)
+        return 0
     dynamics(t, q, v, w.u, p, w.M, w.f, w.w)
     if not (s.constant_mass and s.have_mass):
         if factor_mass(w.M, w.L, s.n, s.k) != 0:
@@ -93,6 +104,9 @@ def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Arra
     for i in range(s.n):
         w.vd[i] = w.f[i]
     solve_mass(w.L, w.vd, s.k, 0, s.n)
+    if s.affine:
+        s.have_free = 1
+        copy(w.vd, w.free)
     return 0
 
 

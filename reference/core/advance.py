@@ -52,6 +52,7 @@ class Kernels(NamedTuple):
 @inlined
 def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Put the inputs that hold from now on in force and find the next instant at which they change."""
+    s.have_free = 0
     while s.next_input < len(b.inputs_t) and b.inputs_t[s.next_input] <= s.t:
         before = s.next_input - 1
         for i in range(s.nu):  # by its change, so that what a controller holds on top stays

@@ -21,6 +21,15 @@ def copy(source: Array, target: Array) -> None:
         target[i] = source[i]
 
 
+@inlined
+def all_finite(x: Array) -> bool:
+    """Whether no entry is NaN or infinite: one such makes the sum of x - x, else 0, NaN."""
+    total = 0.0
+    for i in range(len(x)):
+        total += x[i] - x[i]
+    return total == 0.0
+
+
 @compiled
 def factor_mass(M: Floats, L: Floats, n: int, k: int) -> int:
     """Cholesky factor of every block; 1 if one is not positive definite."""

@@ -27,9 +27,10 @@ def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int
     n = s.n
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[:n], y[n:], OWN) != 0:
         return 1
+    k, vd = w.k[stage], w.vd
     for i in range(n):
-        w.k[stage, i] = y[n + i]
-        w.k[stage, n + i] = w.vd[i]
+        k[i] = y[n + i]
+        k[n + i] = vd[i]
     if s.ledger:
         powers(K, s, m, w, t, y, stage)
     return 0

@@ -355,8 +355,10 @@ def _fall(h: float, rate: float, a: float) -> float:
 @inlined
 def _free_flight(s: Any, w: Work, i: int) -> float:
     """First touch of a FREE row in free flight, where its gap is a parabola: in closed form."""
-    h, rate = w.gaps[0, i], w.rates[0, i]
-    a = (w.rates[NODES - 1, i] - rate) / s.hs
+    h, rate, end = w.gaps[0, i], w.rates[0, i], w.rates[NODES - 1, i]
+    if h > s.touch and w.gaps[NODES - 1, i] > 0.0 and not rate < 0.0 < end:
+        return NEVER  # most rows
+    a = (end - rate) / s.hs
     if h > s.touch:
         w.kind[i] = TOUCH
         t = _fall(h, rate, a)
@@ -375,20 +377,23 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     if s.ng > 0 and _scan_switches(K, s, m, w, mode) != 0:
         return 1
     any_gap, any_multiplier = False, False
+    hit, kind, unilateral, follows = w.hit, w.kind, m.unilateral, m.follows
     for i in range(s.nc):
-        w.hit[i] = NEVER
-        w.kind[i] = NONE
-        if m.unilateral[i] and m.follows[i] < 0 and _watched(s, w, mode, i):
-            w.hit[i] = 1.0
+        hit[i] = NEVER
+        kind[i] = NONE
+        if unilateral[i] and follows[i] < 0 and _watched(s, w, mode, i):
+            hit[i] = 1.0
             any_gap = True
             any_multiplier = any_multiplier or is_active(mode[i])
     if not any_gap:
         return 0
     if _all_free(s, m, mode):
+        first = s.theta
         for i in range(s.nc):
-            if w.hit[i] == 1.0:
-                w.hit[i] = _free_flight(s, w, i)
-                s.theta = min(s.theta, w.hit[i])
+            if hit[i] == 1.0:
+                hit[i] = _free_flight(s, w, i)
+                first = min(first, hit[i])
+        s.theta = first
         if s.theta <= 1.0:
             _tie(s, w)
         return 0

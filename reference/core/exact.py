@@ -135,9 +135,10 @@ def evaluate(s: Any, m: Model, w: Work, t: float, out: Array) -> None:
     """Out = (q, v) after time t on the arc."""
     n = s.n
     q, v = out[:n], out[n:]
+    y, g = w.y, w.g
     for a in range(n):
-        v[a] = w.y[n + a] + w.g[a] * t
-        q[a] = w.y[a] + (w.y[n + a] + 0.5 * w.g[a] * t) * t
+        v[a] = y[n + a] + g[a] * t
+        q[a] = y[a] + (y[n + a] + 0.5 * g[a] * t) * t
     if s.na == 0:
         return
     for j in range(s.na):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from crossbody.reference._cache import compiled, inlined
-from crossbody.reference.core.algebra import ULP
+from crossbody.reference._kinds import Bytes
+from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.layout import Buffers, Model, Work
 
 
@@ -35,13 +34,22 @@ def remember(s: Any, b: Buffers) -> bool:
     if abs(s.t - s.history_t) > 8.0 * ULP * abs(s.t):
         s.history, s.history_t, s.one_by_one = 0, s.t, 0
     for r in range(s.history):
-        if np.array_equal(b.history[r], b.mode):
+        if _same(b.history[r], b.mode):
             return True
     if s.history < len(b.history) - 1:
-        b.history[s.history] = b.mode
+        copy(b.mode, b.history[s.history])
         s.history += 1
         return False
     return True
+
+
+@inlined
+def _same(one: Bytes, other: Bytes) -> bool:
+    """Whether two mode sets are equal."""
+    differing = 0
+    for i in range(len(one)):
+        differing += one[i] != other[i]
+    return differing == 0
 
 
 @inlined

@@ -70,6 +70,8 @@ STATE = np.dtype(
         ("na", "i8"),
         ("have_dense", "i8"),
         ("have_mass", "i8"),
+        ("have_free", "i8"),
+        ("have_laws", "i8"),
         ("stalled", "i8"),
         ("hold", "i8"),
         ("trial_steps", "i8"),
@@ -165,6 +167,7 @@ class Work:
     hda: Floats
     la: Floats
     vd: Floats
+    free: Floats  # (n,) M^-1 f of an affine scene: constant between inputs
     law: Floats2  # (nc, 3) in force now
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
@@ -210,7 +213,7 @@ def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: i
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "G": (nc, nc), "law": (nc, 3),
-        **dict.fromkeys(("f", "vd", "d", "g", "pivot"), (n,)),
+        **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
         **dict.fromkeys(("guard", "guard_lo", "guard_hi", "guard_hit"), (ng,)),

@@ -19,7 +19,7 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes, Floats
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, clear, is_active, scatter
-from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.algebra import ULP, all_finite
 from crossbody.reference.core.dop853 import START, derivative
 from crossbody.reference.core.layout import (
     BALLISTIC,
@@ -94,14 +94,13 @@ def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     if derivative(K, s, m, w, s.t, w.y, START) != 0:
         return ILL_POSED
     scatter(s, w, w.lam)
-    for a in range(n):
-        if not np.isfinite(w.vd[a]):
-            return NOT_FINITE
+    if not (all_finite(w.vd) and all_finite(w.gap) and all_finite(w.rate) and all_finite(w.lam)):
+        return NOT_FINITE
+    speed, rate, unilateral, follows = s.speed, w.rate, m.unilateral, m.follows
     for i in range(s.nc):
-        if not (np.isfinite(w.gap[i]) and np.isfinite(w.rate[i]) and np.isfinite(w.lam[i])):
-            return NOT_FINITE
-        if m.unilateral[i] and m.follows[i] < 0:
-            s.speed = max(s.speed, abs(w.rate[i]))
+        if unilateral[i] and follows[i] < 0:
+            speed = max(speed, abs(rate[i]))
+    s.speed = speed
     return 0
 
 

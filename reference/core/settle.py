@@ -6,10 +6,10 @@ from typing import Any
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate
-from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.collisions import collide
 from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
-from crossbody.reference.core.layout import EDGE, LEVEL, LOST, MEMORYLESS, MODE_CYCLE, Buffers, Model, Work
+from crossbody.reference.core.layout import EDGE, FREE, LEVEL, LOST, MEMORYLESS, MODE_CYCLE, Buffers, Model, Work
 from crossbody.reference.core.machine import evaluate, next_mode, noise
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
@@ -24,7 +24,8 @@ def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     count = 0
     changed = b.history[len(b.history) - 1]
     for i in range(s.nc):
-        if m.unilateral[i] and m.follows[i] < 0:
+        apart = s.fsm == LEVEL and b.mode[i] == FREE and w.gap[i] > s.touch  # most rows: they stay so
+        if not apart and m.unilateral[i] and m.follows[i] < 0:
             after = next_mode(K, s, m, w, b.mode, i)
             if after != b.mode[i]:
                 move(s, b, i, after)
@@ -86,6 +87,7 @@ def switch(K: Any, s: Any, m: Model, w: Work, b: Buffers, fired: int) -> int:
     keep_discrete(s, m, w, b)
     result = K.switch(s.t, w.y[: s.n], w.y[s.n :], m.p, b.mode, fired)
     write_discrete(s, m, w, b)
+    s.have_free = 0
     return int(result)
 
 
@@ -112,8 +114,7 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             return MODE_CYCLE
         s.history, s.one_by_one = 0, 0
         code = _iterate(K, s, m, w, b)
-    for i in range(s.nc):
-        w.lam0[i] = w.lam[i]
-        w.gaps[0, i] = w.gap[i]
-        w.rates[0, i] = w.rate[i]
+    copy(w.lam, w.lam0)
+    copy(w.gap, w.gaps[0])
+    copy(w.rate, w.rates[0])
     return int(code)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from crossbody.reference._cache import inlined
 from crossbody.reference.core import bogacki, choice, dop853, esdirk, exact
 from crossbody.reference.core.acceleration import scatter
-from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.algebra import ULP, all_finite, copy
 from crossbody.reference.core.dop853_table import STAGES
 from crossbody.reference.core.layout import (
     DIVERGED,
@@ -62,14 +60,14 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
     if s.nc > 0:
         s.guards += 1
         K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
-    for i in range(s.nc):
-        w.lams[0, i] = w.lam0[i]
-        if not (np.isfinite(w.gaps[last, i]) and np.isfinite(w.rates[last, i]) and np.isfinite(w.lams[last, i])):
-            return NOT_FINITE
+    copy(w.lam0, w.lams[0])
+    if not (all_finite(w.gaps[last]) and all_finite(w.rates[last]) and all_finite(w.lams[last])):
+        return NOT_FINITE
+    if not all_finite(w.k[end]):
+        return NOT_FINITE
+    y1 = w.y1
     for i in range(2 * n):
-        if not np.isfinite(w.k[end, i]):
-            return NOT_FINITE
-        if abs(w.y1[i]) > FAR:
+        if abs(y1[i]) > FAR:
             return DIVERGED
     s.t_old = s.t
     return 0
