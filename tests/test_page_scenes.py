@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Trajectory
 from crossbody.reports import scenes
-from crossbody.reports.pages.figures import impulse
+from crossbody.reports.pages.case_page import PLOTTED
+from crossbody.reports.pages.figures import FIGURES, impulse, points_for
 from crossbody.reports.pages.playback import chosen, packed, peaks, playback
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace
@@ -172,6 +174,21 @@ def test_collisions_that_take_no_time_are_drawn_as_impulses() -> None:
     assert np.allclose(blows, wanted, atol=1e-6)
     step = impulse(struck.run, events)
     assert np.allclose(step[:, 2], np.where(struck.run.t >= 0.05, 3.0, 0.0))
+
+
+def test_plots_of_many_engines_and_events_stay_in_their_room() -> None:
+    case, n = cases.load("newtons_cradle", "pendulums"), 3000
+    rng, t = np.random.default_rng(5), np.linspace(0.0, case.t_end, n)
+    events = tuple(Event(t=float(at), contact=0, before=Mode.FREE, after=Mode.CONTACT) for at in t[::40])
+    q, wide = rng.standard_normal((n, len(case.q0))), rng.random((n, len(case.contacts)))
+    run = Trajectory(
+        t=t, q=q, v=q, gap=-wide, lam=wide, energy=rng.random((n, 2)), mode=(wide > 0.5).astype(np.int8), events=events
+    )  # fmt: skip
+    many = [Trace(about=study._about(case, "e", str(i)), run=run, truth=run) for i in range(10)]
+    points = points_for(many, PLOTTED)
+    drawn = {name: len(json.dumps(draw(many, points))) for name, (_, draw) in FIGURES.items()}
+    assert sum(size for name, size in drawn.items() if name not in ("modes", "steps")) < 1.1 * PLOTTED
+    assert points > 100
 
 
 def test_an_unknown_mechanism_is_told() -> None:
