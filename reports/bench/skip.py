@@ -167,7 +167,7 @@ def endless(bounces: int) -> Any:
 def _bounces(_repeats: int) -> Iterator[dict[str, Any]]:
     """A million bounces beside a hundred thousand."""
     few, many = endless(100_000), endless(1_000_000)
-    took = _seconds({"few": few, "many": many}, 1)
+    took = _seconds({"few": few, "many": many}, 2)
     held = {name: _bytes(run) for name, run in (("few", few), ("many", many))}
     per = {"1e5": took["few"] / 1e5, "1e6": took["many"] / 1e6}
     lever = Lever(what="time of a bounce, 1e6 over 1e5 of them", limit=1.2, how="a step costs the same at any time")
