@@ -18,7 +18,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, EngineUnavailable, Outcome, Trajectory, UnknownName
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.bounds import Overdue, bounded, killed, overheard
-from crossbody.reports.sweep.measure import Asked, Error, error, instants, residual
+from crossbody.reports.sweep.measure import SECOND_RTOL, Asked, Error, error, instants, residual
 from crossbody.reports.sweep.spec import Spec
 
 RTOL = 1e-9
@@ -138,10 +138,11 @@ def _rtol(settings: Mapping[str, float] | None) -> float:
 
 
 def _beside(spec: Spec, case: Case, settings: Mapping[str, float] | None) -> Case:
-    """The scene with every number moved by as much as the tolerance of the run, up or down."""
+    """The scene with every number moved by the tolerance of the run, up or down; by the truth's if that is coarser."""
+    apart = max(_rtol(settings), 0.0 if case.closed_form is not None else SECOND_RTOL)
     signs = np.random.default_rng(spec.seed)
     near: dict[str, cases.Value] = {
-        name: value * (1.0 + _rtol(settings) * float(signs.choice((-1.0, 1.0)))) if isinstance(value, float) else value
+        name: value * (1.0 + apart * float(signs.choice((-1.0, 1.0)))) if isinstance(value, float) else value
         for name, value in spec.parameters.items()
     }
     if "t_end" in case.parameters:
