@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.cases import _closed_forms as cf
 from crossbody.reports.suites._axis import Levels, Linear, Log
-from crossbody.reports.suites._contract import Drawn, Family, Suite
+from crossbody.reports.suites._contract import TIGHT, Drawn, Family, Suite
 from crossbody.reports.suites._scenes import damped, numbers
 
 
@@ -19,10 +19,13 @@ def _threshold(drawn: Drawn, _rng: np.random.Generator) -> Drawn:
     return {"a0": a0, "a1": a1, "speed": near * cf.threshold_speed(a0, a1, 9.81)}
 
 
+# At 1e-6 m/s the default absolute tolerance of 1e-12 is a millionth of all there is. A hard floor that damps little is
+# bounced on at such speeds more often than the bound on steps allows.
 SUITE = Suite(
     families=(
         Family(
-            case="bouncing_ball", variant="linear", scene=damped, fixed={"height": 0.0, "t_end": 0.5},
+            case="bouncing_ball", variant="linear", scene=damped, fixed={"height": 0.0, "t_end": 0.5}, ladder=TIGHT,
+            finishes=False,
             axes={"speed": Log(1e-6, 1e3), "a0": Log(1.0, 1e12), "zeta": Linear(0.05, 2.0)},
             grid={"gravity": Levels((0.0, 9.81))},
         ),

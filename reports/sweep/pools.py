@@ -122,7 +122,7 @@ def cluster(chunks: Sequence[Chunk], client: Any) -> Iterator[tuple[int, Rows]]:
     specs = dict(chunks)
     futures = [client.submit(work, chunk, pure=False) for chunk in chunks]
     numbers = {future.key: number for future, (number, _) in zip(futures, chunks, strict=True)}
-    for future in as_completed(futures):
+    for future in as_completed(futures, loop=client.loop):  # this client is nobody's default
         error = future.exception()
         if isinstance(error, KilledWorker):
             number = numbers[future.key]
