@@ -36,6 +36,7 @@ SUITE = Suite(
         ),
         Family(
             case="newtons_cradle", variant="sliders", fixed={"n": 2, "collisions": "resolved"}, second=10,
+            ladder=TIGHT,
             axes={"speed": Log(1e-6, 1e3), "a0": Log(1.0, 1e12), "zeta": Linear(0.0, 2.0)},
         ),
     ),
