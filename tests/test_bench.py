@@ -327,3 +327,10 @@ def test_a_ladder_ends_before_the_rung_that_takes_too_long(
         found.append((setting, int(run.settings["max_steps"])))
     assert len(found) == rungs
     assert all(bound <= 2.0 * longest / 0.01 * 1.001 or bound <= 2**i for i, (_, bound) in enumerate(found[1:], 1))
+
+
+def test_a_ladder_ends_where_the_engine_admits_no_finer_setting() -> None:
+    pytest.importorskip("exudyn")
+    case = cases.load("bouncing_ball", "linear", t_end=0.1)
+    settings = [setting for _, setting, _ in Ladder(case, Pick(engine="exudyn", profile="matched"), Effort())]
+    assert settings[-1] == 1e-12

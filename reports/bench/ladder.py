@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from crossbody import engines
-from crossbody.cases import Case
+from crossbody.cases import Case, InvalidValue
 from crossbody.reports.runs.jobs import Pick
 
 LADDERS = {
@@ -64,7 +64,11 @@ class Ladder:
                 return
             if knob != "dt" or setting <= self.case.t_end:
                 given = {knob: setting, **lean, **self._bound(plain)}
-                yield knob, setting, engines.load(self.pick.engine).prepare(self.case, self.pick.profile, **given)
+                try:
+                    run = engines.load(self.pick.engine).prepare(self.case, self.pick.profile, **given)
+                except InvalidValue:  # finer than the engine admits
+                    return
+                yield knob, setting, run
 
     def climbed(self, took: float, steps: int) -> None:
         """Tell what the rung cost: wall time, s, and steps."""
