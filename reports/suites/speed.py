@@ -31,6 +31,7 @@ SUITE = Suite(
         ),
         Family(
             case="bouncing_ball", variant="linear", scene=_threshold, fixed={"height": 0.0, "t_end": 0.5},
+            ladder=TIGHT,
             axes={"a0": Log(1e2, 1e10), "zeta": Linear(0.0, 2.0)},
             grid={"near": Levels((0.5, 0.9, 0.99, 1.0 - 1e-6, 1.0 + 1e-6, 1.01, 1.1, 2.0))},
         ),
