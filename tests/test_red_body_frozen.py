@@ -196,7 +196,7 @@ def test_the_report_draws_the_step_size() -> None:
     found = run(load("red_body"))
     about = {"engine": "reference", "profile": "compiled", "steps": _steps(found.t)}
     title, draw = FIGURES["steps"]
-    figure = draw([Trace(about=about, run=found)], len(found.t))
+    figure = draw([Trace(about=about, run=found)], 10 * len(found.t))
     (line,) = figure["data"]
     starts, lengths = (np.frombuffer(base64.b64decode(line[axis]["bdata"]), line[axis]["dtype"]) for axis in "xy")
     assert title == "Step size"

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases._trajectory import Trajectory
+from crossbody.cases._trajectory import Event, Trajectory
+
+SAME = 1e-7
+"""Part of the horizon within which a sample and a collision are at one instant."""
 
 
 def cumulative(run: Trajectory, t: Floats | None = None) -> Floats:
@@ -18,4 +23,21 @@ def cumulative(run: Trajectory, t: Floats | None = None) -> Floats:
     t = run.t if t is None else t
     pieces = 0.5 * np.diff(t)[:, None] * (run.lam[1:] + run.lam[:-1])
     total: Floats = np.concatenate([np.zeros((1, run.lam.shape[1])), np.cumsum(pieces, axis=0)])
+    return total
+
+
+def with_collisions(run: Trajectory, events: Sequence[Event]) -> Floats:
+    """The same with the impulses of collisions that took no time (n, nc), N s.
+
+    Args:
+        run: its multipliers.
+        events: those of the motion, in the run's time.
+    """
+    total = cumulative(run)
+    near = SAME * float(run.t[-1]) if len(run.t) else 0.0
+    for event in events:
+        if event.impulse:  # of two samples at that instant the second is behind the step
+            last = int(np.searchsorted(run.t, event.t + near, side="right")) - 1
+            behind = last if last >= 0 and run.t[last] >= event.t - near else last + 1
+            total[behind:, event.contact] += event.impulse
     return total

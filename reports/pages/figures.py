@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from crossbody.cases import Event, Mode, Trajectory
+from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
-from crossbody.reports.metrics._impulse import cumulative
+from crossbody.reports.metrics._impulse import with_collisions
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.section import Figure
 from crossbody.reports.pages.sheet import Sheet
@@ -22,8 +22,6 @@ SAMPLE = 16
 FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
-MATCHED = 1e-7
-"""Of the horizon: instants that are no further apart are those of one event."""
 ROUNDING = 1e-17
 """Depth below which there is none, m."""
 
@@ -78,18 +76,6 @@ def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     return sheet.done()
 
 
-def impulse(run: Trajectory, events: Sequence[Event]) -> Floats:
-    """INT lam dt of a motion (n, nc) with the impulses of collisions that took no time, N s."""
-    total = cumulative(run)
-    near = MATCHED * float(run.t[-1]) if len(run.t) else 0.0
-    for event in events:
-        if event.impulse:  # of two samples at that instant the second is behind the step
-            last = int(np.searchsorted(run.t, event.t + near, side="right")) - 1
-            behind = last if last >= 0 and run.t[last] >= event.t - near else last + 1
-            total[behind:, event.contact] += event.impulse
-    return total
-
-
 def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
@@ -97,9 +83,9 @@ def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     each = ("lam {}\n[N]", "impulse\n[N s]", "|error|\n[N s]")
     rows = [text.format(contacts[k]) for k in shown for text in each]
     sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points, group=3)
-    summed = [impulse(trace.run, trace.run.events) for trace in traces]
+    summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
     floor = floor_of(summed[0])
-    true = [None if trace.truth is None else impulse(trace.truth, traces[0].run.events) for trace in traces]
+    true = [None if trace.truth is None else with_collisions(trace.truth, traces[0].run.events) for trace in traces]
     for place, k in enumerate(shown):
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
