@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from crossbody.hw.replaying.inverse import Inferred, estimate_force, inverse
     from crossbody.hw.replaying.replay import replay
     from crossbody.hw.replaying.sensors import Sensor, unlagged
+    from crossbody.hw.replaying.tracked import track_force
     from crossbody.hw.synthetic.log import Sensors, delta_log
     from crossbody.hw.synthetic.plant import Plant, Push, delta_plant
 
@@ -52,6 +53,7 @@ _HOMES = {
     "reading.read": ("Scan", "check", "parts", "read", "scan"),
     "replaying.replay": ("replay",),
     "reading.rows": ("Rows",),
+    "replaying.tracked": ("track_force",),
     "replaying.sensors": ("Sensor", "unlagged"),
     "reading.store": ("store",),
     "synthetic.log": ("Sensors", "delta_log"),
@@ -101,6 +103,7 @@ __all__ = [
     "scan",
     "store",
     "survey",
+    "track_force",
     "unlagged",
 ]
 

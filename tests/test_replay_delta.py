@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from crossbody import hw
+from crossbody.cases import InvalidValue, SceneError
 
 pytest.importorskip("mujoco")
 
@@ -86,6 +87,21 @@ def test_a_force_that_was_not_measured_is_found_within_its_uncertainty(pushed: h
     assert np.abs(true).max() == 5.0
     assert np.mean(np.abs(error) < 2.0 * found.std[steady]) > 0.9
     assert np.sqrt(np.mean(error**2)) < 1.5 * found.std.mean()
+
+
+def test_a_force_is_followed_from_positions_alone_within_its_uncertainty(pushed: hw.Plant) -> None:
+    log = hw.delta_log(pushed)
+    found = hw.track_force(log, "delta", size=3.0, memory=0.1, delay=DELAY, stride=2)
+    true = pushed.force[np.clip(np.searchsorted(pushed.t, found.t + 1e-9) - 1, 0, len(pushed.force) - 1)]
+    edges = np.array([0.5, 0.7, 0.9, 1.1, found.t[0], found.t[-1]])
+    steady = np.abs(found.t[:, None] - edges).min(axis=1) > 0.03  # a jump is no Gauss-Markov process
+    error = (found.value - true)[steady]
+    assert np.mean(np.abs(error) < 2.0 * found.std[steady]) > 0.9
+    assert np.median(found.std[steady]) < 0.5
+    with pytest.raises(InvalidValue, match="time_force"):
+        hw.track_force(log, "delta", size=3.0, memory=0.0)
+    with pytest.raises(SceneError, match="no input for a force"):
+        hw.track_force(log, "ball", size=1.0, memory=0.1)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -135,7 +135,7 @@ def _balance(
     rows = _rows(log, half, stride)
     smooth = derivatives(log.time, y, half, degree, rows)
     value, rate, acceleration, gain = smooth
-    noise = gain[:, 2:] * _noise(log.time, y, half, degree)
+    noise = gain[:, 2:] * noise_of(log.time, y, half, degree)
     segment = Segment(y=value[0], yd=rate[0], t_end=float(log.time[-1] - log.time[0]))
     case = model.build(model.numbers(parameters), segment)
     system = system_of(case)
@@ -173,7 +173,7 @@ def _one(
     return q, S.T @ (M @ vd - f), S.T @ B, S.T @ M @ S
 
 
-def _noise(t: Floats, y: Floats, half: int, degree: int) -> Floats:
+def noise_of(t: Floats, y: Floats, half: int, degree: int) -> Floats:
     """Standard deviation of the samples about their polynomials (k,), all parameters of which are paid for."""
     rows = np.arange(half, len(t) - half)
     value, _, _, gain = derivatives(t, y, half, degree, rows)

@@ -1,0 +1,81 @@
+"""The force that nobody measured, followed through a log by an extended Kalman filter and smoother.
+
+Beside `estimate_force`, which balances accelerations one instant at a time, this one knows the equations of motion from
+sample to sample and how quickly forces change (a Gauss-Markov process): positions alone serve, nothing is smoothed by a
+polynomial, and the covariance holds the errors of neighbouring samples together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from crossbody.cases import SceneError, Value
+from crossbody.engines._equations import system_of
+from crossbody.hw import models
+from crossbody.hw.models._contract import Model, Segment
+from crossbody.hw.reading.log import Log
+from crossbody.hw.replaying.inverse import Inferred, noise_of
+from crossbody.hw.replaying.lift import check_measured
+from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, derivatives
+from crossbody.reference.linear import Unknown, filtered
+
+
+def track_force(
+    log: Log, model: str | Model, *, size: float, memory: float, parameters: Mapping[str, Value] | None = None,
+    delay: float = 0.0, stride: int = 1,
+) -> Inferred:  # fmt: skip
+    """The force that acts on the mechanism besides the recorded torques, from positions and torques.
+
+    Args:
+        log: what was recorded.
+        model: its name in `hw.models`, or itself; its rows are always on, and it has inputs for such a force.
+        size: standard deviation that the force may have, N.
+        memory: its correlation time, s: much longer than a sample, not longer than what is to be seen.
+        parameters: of the model, where not its defaults.
+        delay: of the measured coordinates beyond what the column map says, s.
+        stride: of so many samples one is used.
+
+    Raises:
+        SceneError: if the log or the model does not fit.
+        InvalidValue: for a log shorter than a polynomial, or a size or memory that is not above 0.
+    """
+    chosen = models.load(model) if isinstance(model, str) else model
+    if not chosen.forces:
+        raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
+    chosen.check_log(log)
+    y, _ = chosen.read(chosen, log)
+    shift = log.channel("coordinates", chosen.channels[0]).delay + delay
+    value, rate, _, _ = derivatives(log.time, y, HALF, DEGREE, np.array([HALF]))
+    kept, t = slice(HALF, None, stride), log.time - shift
+    case = chosen.build(chosen.numbers(parameters), Segment(y=value[0], yd=rate[0], t_end=float(t[-1] - t[0])))
+    system, own = system_of(case), len(chosen.inputs)
+    check_measured(system, chosen.seen, chosen.name)
+    u = np.zeros((len(t[kept]), system.inputs))
+    u[:, :own] = _means(log.time, log.matrix("inputs", chosen.inputs), t[kept])
+    found = filtered(
+        system, t[kept], y[kept], u, unknown=Unknown(inputs=tuple(range(own, own + len(chosen.forces)))),
+        measured=chosen.seen, std_y=noise_of(log.time, y, HALF, DEGREE), q0=case.q0, v0=case.v0, std_force=size,
+        time_force=memory,
+    )  # fmt: skip
+    nothing = np.full(found.force.shape, np.nan)
+    return Inferred(
+        t=found.t, names=chosen.forces, unit="N", value=found.force, std=found.std, recorded=nothing
+    )  # fmt: skip
+
+
+def _means(times: Floats, held: Floats, t: Floats) -> Floats:
+    """Means (n, nu) from each instant of t to the next of inputs that hold from their own times on."""
+    total = np.concatenate([np.zeros((1, held.shape[1])), np.cumsum(held[:-1] * np.diff(times)[:, None], axis=0)])
+    ends = np.append(t, 2.0 * t[-1] - t[-2])
+    at = np.column_stack([_integral(times, total[:, i], held[:, i], ends) for i in range(held.shape[1])])
+    means: Floats = np.diff(at, axis=0) / np.diff(ends)[:, None]
+    return means
+
+
+def _integral(times: Floats, total: Floats, held: Floats, t: Floats) -> Floats:
+    """The integral of one input up to instants t; before its first and behind its last time it holds."""
+    k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 1)
+    integral: Floats = total[k] + held[k] * (t - times[k])
+    return integral
