@@ -13,7 +13,7 @@ from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Trajectory
 from crossbody.reports import scenes
 from crossbody.reports.pages.case_page import PLOTTED
-from crossbody.reports.pages.figures import FIGURES, impulse, points_for
+from crossbody.reports.pages.figures import FIGURES, points_for
 from crossbody.reports.pages.playback import chosen, packed, peaks, playback
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace
