@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -225,10 +226,21 @@ def test_a_scheduler_that_does_not_answer_is_told_within_its_time(tmp_path: Path
         with pytest.raises(SchedulerUnavailable, match="No dask scheduler answers"):
             pools.connect(address)
         assert time.monotonic() - began < 10.0
+    with socket.create_server(("127.0.0.1", 0)) as stranger:
+        threading.Thread(target=_refuse_in_http, args=(stranger,), daemon=True).start()
+        with pytest.raises(SchedulerUnavailable, match="No dask scheduler answers"):
+            pools.connect(f"tcp://127.0.0.1:{stranger.getsockname()[1]}")
     with pytest.raises(SchedulerUnavailable):
         pools.connect("nonsense://")
     assert call(*WORDS, "--scheduler", "tcp://127.0.0.1:1", "--out", str(tmp_path / "out")) == 2
     assert not (tmp_path / "out").exists()
+
+
+def _refuse_in_http(server: socket.socket) -> None:
+    connection, _ = server.accept()
+    with connection:
+        connection.sendall(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\nConnection: close\r\n\r\n" + bytes(64))
+        connection.recv(4096)
 
 
 def begun(out: Path, suite: str, runs: int, jobs: int) -> subprocess.Popen[bytes]:

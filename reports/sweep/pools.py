@@ -98,7 +98,7 @@ def connect(address: str) -> Any:
     try:
         asyncio.run(_greet(address))
         return Client(address, timeout=ANSWER, set_as_default=False)
-    except (TimeoutError, OSError, ValueError) as error:
+    except (TimeoutError, OSError, ValueError, MemoryError) as error:  # words of another protocol read as a huge size
         said = " ".join(str(error).split()) or type(error).__name__
         raise SchedulerUnavailable(
             f"No dask scheduler answers at {address!r} within {ANSWER:g} s ({said}); "
