@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.metrics._impulse import cumulative
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -20,13 +20,12 @@ CLAIMED = False
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max over rows of |INT lam dt - INT lam_truth dt| / INT |lam_truth| dt; None where lam is not known.
 
-    Both integrals take the same samples by the same rule, so that the error of the rule cancels; collisions that take
-    no time count with their impulses.
+    Both integrals take the same samples by the same rule, so that the error of the rule cancels. Collisions that take
+    no time have no lam and do not count: beside them a compliant truth has samples too few for its own integral.
     """
     inside, exact = aligned(truth, run)
     if np.isnan(run.lam).any() or not inside.any():
         return None
-    mine = with_collisions(run, run.events)[inside][-1]
-    theirs = with_collisions(exact, truth.trajectory.events)[-1]
+    mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
     scale = float(np.max(np.abs(theirs), initial=0.0))
     return float(np.max(np.abs(mine - theirs))) / scale if scale else None
