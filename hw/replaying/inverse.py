@@ -97,9 +97,7 @@ def estimate_force(
 
     Args and errors as for `inverse`; the model must have inputs for such a force (`Model.forces`).
     """
-    chosen = models.load(model) if isinstance(model, str) else model
-    if not chosen.forces:
-        raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
+    chosen = pushed(model)
     balance = _balance(log, chosen, parameters, delay, half, degree, stride)
     own = len(chosen.inputs)
     torque = _felt(log, chosen, delay, half, degree, _rows(log, half, stride))
@@ -109,13 +107,38 @@ def estimate_force(
     return _solved(balance, balance.inputs[:, :, own : own + len(names)], left, names, "N", nothing)
 
 
-def _felt(log: Log, model: Model, delay: float, half: int, degree: int, rows: Rows) -> Floats:
-    """The recorded inputs as the smoothed accelerations show them."""
+def pushed(model: str | Model) -> Model:
+    """The model.
+
+    Raises:
+        SceneError: if it has no input for a force that acts besides its torques.
+    """
+    chosen = models.load(model) if isinstance(model, str) else model
+    if not chosen.forces:
+        raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
+    return chosen
+
+
+def recorded_inputs(log: Log, model: Model) -> Floats:
+    """The inputs that the model is driven by (n, nu).
+
+    Raises:
+        SceneError: naming those that the log does not have.
+    """
     lacking = [name for name in model.inputs if name not in log.names("inputs")]
     if lacking:
         raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
-    shift = log.channel("coordinates", model.channels[0]).delay + delay
-    return felt(log.time, log.matrix("inputs", model.inputs), shift, half, degree, rows)
+    return log.matrix("inputs", model.inputs)
+
+
+def shift_of(log: Log, model: Model, delay: float) -> float:
+    """How much later than they were true the measured coordinates stand in the log, s."""
+    return log.channel("coordinates", model.channels[0]).delay + delay
+
+
+def _felt(log: Log, model: Model, delay: float, half: int, degree: int, rows: Rows) -> Floats:
+    """The recorded inputs as the smoothed accelerations show them."""
+    return felt(log.time, recorded_inputs(log, model), shift_of(log, model, delay), half, degree, rows)
 
 
 def _solved(
@@ -146,8 +169,9 @@ def _balance(
         q = terms[0]
         found.append(terms[1:])
     needed, inputs, mass = (np.array([one[i] for one in found]) for i in range(3))
-    shift = log.channel("coordinates", model.channels[0]).delay + delay
-    return _Balance(t=log.time[rows] - shift, needed=needed, inputs=inputs, mass=mass, noise=noise)
+    return _Balance(
+        t=log.time[rows] - shift_of(log, model, delay), needed=needed, inputs=inputs, mass=mass, noise=noise
+    )
 
 
 def _rows(log: Log, half: int, stride: int) -> Rows:

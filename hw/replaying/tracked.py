@@ -11,12 +11,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases import SceneError, Value
+from crossbody.cases import Value
 from crossbody.engines._equations import system_of
-from crossbody.hw import models
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.inverse import Inferred, noise_of
+from crossbody.hw.replaying.inverse import Inferred, noise_of, pushed, recorded_inputs, shift_of
 from crossbody.hw.replaying.lift import check_measured
 from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, derivatives
 from crossbody.reference.linear import Unknown, filtered
@@ -41,19 +40,16 @@ def track_force(
         SceneError: if the log or the model does not fit.
         InvalidValue: for a log shorter than a polynomial, or a size or memory that is not above 0.
     """
-    chosen = models.load(model) if isinstance(model, str) else model
-    if not chosen.forces:
-        raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
+    chosen = pushed(model)
     chosen.check_log(log)
     y, _ = chosen.read(chosen, log)
-    shift = log.channel("coordinates", chosen.channels[0]).delay + delay
     value, rate, _, _ = derivatives(log.time, y, HALF, DEGREE, np.array([HALF]))
-    kept, t = slice(HALF, None, stride), log.time - shift
+    kept, t = slice(HALF, None, stride), log.time - shift_of(log, chosen, delay)
     case = chosen.build(chosen.numbers(parameters), Segment(y=value[0], yd=rate[0], t_end=float(t[-1] - t[0])))
     system, own = system_of(case), len(chosen.inputs)
     check_measured(system, chosen.seen, chosen.name)
     u = np.zeros((len(t[kept]), system.inputs))
-    u[:, :own] = _means(log.time, log.matrix("inputs", chosen.inputs), t[kept])
+    u[:, :own] = _means(log.time, recorded_inputs(log, chosen), t[kept])
     found = filtered(
         system, t[kept], y[kept], u, unknown=Unknown(inputs=tuple(range(own, own + len(chosen.forces)))),
         measured=chosen.seen, std_y=noise_of(log.time, y, HALF, DEGREE), q0=case.q0, v0=case.v0, std_force=size,
