@@ -21,6 +21,7 @@ from crossbody.engines._cradle import one_set
 from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
+from crossbody.engines.mujoco._globals import Hook
 from crossbody.engines.mujoco._pairs import FAR, FREE, Pairs
 
 CONTACT, COLLISION = int(Mode.CONTACT), int(Mode.COLLISION)
@@ -62,6 +63,24 @@ class TwoSets(Pairs):
         self.closed[:] = False
         self.colliding[:] = self.quick
         self._set()
+
+    def after(self, restart: Callable[[], None]) -> Callable[[], None]:
+        """The start of a scene, and then `reset`."""
+
+        def start() -> None:
+            restart()
+            self.reset()
+
+        return start
+
+    def beside(self, forces: Hook) -> Hook:
+        """Forces of every stage, and then the rows' own `hook`."""
+
+        def hook(model: Any, data: Any) -> None:
+            forces(model, data)
+            self.hook(model, data)
+
+        return hook
 
     def _set(self) -> None:
         """Put the constants of every row in force."""

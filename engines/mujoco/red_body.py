@@ -181,7 +181,7 @@ def _guard(own: RedBody, data: Any) -> Callable[[], bool]:
 def _follow(scene: Scene, own: RedBody, case: Case, dt: float) -> TwoSets:
     """Rows that live as long as the level machine says, with the constants of their modes."""
     without_regularisation(scene.model)
-    data, restart = scene.data, scene.start
+    data = scene.data
     box, inertia, slab, slab_inertia = own.masses
     q, v = data.qpos, data.qvel
     pairs = TwoSets(
@@ -189,13 +189,8 @@ def _follow(scene: Scene, own: RedBody, case: Case, dt: float) -> TwoSets:
         gaps=lambda: own.heights(q), drift=lambda: own.drift(q, v), jacobian=lambda: own.jacobian(q),
         weights=np.array([box, box, inertia, slab, slab, slab_inertia]),
     )  # fmt: skip
-
-    def start() -> None:
-        restart()
-        pairs.reset()
-
     scene.machine = "level"
-    scene.start, scene.modes, scene.lam = start, pairs.modes, pairs.lam
+    scene.start, scene.modes, scene.lam = pairs.after(scene.start), pairs.modes, pairs.lam
     scene.hook, scene.margins, scene.arm = pairs.hook, pairs.margins, pairs.arm(reach=8.0 * dt * own.speed)
     return pairs
 

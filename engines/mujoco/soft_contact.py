@@ -90,16 +90,8 @@ def _matched(own: SoftContact, case: Case) -> Scene:
     without_regularisation(model)
     data = mujoco.MjData(model)
     pairs = _rows(own, case, model, data)
-    reset, forces = _start(own, case, model, data, np.eye(len(NAMES))), _forces(own, data)
-
-    def start() -> None:
-        reset()
-        pairs.reset()
-
-    def hook(m: Any, d: Any) -> None:
-        forces(m, d)
-        pairs.hook(m, d)
-
+    start = pairs.after(_start(own, case, model, data, np.eye(len(NAMES))))
+    hook = pairs.beside(_forces(own, data))
     scene = Scene(
         model=model, data=data, nc=2, start=start, modes=pairs.modes, lam=pairs.lam, safe=_guard(own, data),
         observe=own.observe, chart=soft.chart, instants=soft.instants(own.p, case.t_end), hook=hook, always=True,

@@ -37,6 +37,8 @@ from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._pairs import Pairs, add_pairs
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._two_sets import TwoSets
+from crossbody.engines.mujoco.soft_contact import ITERATIONS, SMALL
+from crossbody.engines.mujoco.soft_contact import why_not as why_not
 
 HELD = (int(Mode.BILATERAL),) * LOOPS
 FREE, CONTACT = int(Mode.FREE), int(Mode.CONTACT)
@@ -44,18 +46,8 @@ PADS, BLOCK = ("left pad", "right pad"), "block"
 GEOMS = ((PADS[0], BLOCK), (PADS[1], BLOCK), ("table", BLOCK))
 WIDE = 1.0
 """Half the height and depth of a pad's face, m: only its distance along x counts."""
-SMALL = 1e-12
-"""Part of the jaws' stroke, and of the largest force, that counts as no gap and as no multiplier."""
 FASTEST = 1e6
 """Rate at which a run has diverged."""
-ITERATIONS = 20
-
-
-def why_not(case: Case, profile: str) -> str | None:
-    """The rows live as long as the level machine says."""
-    if profile == "matched" and case.fsm != "level":
-        return f"The soft contact in MuJoCo switches by the machine 'level' and not by {case.fsm!r}."
-    return None
 
 
 def default_step(case: Case, profile: str) -> float:
@@ -101,18 +93,8 @@ def _matched(own: SoftDelta, case: Case) -> Scene:
         model, data, GEOMS, own.law, small, gaps=lambda: own.heights(q), drift=None, jacobian=lambda: own.H,
         weights=weights,
     )  # fmt: skip
-    scene = _scene(own, case, model, data, pairs)
-    reset, forces, arm = scene.start, _forces(own, data), pairs.arm(reach)
-
-    def start() -> None:
-        reset()
-        pairs.reset()
-
-    def hook(m: Any, d: Any) -> None:
-        forces(m, d)
-        pairs.hook(m, d)
-
-    scene.start, scene.hook, scene.machine = start, hook, "level"
+    scene, arm = _scene(own, case, model, data, pairs), pairs.arm(reach)
+    scene.start, scene.hook, scene.machine = pairs.after(scene.start), pairs.beside(_forces(own, data)), "level"
     scene.arm = lambda modes: arm(modes[LOOPS:])
     scene.margins = lambda: [(0.0, 0.0)] * LOOPS + pairs.margins()
     scene.audit = _listed(scene, own, case) | _listed_rows(scene, own, case, pairs)
