@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
+from rig_data import CUBE, PENDULUM, needs_cube, needs_pendulum
 
 from crossbody import hw
 from crossbody.cases import InvalidValue, LogFormatError
-
-DATA = Path(os.environ.get("CROSSBODY_DATA", Path(__file__).parent.parent.parent / "shared" / "data"))
-PENDULUM = DATA / "multiarm_pendulum"
-CUBE = DATA / "contactnets_cube" / "tosses.parquet"
-
-needs_pendulum = pytest.mark.skipif(
-    not PENDULUM.is_dir(), reason=f"No pendulum logs in {PENDULUM}: set CROSSBODY_DATA to the folder that holds them."
-)
-needs_cube = pytest.mark.skipif(
-    not CUBE.is_file(), reason=f"No cube tosses in {CUBE}: set CROSSBODY_DATA to the folder that holds them."
-)
 
 
 @needs_pendulum
