@@ -57,7 +57,7 @@ class Delta:
         robot: geometry, masses, gravity, friction.
         r0, rd0 (9,): start in the coordinates of the tree.
         drive: what acts from outside.
-        table: numbers of `_delta_forces.forces`.
+        table: numbers of `engines._delta.forces.forces`.
     """
 
     robot: Robot

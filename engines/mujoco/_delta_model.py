@@ -16,7 +16,7 @@ FLAGS = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_
 
 
 def compiled(robot: Robot, law: Law | None = None) -> Any:
-    """The model; its coordinates are those of the tree, see `engines._delta_chart`.
+    """The model; its coordinates are those of the tree, see `engines._delta.chart`.
 
     Args:
         robot: geometry, masses, gravity; friction is left to forces on absolute angles.

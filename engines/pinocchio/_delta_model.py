@@ -1,6 +1,6 @@
 """The delta robot in Pinocchio from two sources: the MJCF that MuJoCo reads, and joint by joint (spec 3.8 and 4.3).
 
-Both have the coordinates of `engines._delta_chart` and two point constraints in world axes, tips 2 and 3 against
+Both have the coordinates of `engines._delta.chart` and two point constraints in world axes, tips 2 and 3 against
 tip 1.
 """
 
