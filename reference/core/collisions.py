@@ -167,20 +167,26 @@ def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
             b.mode[i] = after_mode
 
 
+@inlined
+def _factor(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """M^-1 of the present state, and the free acceleration in vd, as the map asks for them; 1 if ill posed."""
+    activate(s, m, w, b.mode)
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL) != 0:
+        return 1
+    if s.n == 1:
+        w.L[0, 0] = np.sqrt(w.M[0, 0])
+    return 0
+
+
 @compiled
 def _one(K: Any, s: Any, m: Model, w: Work, b: Buffers, known: bool) -> int:
     """One collision of the rows marked; with known = True the free acceleration stands in vd from the one before."""
-    n = s.n
     for i in range(s.nc):
         if w.struck[i] == BOUNCES:
             write_event(s, b, i, b.mode[i], COLLISION, 0.0)
     while True:
-        if not known:
-            activate(s, m, w, b.mode)
-            if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:n], w.y[n:], GENERAL) != 0:
-                return ILL_POSED
-            if n == 1:
-                w.L[0, 0] = np.sqrt(w.M[0, 0])
+        if not known and _factor(K, s, m, w, b) != 0:
+            return ILL_POSED
         _list_rows(s, m, w, b)
         if _impulses(K, s, m, w) != 0:
             return ILL_POSED
@@ -213,11 +219,8 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             still = True
     if not still or _endless(s):
         return 0
-    activate(s, m, w, b.mode)
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:n], w.y[n:], GENERAL) != 0:
+    if _factor(K, s, m, w, b) != 0:
         return ILL_POSED
-    if n == 1:
-        w.L[0, 0] = np.sqrt(w.M[0, 0])
     _list_rows(s, m, w, b)
     if assemble(K.rows, s, m, w, s.t, w.y[:n], w.y[n:]) != 0:
         return ILL_POSED

@@ -124,10 +124,11 @@ def multiplier_if_active(
 
 
 @inlined
-def _own_press(K: Any, s: Any, m: Model, w: Work, i: int) -> bool:
+def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool:
     """Whether lam of row i would be positive: the rest of its law is negative with the others as they are.
 
-    Lam of a row that joins is that rest over a positive number, so its sign needs no solution.
+    Lam of a row that joins is that rest over a positive number, so its sign needs no solution. A row at rest (spec 1.2)
+    has no law yet: what is left of its gap and its rate is what collisions left, and presses nothing.
     """
     n, j = s.n, s.na
     w.idx[j] = i
@@ -138,17 +139,19 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int) -> bool:
         push += w.H[j, c] * w.k[START, n + c]
         size += abs(w.H[j, c] * w.k[START, n + c])  # bodies in free fall cancel
         rate += w.H[j, c] * w.y[n + c]
-    h, a0, a1, a2 = w.ha[j], w.law[i, 0], w.law[i, 1], w.law[i, 2]
-    spring = (a0 + a2 * h * h) * h
-    size += a1 * abs(rate) + abs(spring)
-    return bool(-(push + w.Hdv[j] + a1 * rate + spring) > ROUNDING * size + _from_state(s, w, i))
+    if not at_rest:
+        h, a0, a1, a2 = w.ha[j], w.law[i, 0], w.law[i, 1], w.law[i, 2]
+        spring = (a0 + a2 * h * h) * h
+        push += a1 * rate + spring
+        size += a1 * abs(rate) + abs(spring)
+    return bool(-(push + w.Hdv[j]) > ROUNDING * size + _from_state(s, w, i))
 
 
 @inlined
-def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest: bool) -> bool:
     """Whether row i would push if it were active now; the acceleration of the present modes stands in k[0]."""
-    if not s.has_solve and active_mode(s, m, i) == CONTACT:
-        return _own_press(K, s, m, w, i)
+    if at_rest or (not s.has_solve and active_mode(s, m, i) == CONTACT):
+        return _own_press(K, s, m, w, i, at_rest)
     lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.n], w.y[s.n :])
     return bool(lam > w.noise[i])
 
@@ -166,12 +169,12 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return int(mode[i])
     if mode[i] != FREE:
         closing = rate < -slow(s)
-        return active_mode(s, m, i) if closing and _would_press(K, s, m, w, mode, i) else int(mode[i])
+        return active_mode(s, m, i) if closing and _would_press(K, s, m, w, mode, i, False) else int(mode[i])
     if rate < -slow(s):
         return active_mode(s, m, i)
     if h < -DEEP:
-        return active_mode(s, m, i) if _would_press(K, s, m, w, mode, i) else BALLISTIC
-    if rate <= slow(s) and _would_press(K, s, m, w, mode, i):
+        return active_mode(s, m, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
+    if rate <= slow(s) and _would_press(K, s, m, w, mode, i, collides):
         return active_mode(s, m, i)
     return FREE
 
@@ -185,7 +188,7 @@ def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> 
         return BALLISTIC if w.lam[i] < -w.noise[i] else CONTACT
     if w.gap[i] > s.touch:
         return FREE
-    return CONTACT if _would_press(K, s, m, w, mode, i) else BALLISTIC
+    return CONTACT if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
 
 
 @inlined

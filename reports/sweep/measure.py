@@ -18,6 +18,10 @@ from crossbody.reports.metrics._contacts import contacts
 
 SHARES = (33, 49)
 """How many instants of a run are looked at, evenly and from 1e-12 of the horizon on by their logarithm."""
+PARTED = 0.1
+"""Part of the limit by which the truth beside has parted at the divergence time: a run errs at each of its steps."""
+TRACE = 1e-3
+"""Part of a shift of a touch or release, over the horizon, below which its trace in the motion says: nothing pressed."""
 SECOND_RTOL = 1e-11
 """Tolerance of the independent integrator."""
 
@@ -64,7 +68,7 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     """Against the best truth at hand, up to the divergence time.
 
     A run further from the truth than its limit is inaccurate only where the truth itself is sharper than that: up to
-    the time at which it has parted by the limit from the truth of a scene that differs by the run's tolerance.
+    the time at which it has parted by a tenth of it from the truth of a scene that differs by the run's tolerance.
     """
     if not len(run.t):
         return Error()
@@ -115,7 +119,7 @@ def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Tru
 
 
 def _divergence(truth: Truth, times: Floats, asked: Asked, t_end: float) -> float:
-    """When the truth has parted by the limit from that of the scene beside it, s; infinite if it never does.
+    """When the truth has parted by a tenth of the limit from that of the scene beside it, s; infinite if it never does.
 
     That may be in a coordinate, or in the time of a touch: a gap that closes slowly closes at a time hardly known.
     """
@@ -125,8 +129,9 @@ def _divergence(truth: Truth, times: Floats, asked: Asked, t_end: float) -> floa
         return math.inf
     if isinstance(near, str):
         return math.inf
-    off = _distance(truth.at(times), near.at(times), times) > asked.limit
-    late = [start for start, shift in _shifts(truth, near.trajectory) if shift > asked.limit * t_end]
+    most = PARTED * asked.limit
+    off = _distance(truth.at(times), near.at(times), times) > most
+    late = [start for start, shift in _shifts(truth, near.trajectory) if shift > most * t_end]
     return min(float(times[np.argmax(off)]) if off.any() else math.inf, *late, math.inf)
 
 
@@ -184,7 +189,10 @@ def lasting(run: Trajectory) -> Trajectory:
 def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
     position = metrics.load("position").measure(truth, run, case)
     shift = metrics.load("event_times").measure(truth, run, case)
-    known = [part for part in (position, None if shift is None else shift / case.t_end) if part is not None]
+    late = 0.0 if shift is None else shift / case.t_end
+    if late > 0.0 and float(_distance(truth.at(run.t), run, run.t).max()) < TRACE * late:  # it stood still and let go
+        late = 0.0
+    known = [part for part in (position, None if shift is None else late) if part is not None]
     value = max(known, default=math.nan)
     return Error(value=value, tier=truth.tier.value if known else "", until=case.t_end, why=f"error {value:.2e}")
 
