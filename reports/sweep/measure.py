@@ -21,7 +21,7 @@ SHARES = (33, 49)
 PARTED = 0.1
 """Part of the limit by which the truth beside has parted at the divergence time: a run errs at each of its steps."""
 TRACE = 1e-3
-"""Part of a shift of a touch or release, over the horizon, below which its trace in the motion says: nothing pressed."""
+"""A touch or release whose shift leaves less than this part of it in the motion is one that pressed nothing."""
 SECOND_RTOL = 1e-11
 """Tolerance of the independent integrator."""
 
