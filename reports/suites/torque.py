@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from crossbody.reports.suites._axis import Linear, Log
-from crossbody.reports.suites._contract import Family, Suite
+from crossbody.reports.suites._contract import TIGHT, Family, Suite
 
+# Servos that move within a step or two: the energy account is a quadrature beside the motion, which alone sets the steps.
 SUITE = Suite(
     families=(
         Family(
@@ -13,6 +14,7 @@ SUITE = Suite(
         ),
         Family(
             case="delta_singularity", variant="light", fixed={"t_end": 2.0, "start": 1.0}, second=20, finishes=False,
+            ladder=TIGHT,
             axes={"kp": Log(1.0, 1e4), "kd": Log(1e-2, 1e2), "ramp": Log(1e-4, 1.0), "offset": Linear(-0.2, 0.2)},
         ),
         Family(
