@@ -5,7 +5,7 @@ from __future__ import annotations
 from crossbody.reports.suites._axis import Linear, Log
 from crossbody.reports.suites._contract import TIGHT, Family, Suite
 
-# Servos that move within a step or two: the energy account is a quadrature beside the motion, which alone sets the steps.
+# Servos move within a step or two here, and the energy account is a quadrature beside the motion, which sets the steps.
 SUITE = Suite(
     families=(
         Family(
