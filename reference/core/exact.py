@@ -117,6 +117,9 @@ def begin(K: Any, s: Any, m: Model, w: Work) -> None:
     if s.na == 0:
         return
     accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:n], w.y[n:], GENERAL)
+    if s.na == n:  # every coordinate is held: what rounding leaves of a_c would grow with t^2
+        w.g[:] = 0.0
+        return
     for j in range(s.na):
         i = w.idx[j]
         w.r[j] = -w.law[i, 1] * w.rates[0, i] - w.law[i, 0] * w.gaps[0, i]

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
 from crossbody.reports.pages.styles import COLOURS, DASHES
+
+APART = 1.0
+"""Decades of error between two labels of a line, twice the decades of time."""
 
 
 def work_precision(rows: pd.DataFrame) -> go.Figure:
@@ -27,7 +32,8 @@ def work_precision(rows: pd.DataFrame) -> go.Figure:
         figure.add_trace(
             go.Scatter(
                 x=x, y=group["median_ms"], name=label, mode="lines+markers+text",
-                text=[f"{s:.0e}" if np.isfinite(s) else "" for s in group["setting"].astype(float)],
+                text=_labels(x, group["median_ms"], group["setting"]),
+                customdata=group["setting"], hovertemplate="%{customdata:.0e}: error %{x:.2g}, %{y:.3g} ms",
                 textposition="top center", textfont={"size": 9},
                 line={"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)]},
                 marker={"symbol": np.where(failed, "x", "circle").tolist(), "size": 8},
@@ -39,3 +45,14 @@ def work_precision(rows: pd.DataFrame) -> go.Figure:
     cases = ", ".join(rows["case"].unique())
     figure.update_layout(title_text=f"Work against precision, {cases}; a cross is a run that failed", height=560)
     return figure
+
+
+def _labels(x: pd.Series, y: pd.Series, setting: pd.Series) -> list[str]:
+    """Tolerance or step of the rungs that stand apart from the last one that has a label."""
+    found: list[str] = []
+    last = (math.inf, math.inf)
+    for here, s in zip(zip(np.log10(x), np.log10(y.astype(float)), strict=True), setting.astype(float), strict=True):
+        apart = abs(here[0] - last[0]) > APART or abs(here[1] - last[1]) > 0.5 * APART
+        found.append(f"{s:.0e}" if apart and np.isfinite(s) else "")
+        last = here if apart else last
+    return found
