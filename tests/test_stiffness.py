@@ -59,3 +59,12 @@ def test_stiff_pendulum_agrees_with_the_explicit_method(p):
     )
     assert stiff.outcome.ok
     assert stiff.q[-1] == pytest.approx(explicit.q[-1], abs=2e-7)
+
+
+@pytest.mark.parametrize(("a0", "a1", "speed"), [(545271.8, 9649.98, 1.04e-6), (649807.8, 16074.0, 1.07e-6)])
+def test_a_ball_at_rest_in_closed_form_does_not_creep(a0, a1, speed):
+    """Rounding of the force that holds it, 1e-15 m/s^2, would be 1e-15 m/s after a second: 1e-9 of its impact."""
+    run = simulate(ball(a0=a0, a1=a1, a2=0.0), [0.0], [-speed], 1.0, ledger=False)
+    assert run.counts["exact_steps"] == run.steps == 1
+    assert abs(run.q[-1, 0]) < 1e-20
+    assert abs(run.v[-1, 0]) < 1e-20
