@@ -189,12 +189,17 @@ def lasting(run: Trajectory) -> Trajectory:
 def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
     position = metrics.load("position").measure(truth, run, case)
     shift = metrics.load("event_times").measure(truth, run, case)
-    late = 0.0 if shift is None else shift / case.t_end
-    if late > 0.0 and float(_distance(truth.at(run.t), run, run.t).max()) < TRACE * late:  # it stood still and let go
-        late = 0.0
-    known = [part for part in (position, None if shift is None else late) if part is not None]
+    known = [] if position is None else [position]
+    if shift is not None:
+        known.append(_with_trace(truth, run, shift / case.t_end))
     value = max(known, default=math.nan)
     return Error(value=value, tier=truth.tier.value if known else "", until=case.t_end, why=f"error {value:.2e}")
+
+
+def _with_trace(truth: Truth, run: Trajectory, shift: float) -> float:
+    """A shift of touches or releases, relative; 0 where the motion shows none of it: a gap that stood still let go."""
+    apart = float(_distance(truth.at(run.t), run, run.t).max())
+    return 0.0 if apart < TRACE * shift else shift
 
 
 def _distance(other: Trajectory, run: Trajectory, times: Floats) -> Floats:
