@@ -14,7 +14,7 @@ from crossbody.reports.sweep.spec import Spec
 
 Rows = list[dict[str, Any]]
 Chunk = tuple[int, Sequence[Spec]]
-ANSWER = 5.0
+ANSWER = 4.0
 """Time that a scheduler has to answer, s."""
 ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
 
