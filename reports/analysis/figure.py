@@ -64,7 +64,9 @@ def response_figure(rows: pd.DataFrame) -> go.Figure:
             )  # fmt: skip
     figure.update_xaxes(type="log", exponentformat="power")
     figure.update_xaxes(title_text="frequency [rad/s]", row=2, col=1)
-    figure.update_yaxes(type="log", exponentformat="power", title_text="magnitude [SI unit of output / of input]", row=1, col=1)
+    figure.update_yaxes(
+        type="log", exponentformat="power", title_text="magnitude [SI unit of output / of input]", row=1, col=1
+    )
     figure.update_yaxes(title_text="phase [deg]", row=2, col=1)
     figure.update_layout(title_text="Frequency responses", height=680)
     return figure
