@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports import sections
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import label, style, suits
 from crossbody.reports.pages.html import Page
@@ -92,6 +93,7 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
             "rows": rows, "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
+            "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
         },
     )  # fmt: skip
@@ -101,11 +103,12 @@ def _plots(traces: Sequence[Trace]) -> list[Section]:
     if not traces:
         return []
     points = figures.points_for(traces, PLOTTED)
+    drawn = {name: draw(traces, points) for name, (_, draw) in figures.FIGURES.items() if suits(name, traces)}
     return [
         Section(
-            name=name, title=title, text=figures.note(name, traces),
-            plots=(Plot(name=f"plot-{name}", figure=draw(traces, points), time=True),),
-        ) for name, (title, draw) in figures.FIGURES.items() if suits(name, traces)
+            name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces),
+            plots=(Plot(name=f"plot-{name}", figure=figure, time=True),),
+        ) for name, figure in drawn.items() if figure["data"]
     ]  # fmt: skip
 
 

@@ -97,7 +97,7 @@ def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | No
 
 
 def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, float]) -> list[Line]:
-    """Lines of one case: all together, what it costs, and every metric that is judged for some engine.
+    """Lines of one case: all together, what it costs, and every metric judged for some engine (all, if none is).
 
     Args:
         rows: verdicts of the case.
@@ -123,11 +123,12 @@ def _cost(wall: float | None, least: float) -> Cell:
 
 
 def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
-    judged = {row["metric"]: row["unit"] for row in rows if row["verdict"] in WORST}
-    order = sorted(judged, key=lambda name: KEY.index(name) if name in KEY else len(KEY))
+    judged = [row for row in rows if row["verdict"] in WORST]
+    units = {row["metric"]: row["unit"] for row in judged or rows}
+    order = sorted(units, key=lambda name: KEY.index(name) if name in KEY else len(KEY))
     values = {who: {row["metric"]: row for row in mine[who]} for who in engines}
     return [
-        Line(text=name, small=f"[{judged[name]}]", cells=[_value(values[who].get(name), page) for who in engines])
+        Line(text=name, small=f"[{units[name]}]", cells=[_value(values[who].get(name), page) for who in engines])
         for name in order
     ]
 

@@ -32,13 +32,13 @@ TEXT = (
 
 
 def playback(traces: Sequence[Trace]) -> list[Section]:
-    """The section, or one that says why there is none; nothing where no motion is stored."""
-    if not traces:
-        return []
-    about = traces[0].about
+    """The section, or one that says why there is none; nothing where no motion, or no mechanism, is stored."""
+    about = traces[0].about if traces else {}
     name = about.get("mechanism", "")
+    if not name:  # a log that was replayed has none
+        return []
     if name not in scenes.names():
-        told = f"There is no picture of the mechanism {name or '(not stored by the version that ran this)'}."
+        told = f"There is no picture of the mechanism {name}."
         return [Section(name="playback", title="Playback", text=told)]
     try:
         scene = packed(traces, scenes.load(name))
