@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,10 @@ def test_replay_writes_the_report_with_the_measurement_in_it(
     assert not told["log"]["synthetic"]
     assert len(list((out / "traces").glob("*.parquet"))) == 3
     assert code("report", out) == 0
+    case = next(out.glob("case-*.html")).read_text(encoding="utf-8")
+    assert '<option value="all" selected>' in case  # nothing is judged: every number is shown
+    heads = re.findall(r"<h2>([^<]*)", case)
+    assert heads == ["At a glance", "Verdicts", "Motion", "Runs", "Parity audit", "Provenance"]
 
 
 @needs_pendulum
