@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from crossbody.cases import Case, Outcome, Parameter, Trajectory
 from crossbody.cases import _closed_forms as cf
 from crossbody.cases._arrays import Floats
-from crossbody.engines._line import CONTACT, FREE, Line
-from crossbody.engines._peer import ended, events
+from crossbody.engines._line import CONTACT, FREE, Line, line
+from crossbody.engines._peer import PeerRun, ended, events
 
 ROUNDING = 1e-9
 """An impulse below this part of the momentum that a body has is none."""
@@ -113,8 +113,24 @@ def settings(case: Case, scene: Line, step: float) -> Mapping[str, Parameter]:
     }
 
 
-def physics(case: Case, masses: list[float], gravity: float, e: float) -> Mapping[str, object]:
-    """What reached the engine, for the parity audit: a restitution stands where the law has constants."""
-    return {
-        "masses": masses, "gravity": gravity, "constants": {"restitution": e}, "q0": case.q0, "v0": case.v0,
+def stepped(
+    who: tuple[str, str], case: Case, used: Mapping[str, Any], stepper: Stepper, masses: list[float], gravity: float
+) -> PeerRun:
+    """A prepared run with what reached the engine: in the audit a restitution stands where the law has constants.
+
+    Args:
+        who: engine and profile.
+        case: the scene.
+        used: the values of `settings`.
+        stepper: the engine's world.
+        masses: read back from it, kg.
+        gravity: read back from it, m/s^2.
+    """
+    integrate = Steps(
+        stepper=stepper, line=line(case), t_end=case.t_end, dt=float(used["dt"]), max_steps=int(used["max_steps"])
+    )
+    physics = {
+        "masses": masses, "gravity": gravity, "constants": {"restitution": used["restitution"]},
+        "q0": case.q0, "v0": case.v0,
     }  # fmt: skip
+    return PeerRun(engine=who[0], profile=who[1], settings=used, integrate=integrate, physics=physics)

@@ -12,7 +12,7 @@ from crossbody.cases import Case, CaseUnsupported
 from crossbody.engines import _settings
 from crossbody.engines._line import Line, line
 from crossbody.engines._peer import PeerRun, why_not
-from crossbody.engines._peer_steps import Steps, no_rigid_contact, physics, settings
+from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
 
 THICK = 1.0  # m, of the floor
 
@@ -108,17 +108,10 @@ class Dart:
             raise CaseUnsupported(reason)
         scene = line(case)
         used = _settings.chosen(self.name, profile, settings(case, scene, 1e-3), given)
-        e = float(used["restitution"])
-        world = World(scene, e)
-        integrate = Steps(
-            stepper=world, line=scene, t_end=case.t_end, dt=float(used["dt"]), max_steps=int(used["max_steps"])
-        )
+        world = World(scene, float(used["restitution"]))
         masses = [float(body.getMass()) for body in world.bodies]
         gravity = float(np.linalg.norm(world.world.getGravity()))
-        return PeerRun(
-            engine=self.name, profile=profile, settings=used, integrate=integrate,
-            physics=physics(case, masses, gravity, e),
-        )  # fmt: skip
+        return stepped((self.name, profile), case, used, world, masses, gravity)
 
 
 ENGINE = Dart()

@@ -12,7 +12,7 @@ from crossbody.cases import Case, CaseUnsupported
 from crossbody.engines import _settings
 from crossbody.engines._line import Line, line
 from crossbody.engines._peer import PeerRun, why_not
-from crossbody.engines._peer_steps import Steps, no_rigid_contact, physics, settings
+from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
 
 ITERATIONS = 200
 """Of the sequential impulses: enough for five balls in a row to 1e-10 of their momentum."""
@@ -98,16 +98,9 @@ class Pymunk:
         scene = line(case)
         step = 1e-3 if profile == "matched" else USUAL
         used = _settings.chosen(self.name, profile, settings(case, scene, step), given)
-        e = float(used["restitution"])
-        world = World(scene, e, profile == "matched")
-        integrate = Steps(
-            stepper=world, line=scene, t_end=case.t_end, dt=float(used["dt"]), max_steps=int(used["max_steps"])
-        )
+        world = World(scene, float(used["restitution"]), profile == "matched")
         masses = [float(body.mass) for body in world.bodies]
-        return PeerRun(
-            engine=self.name, profile=profile, settings=used, integrate=integrate,
-            physics=physics(case, masses, -float(world.space.gravity.y), e),
-        )  # fmt: skip
+        return stepped((self.name, profile), case, used, world, masses, -float(world.space.gravity.y))
 
 
 ENGINE = Pymunk()
