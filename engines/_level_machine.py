@@ -3,7 +3,7 @@
     FREE -> active        h <= 0 and (h' < 0 or h < 0); at rest on the surface if it would press
     active -> BALLISTIC   lam < 0 and h <= 0            active -> FREE        lam < 0 and h > 0
     BALLISTIC -> FREE     h > 0                         BALLISTIC -> active   h <= 0, h' < 0, lam would be > 0
-    COLLISION -> CONTACT  b1 |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
+    COLLISION -> CONTACT  max(b1, sqrt(b0)) |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
 
 active is COLLISION for a row with two sets of constants, else CONTACT; out of COLLISION, BALLISTIC is
 COLLISION_SEPARATION. Velocities are continuous: every row follows its law in real time (the rule `resolved`).

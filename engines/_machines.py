@@ -57,7 +57,7 @@ class Rows(Protocol):
         ...
 
     def elastic(self, q: Floats, v: Floats) -> Floats:
-        """b1 |h'| + b0 |h| of every row (nc,), m/s^2."""
+        """max(b1, sqrt(b0)) |h'| + b0 |h| of every row (nc,), m/s^2."""
         ...
 
 

@@ -134,6 +134,29 @@ def test_handing_over_changes_lam_by_less_than_the_elastic_part_that_was_left() 
     assert elastic == pytest.approx(0.01 * own * Fall(p).delassus(found.q[before, 2]), rel=1e-6)
 
 
+def handed_over(profile: str, rtol: float, **changes: float) -> float:
+    case = load("red_body", "resolved", tilt=0.0, spin=0.0, **changes)
+    found = REFERENCE.prepare(case, profile, rtol=rtol, ledger=False).run()
+    assert found.outcome.ok, found.message
+    (t,) = [t for contact, after, t in instants(found) if (contact, after) == (RIGHT, Mode.CONTACT)]
+    return t
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"drop": 1.957728446419402e-6, "mass": 4.276075634185, "zeta3": 1.076425859792, "zeta4": 0.050269636833994},
+        {"drop": 6.232784894530541e-6, "mass": 3.427862795557, "zeta3": 0.860105859792, "zeta4": 0.167720698891},
+    ],
+    ids=["light", "damped"],
+)  # fmt: skip
+def test_a_hand_over_that_is_due_for_a_moment_only_is_not_missed(changes: dict[str, float]) -> None:
+    """The elastic part is least where the gap passes through zero: one half swing later the motion is another one."""
+    first = handed_over("compiled", 1e-12, **changes)
+    for profile, rtol in (("compiled", 1e-8), ("compiled", 1e-10), ("cvode", 1e-8), ("cvode", 1e-11)):
+        assert handed_over(profile, rtol, **changes) == pytest.approx(first, abs=1e-7)
+
+
 def rate_of_left(found: Trajectory, at: int) -> float:
     return float(system_of(load("red_body")).gap(found.q[at], found.v[at])[1][LEFT])
 

@@ -115,9 +115,11 @@ def test_how_far_the_loop_is_from_its_right_hand_sides():
     assert loop / bound < 10.0
 
 
-def _evaluations(dynamics, gaps, rows, energy, power, solve, control, state, model, work, buffers, count):
+def _evaluations(
+    dynamics, gaps, rows, energy, power, solve, control, watch, switch, state, model, work, buffers, count
+):  # fmt: skip
     s = state[0]
-    K = Kernels(dynamics, gaps, rows, energy, power, solve, control)
+    K = Kernels(dynamics, gaps, rows, energy, power, solve, control, watch, switch)
     m, w, b = open_model(model), open_work(work), open_buffers(buffers)
     b.mode[0] = CONTACT
     activate(s, m, w, b.mode)

@@ -25,7 +25,7 @@ def test_a_row_without_fast_constants_keeps_its_own_while_the_row_it_follows_col
 
 
 def test_collision_hands_over_when_the_elastic_part_is_spent():
-    # b1 |h'| + b0 |h| = eps lam / (G_A^-1)_ii; the rod is active too, so (G_A^-1)_ii is not 1 / G_ii.
+    # max(b1, sqrt(b0)) |h'| + b0 |h| = eps lam / (G_A^-1)_ii; the rod is active too, so (G_A^-1)_ii is not 1 / G_ii.
     angle = np.arcsin(0.9)
     system = wall_pendulum(0.9, a0=1.0, a1=2.0, b0=[0.0, 1e6], b1=[0.0, 2e3])
     start = [0.9, -np.cos(angle)], [1e-3, 1e-3 * np.tan(angle)]

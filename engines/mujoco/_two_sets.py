@@ -118,14 +118,14 @@ class TwoSets(Pairs):
         return SEPARATED if self.colliding[i] else BALLISTIC
 
     def _spent(self, lam: Floats, pushing: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Rows whose elastic part b1 |h'| + b0 |h| is below 1 % of lam_i/(G_A^-1)_ii (nc,)."""
+        """Rows whose elastic part max(b1, sqrt(b0)) |h'| + b0 |h| is below 1 % of lam_i/(G_A^-1)_ii (nc,)."""
         spent = np.zeros(self.nc, dtype=bool)
         if not (self.colliding & self.closed & pushing).any():
             return spent
         H, on = self.jacobian(), np.flatnonzero(self.closed & pushing)
         inverse = np.linalg.inv((H[on] / self.weights) @ H[on].T)
         h, hd = self.gaps(), H @ self.data.qvel
-        elastic = self.fast[:, 1] * np.abs(hd) + self.fast[:, 0] * np.abs(h)
+        elastic = np.maximum(self.fast[:, 1], np.sqrt(self.fast[:, 0])) * np.abs(hd) + self.fast[:, 0] * np.abs(h)
         spent[on] = elastic[on] <= EPS * lam[on] / np.diag(inverse)
         return spent
 

@@ -130,9 +130,10 @@ class PinRows:
         return G
 
     def elastic(self, q: Floats, v: Floats) -> Floats:
-        """b1 |h'| + b0 |h| of every row (nc,), m/s^2."""
+        """max(b1, sqrt(b0)) |h'| + b0 |h| of every row (nc,), m/s^2."""
         h, hd = self.gaps(q, v)
-        part: Floats = self.entered[1] * np.abs(hd) + self.entered[0] * np.abs(h)
+        b0, b1 = self.entered[:2]
+        part: Floats = np.maximum(b1, np.sqrt(b0)) * np.abs(hd) + b0 * np.abs(h)
         return part
 
     def accelerate(self, q: Floats, v: Floats, modes: Modes) -> tuple[Floats, Floats]:

@@ -1,7 +1,7 @@
 """Where in a step one guard of one row falls below zero first.
 
 A gap is searched by the sign of its rate as well: where the rate changes sign the gap has its extremum, which decides,
-so that a contact entirely inside one step is found. So is a dip of a multiplier between two nodes.
+so that a contact entirely inside one step is found. So is a dip of a multiplier between two nodes, and a hand-over.
 """
 
 from __future__ import annotations
@@ -175,14 +175,39 @@ def _vertex(x0: float, f0: float, x1: float, f1: float, x2: float, f2: float) ->
 
 @inlined
 def handed_over(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
-    """First instant at which the elastic part of a COLLISION's multiplier is spent."""
-    before = guard(K, s, m, w, mode, HANDOVER, i, 0.0)
-    for node in range(1, NODES):
-        value = guard(K, s, m, w, mode, HANDOVER, i, at_node(node))
-        if value <= 0.0:
-            return root(K, s, m, w, mode, HANDOVER, i, at_node(node - 1), max(before, 1e-300), at_node(node), value)
-        before = value
+    """First instant at which the elastic part of a COLLISION's multiplier is spent, at a node or in a kink between.
+
+    The absolute values in it make it least where the gap or its rate passes through zero, however briefly.
+    """
+    before = max(guard(K, s, m, w, mode, HANDOVER, i, 0.0), 1e-300)
+    for node in range(NODES - 1):
+        a, b = at_node(node), at_node(node + 1)
+        for place in (_passage(K, s, m, w, mode, i, node), _turning(K, s, m, w, mode, i, node), b):
+            if place < NEVER:
+                value = guard(K, s, m, w, mode, HANDOVER, i, place)
+                if value <= 0.0:
+                    return root(K, s, m, w, mode, HANDOVER, i, a, before, place, value)
+        before = max(value, 1e-300)
     return NEVER
+
+
+@inlined
+def _passage(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, node: int) -> float:
+    """Where the gap passes through zero between a node and the next; NEVER if it does not."""
+    a, b = at_node(node), at_node(node + 1)
+    ha, hb = w.gaps[node, i], w.gaps[node + 1, i]
+    if ha > 0.0 > hb:
+        return root(K, s, m, w, mode, TOUCH, i, a, ha, b, hb)
+    if ha < 0.0 < hb:
+        return root(K, s, m, w, mode, LEAVE, i, a, -ha, b, -hb)
+    return NEVER
+
+
+@inlined
+def _turning(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, node: int) -> float:
+    """Where the gap's rate does."""
+    ra, rb = w.rates[node, i], w.rates[node + 1, i]
+    return _extremum(K, s, m, w, mode, i, node, bool(ra < 0.0)) if ra * rb < 0.0 else NEVER
 
 
 @inlined

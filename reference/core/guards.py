@@ -32,12 +32,16 @@ def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
 
 @inlined
 def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
-    """b1 |h'| + b0 |h| - eps lam_i / (G^-1)_ii, positive while the elastic part of lam still counts."""
+    """Elastic part c |h'| + b0 |h| less eps lam_i / (G^-1)_ii: positive while the elastic part of lam still counts.
+
+    c is b1, but at least sqrt(b0): with b1 alone a weakly damped collision would be spent at each passage of h
+    through zero, one without damping at its touch.
+    """
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], GENERAL) != 0:
         return np.nan
     for j in range(s.na):
         if w.idx[j] == i:
-            elastic = w.law[i, 1] * abs(w.hda[j]) + w.law[i, 0] * abs(w.ha[j])
+            elastic = max(w.law[i, 1], np.sqrt(w.law[i, 0])) * abs(w.hda[j]) + w.law[i, 0] * abs(w.ha[j])
             return float(elastic - HANDOVER_PART * w.la[j] / inverse_diagonal(w.G, s.na, w.reach, j, w.scale))
     return np.nan
 

@@ -100,15 +100,16 @@ def lam_gradient(at: Point, over: Theta, i: int) -> Floats:
 
 
 def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
-    """Of b1 |h'| + b0 |h| - HANDOVER lam_i/(G^-1)_ii, where a collision is spent (spec 1.2)."""
+    """Of max(b1, sqrt(b0)) |h'| + b0 |h| - HANDOVER lam_i/(G^-1)_ii, where a collision is spent (spec 1.2)."""
     j, n = at.active.tolist().index(i), at.system.n
     _, lam, slope = slopes(at, over)
     b0, b1, _ = at.system.beta[i]
+    speed = max(b1, b0**0.5)
     signs = np.sign(gaps(at, at.q, at.v)[[i, i + at.system.nc]])
 
     def elastic(here: Point, q: Array, v: Array) -> Array:
         h = gaps(here, q, v)[[i, i + at.system.nc]]
-        part: Array = b0 * signs[0] * h[:1] + b1 * signs[1] * h[1:]
+        part: Array = b0 * signs[0] * h[:1] + speed * signs[1] * h[1:]
         return part
 
     def mobility(here: Point, q: Array, v: Array) -> Array:

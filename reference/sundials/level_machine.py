@@ -3,7 +3,7 @@
     FREE -> active        h <= 0 and (h' < 0 or h < 0)
     active -> BALLISTIC   lam < 0, h <= 0         active -> FREE        lam < 0, h > 0
     BALLISTIC -> FREE     h > 0                   BALLISTIC -> active   h <= 0, h' < 0, lam would be > 0
-    COLLISION -> CONTACT  b1 |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
+    COLLISION -> CONTACT  max(b1, sqrt(b0)) |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
 
 h' counts as zero below 1e-9 of the largest rate seen, lam as zero below what rounding makes of it. A gap below -1e-9 m
 that does not close was started in penetration: it is active if it would press, else BALLISTIC.
@@ -33,9 +33,11 @@ class Watch(IntEnum):
     SWITCH = 0
     """FREE: touch. Active: release. BALLISTIC: leave."""
     TURN = 1
-    """The gap has its extremum: nothing switches, but a touch and a leave inside one step are seen."""
+    """The gap has its extremum: nothing switches, but a touch and a leave inside one step are seen, and a hand-over."""
     OTHER = 2
     """BALLISTIC: catch. COLLISION: hand-over."""
+    PASS = 3
+    """COLLISION: the gap passes through zero, where the elastic part is least as well; nothing switches."""
 
 
 @dataclass(slots=True)
@@ -211,7 +213,7 @@ class LevelMachine:
         gap, _ = self.equations.gaps(t, q, v)
         self._repeats(t)
         before = len(self.events)
-        for i, watch in {i: watch for i, watch in fired if watch != Watch.TURN}.items():
+        for i, watch in {i: watch for i, watch in fired if watch in (Watch.SWITCH, Watch.OTHER)}.items():
             mode = self.modes[i]
             if watch == Watch.OTHER:
                 self._switch(t, i, Mode.CONTACT if mode == Mode.COLLISION else self._active_mode(i))
@@ -239,7 +241,7 @@ class LevelMachine:
                 self._shift[len(Watch) * j] = -start + view.noise[i]
 
     def guards(self, t: float, q: Floats, v: Floats, lam: Floats, out: Floats) -> None:
-        """All watched functions (3 a row) at a state with its multipliers."""
+        """All watched functions (4 a row) at a state with its multipliers."""
         gap, rate = (a.copy() for a in self.equations.gaps(t, q, v))
         out[:] = 1.0
         for j, i in enumerate(self.rows):
@@ -250,6 +252,7 @@ class LevelMachine:
                 if mode == Mode.COLLISION:
                     elastic, inertial = self.equations.elastic_part(t, q, v, i)
                     out[at + Watch.OTHER] = elastic - SPENT * max(inertial, 0.0)
+                    out[at + Watch.TURN], out[at + Watch.PASS] = h * hd, -h * hd
             elif mode == Mode.FREE:
                 out[at] = max(h, hd + self.slow) if i in self._inside else h
                 out[at + Watch.TURN] = (self.slow if i in self.frozen else 0.0) - hd

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from crossbody.reports.suites._axis import Levels, Linear, Log, Whole
-from crossbody.reports.suites._contract import Family, Suite
+from crossbody.reports.suites._contract import TIGHT, Family, Suite
 from crossbody.reports.suites._scenes import lifted, uneven
 
 _RATIOS = {"zeta3": Linear(0.0, 2.0), "zeta4": Linear(0.0, 2.0)}
@@ -24,7 +24,7 @@ SUITE = Suite(
             axes={"drop": Log(1e-6, 1e-1), "mass": Log(1e-2, 1e2), **_RATIOS},
         ),
         Family(
-            case="red_body", variant="resolved", fixed={"tilt": 0.0, "spin": 0.0}, second=20,
+            case="red_body", variant="resolved", fixed={"tilt": 0.0, "spin": 0.0}, second=20, ladder=TIGHT,
             axes={"drop": Log(1e-6, 1e-1), "mass": Log(1e-1, 1e1), **_RATIOS},
         ),
     ),

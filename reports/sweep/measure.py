@@ -18,12 +18,12 @@ from crossbody.reports.metrics._contacts import contacts
 
 SHARES = (33, 49)
 """How many instants of a run are looked at, evenly and from 1e-12 of the horizon on by their logarithm."""
-PARTED = 0.1
-"""Part of the limit by which the truth beside has parted at the divergence time: a run errs at each of its steps."""
+STEPS = 100
+"""Fewest steps that a run counts for where its errors are added up: independent ones grow with the root of that."""
 TRACE = 1e-3
 """A touch or release whose shift leaves less than this part of it in the motion is one that pressed nothing."""
-SECOND_RTOL = 1e-11
-"""Tolerance of the independent integrator."""
+SECOND_RTOL = 1e-12
+"""Tolerance of the independent integrator: grazing multiplies its errors by 1e5."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,7 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     """Against the best truth at hand, up to the divergence time.
 
     A run further from the truth than its limit is inaccurate only where the truth itself is sharper than that: up to
-    the time at which it has parted by a tenth of it from the truth of a scene that differs by the run's tolerance.
+    the time at which so many errors as the run has steps, each of the size of its tolerance, may add up to the limit.
     """
     if not len(run.t):
         return Error()
@@ -78,7 +78,8 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     found = _against(truth, run, case)
     if not found.value > asked.limit:
         return found
-    until = _divergence(truth, run.t, asked, case.t_end)
+    most = asked.limit / math.sqrt(max(STEPS, run.steps))
+    until = _divergence(truth, run.t, asked, most, case.t_end)
     if until > case.t_end:
         return found
     shifts = [shift for start, shift in _shifts(truth, run) if start < until]
@@ -118,8 +119,8 @@ def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Tru
     return from_run(other, Tier.C, "compiled against CVODE")
 
 
-def _divergence(truth: Truth, times: Floats, asked: Asked, t_end: float) -> float:
-    """When the truth has parted by a tenth of the limit from that of the scene beside it, s; infinite if it never does.
+def _divergence(truth: Truth, times: Floats, asked: Asked, most: float, t_end: float) -> float:
+    """When the truth has parted by more than `most` from that of the scene beside it, s; infinite if it never does.
 
     That may be in a coordinate, or in the time of a touch: a gap that closes slowly closes at a time hardly known.
     """
@@ -129,7 +130,6 @@ def _divergence(truth: Truth, times: Floats, asked: Asked, t_end: float) -> floa
         return math.inf
     if isinstance(near, str):
         return math.inf
-    most = PARTED * asked.limit
     off = _distance(truth.at(times), near.at(times), times) > most
     late = [start for start, shift in _shifts(truth, near.trajectory) if shift > most * t_end]
     return min(float(times[np.argmax(off)]) if off.any() else math.inf, *late, math.inf)
