@@ -61,8 +61,11 @@ def defaults(spec: Spec) -> dict[str, Value]:
 
 
 def _same(spec: Spec, first: pd.Series[Any]) -> Fails:
+    """Whether a run fails in the same way; the independent integrator is asked only about one that says finished."""
+    second = spec.second and first["outcome"] == Outcome.FINISHED.value
+
     def fails(parameters: Mapping[str, Value]) -> bool:
-        row = execute(replace(spec, parameters=dict(parameters), ends=False))
+        row = execute(replace(spec, parameters=dict(parameters), ends=False, second=second))
         return bool(row["outcome"] == first["outcome"] and row["verdict"] == first["verdict"])
 
     return fails
