@@ -14,10 +14,9 @@ from typing import Any
 
 import pandas as pd
 
-import crossbody.cases
-import crossbody.engines
-import crossbody.reference
+from crossbody import cases, engines, reference
 from crossbody.cases import OutputError
+from crossbody.reports import judging, metrics, sweep
 from crossbody.reports.runs import output
 from crossbody.reports.sweep.execute import COLUMNS, TIMES
 from crossbody.reports.sweep.spec import Spec
@@ -27,9 +26,9 @@ SWEEP, PARTS = "sweep.json", "parts"
 
 @cache
 def code() -> str:
-    """Digest of the sources that decide what comes out."""
+    """Digest of the sources that decide what comes out: of runs, and of how they are judged."""
     found = hashlib.sha256()
-    for package in (crossbody.cases, crossbody.engines, crossbody.reference):
+    for package in (cases, engines, reference, judging, metrics, sweep):
         root = Path(next(iter(package.__path__)))
         for path in sorted(root.rglob("*.py")):
             found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
