@@ -295,6 +295,18 @@ def test_a_truth_is_asked_for_no_longer_than_it_is_sharper_than_the_tolerance(
     assert early["error"] == pytest.approx(0.01, rel=0.05)
 
 
+def test_a_slow_touch_does_not_set_the_clock_of_what_moves_fast() -> None:
+    """It is known to microseconds only; the other masses, at a metre per second, agree at every instant."""
+    law = {"a0": 40756072.9447183, "zeta": 0.8239943821405218, "collisions": "resolved"}
+    family = Family(
+        case="newtons_cradle", variant="sliders", fixed={"n": 4, "lifted": 3, "gap": 0.042105817424794335, **law},
+        ladder=Ladder(rtol=(1e-12,), dt=(1e-4,)), second=1,
+    )  # fmt: skip
+    row = execute(drawn(family, 1)[0])
+    assert row["tier"].startswith("C")
+    assert row["error"] < 1e-10
+
+
 @pytest.mark.parametrize("near", [1.0 - 1e-6, 1.0 + 1e-6, 1.0 + 1e-8])
 @pytest.mark.parametrize(
     ("a0", "zeta"),

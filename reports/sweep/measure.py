@@ -83,8 +83,8 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     if until > case.t_end:
         return found
     shifts = [shift for start, shift in _shifts(truth, run) if start < until]
-    apart = _distance(truth.at(run.t), run, run.t)[run.t < until]
-    value = max(float(np.max(apart, initial=0.0)), max(shifts, default=0.0) / case.t_end)
+    apart = float(np.max(_distance(truth.at(run.t), run, run.t)[run.t < until], initial=0.0))
+    value = max(apart, _with_trace(max(shifts, default=0.0) / case.t_end, apart))
     return Error(value=value, tier=found.tier, until=until, why=f"diverges at t = {until:.3g} s; behind, {found.why}")
 
 
@@ -187,18 +187,22 @@ def lasting(run: Trajectory) -> Trajectory:
 
 
 def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
+    """By the clock of the touches or by the clock on the wall, whichever is nearer.
+
+    The first is no good where a gap that closes slowly shifts it for all that moves fast, the second beside an impact.
+    """
     position = metrics.load("position").measure(truth, run, case)
     shift = metrics.load("event_times").measure(truth, run, case)
-    known = [] if position is None else [position]
+    apart = float(_distance(truth.at(run.t), run, run.t).max())
+    known = [] if position is None else [min(position, apart)]
     if shift is not None:
-        known.append(_with_trace(truth, run, shift / case.t_end))
+        known.append(_with_trace(shift / case.t_end, apart))
     value = max(known, default=math.nan)
     return Error(value=value, tier=truth.tier.value if known else "", until=case.t_end, why=f"error {value:.2e}")
 
 
-def _with_trace(truth: Truth, run: Trajectory, shift: float) -> float:
+def _with_trace(shift: float, apart: float) -> float:
     """A shift of touches or releases, relative; 0 where the motion shows none of it: a gap that stood still let go."""
-    apart = float(_distance(truth.at(run.t), run, run.t).max())
     return 0.0 if apart < TRACE * shift else shift
 
 
