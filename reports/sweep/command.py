@@ -62,7 +62,7 @@ def stress(ask: Ask, out: Path, command: str) -> int:
         sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=voice.silent())
     rows, times = store.table()
     with _bar(None, quiet=voice.silent()) as tell:
-        small = reproducers(rows, specs, tell)
+        small = reproducers(rows, specs, _processes(ask.jobs), tell)
     _finish(store, rows, times, small, provenance(command, seed=ask.seed))
     if voice.as_json():
         print(voice.rows_as_json(small))
@@ -121,10 +121,14 @@ def sweep(store: Store, specs: Sequence[Spec], chunk: int, pool: Pool, quiet: bo
             tell(f"{rows[0]['suite']}: {len(rows)} runs")
 
 
+def _processes(count: int) -> int:
+    return count or len(os.sched_getaffinity(0))
+
+
 def _executed(left: Sequence[pools.Chunk], pool: Pool) -> Iterable[tuple[int, pools.Rows]]:
     if pool.client is not None:
         return pools.cluster(left, pool.client)
-    count = pool.count or len(os.sched_getaffinity(0))
+    count = _processes(pool.count)
     return pools.here(left) if count == 1 else pools.processes(left, count)
 
 

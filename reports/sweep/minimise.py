@@ -13,11 +13,12 @@ import pandas as pd
 from crossbody.cases import Outcome, Value
 from crossbody.cases._load import module
 from crossbody.reports.judging.verdict import Word
+from crossbody.reports.sweep import pools
 from crossbody.reports.sweep.execute import CRASHED, REFUSED, SKIPPED, execute
 from crossbody.reports.sweep.spec import Spec
 
-TRIES = 60
-"""Runs that one failure may cost."""
+TRIES, FEWEST, STEPS = 60, 6, 300_000
+"""Runs that one failure may cost: fewer, to a least number, where they take more steps than this together."""
 HALVES = 6
 """How often a parameter that matters is moved half of what is left towards its default."""
 KINDS = ("suite", "case", "variant", "engine", "profile", "outcome", "verdict")
@@ -31,26 +32,49 @@ def failures(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[(rows["verdict"] == Word.OUTSIDE) | ended]
 
 
-def reproducers(rows: pd.DataFrame, specs: Sequence[Spec], tell: Callable[[str], None]) -> pd.DataFrame:
-    """The smallest scene found for the first failure of every kind: one suite, scene, engine, outcome and verdict."""
-    found = []
-    for kind, group in failures(rows).groupby(list(KINDS), sort=False):
-        first = group.iloc[0]
-        tell(f"{first['engine']}:{first['profile']} {first['case']}: {first['outcome']}")
-        about = dict(zip(KINDS, kind, strict=True)) | {"count": len(group), "why": first["why"]}
-        found.append(about | _smallest(specs[int(first["index"])], first))
+def reproducers(rows: pd.DataFrame, specs: Sequence[Spec], count: int, tell: Callable[[str], None]) -> pd.DataFrame:
+    """The smallest scene found for the first failure of every kind: one suite, scene, engine, outcome and verdict.
+
+    Args:
+        rows: of the sweep.
+        specs: of its runs.
+        count: of processes; 1 for this one.
+        tell: is told of each that is found.
+    """
+    kinds = [(group.iloc[0], len(group)) for _, group in failures(rows).groupby(list(KINDS), sort=False)]
+    left = {i: (specs[int(first["index"])], first) for i, (first, _) in enumerate(kinds)}
+    small: dict[int, dict[str, Any]] = {}
+    for i, told in pools.surviving(_numbered, list(left.items()), count):
+        small[i] = told
+        tell(f"{kinds[i][0]['engine']}:{kinds[i][0]['profile']} {kinds[i][0]['case']}: {kinds[i][0]['outcome']}")
+    found = [
+        {name: first[name] for name in (*KINDS, "why")} | {"count": number} | (small.get(i) or _as_it_came(*left[i]))
+        for i, (first, number) in enumerate(kinds)
+    ]
     return pd.DataFrame(found, columns=list(COLUMNS))
+
+
+def _numbered(task: tuple[int, tuple[Spec, pd.Series[Any]]]) -> tuple[int, dict[str, Any]]:
+    number, (spec, first) = task
+    return number, _smallest(spec, first)
 
 
 def _smallest(spec: Spec, first: pd.Series[Any]) -> dict[str, Any]:
     if first["outcome"] in (CRASHED, Outcome.TIME_LIMIT.value):  # a process or many seconds a try
-        left, tries = dict(spec.parameters), 0
-    else:
-        left, tries = shrink(spec.parameters, defaults(spec), _same(spec, first))
+        return _as_it_came(spec, first)
+    tries = min(TRIES, max(FEWEST, STEPS // max(1, int(first["steps"]))))
+    return _told(spec, first, *shrink(spec.parameters, defaults(spec), _same(spec, first), tries))
+
+
+def _as_it_came(spec: Spec, first: pd.Series[Any]) -> dict[str, Any]:
+    return _told(spec, first, spec.parameters, 0)
+
+
+def _told(spec: Spec, first: pd.Series[Any], left: Mapping[str, Value], tries: int) -> dict[str, Any]:
     settings = dict(json.loads(first["settings"]))
     if first["outcome"] == Outcome.STEP_LIMIT.value:
         settings["max_steps"] = spec.max_steps
-    return {"parameters": json.dumps(left), "tries": tries, "command": spec.command(settings, left)}
+    return {"parameters": json.dumps(dict(left)), "tries": tries, "command": spec.command(settings, left)}
 
 
 def defaults(spec: Spec) -> dict[str, Value]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from crossbody.cases import SchedulerUnavailable
 from crossbody.reports.sweep.execute import crashed, execute
@@ -14,6 +14,8 @@ from crossbody.reports.sweep.spec import Spec
 
 Rows = list[dict[str, Any]]
 Chunk = tuple[int, Sequence[Spec]]
+Task = TypeVar("Task")
+Done = TypeVar("Done")
 ANSWER = 4.0
 """Time that a scheduler has to answer, s."""
 ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
@@ -44,7 +46,7 @@ def processes(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
     warm(chunks)
     left = dict(chunks)
     for _ in range(2):
-        for number, rows in _surviving(list(left.items()), jobs):
+        for number, rows in surviving(_alone, list(left.items()), jobs):
             del left[number]
             yield number, rows
         if not left:
@@ -53,8 +55,15 @@ def processes(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
         yield number, [row for spec in specs for row in _single(spec)]
 
 
-def _surviving(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
-    """What comes back until a process ends that should not have."""
+def _alone(chunk: Chunk) -> tuple[int, Rows]:
+    return work(chunk, alone=True)
+
+
+def surviving(function: Callable[[Task], Done], tasks: Sequence[Task], jobs: int) -> Iterator[Done]:
+    """What comes back from processes, as it is done, until one ends that should not have; with one job, from here."""
+    if jobs == 1:
+        yield from map(function, tasks)
+        return
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
@@ -62,13 +71,13 @@ def _surviving(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=".*worker stopped while some jobs.*")
-            yield from parallel(delayed(work)(chunk, True) for chunk in chunks)
+            yield from parallel(delayed(function)(task) for task in tasks)
     except BrokenProcessPool:
         return
 
 
 def _single(spec: Spec) -> Rows:
-    for _, rows in _surviving([(spec.index, [spec])], 2):  # 1 would be this process
+    for _, rows in surviving(_alone, [(spec.index, [spec])], 2):  # 1 would be this process
         return rows
     return [crashed(spec, ENDED)]
 
