@@ -24,7 +24,7 @@ from crossbody.reports.suites._contract import Family, Ladder, Suite
 from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
 from crossbody.reports.sweep.execute import COLUMNS, execute
-from crossbody.reports.sweep.map import stability_map, summary
+from crossbody.reports.sweep.map import MAP, stability_map, summary
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.together import together
@@ -447,3 +447,21 @@ def test_the_map_has_a_cell_for_every_stiffness_and_rung_with_the_worst_of_each(
     line = summary(rows).iloc[0]
     assert line["runs"] == line["finished"] == 8
     assert not len(failures(rows))
+
+
+def test_a_map_of_engines_that_fail_has_crosses_without_a_colour(tmp_path: Path) -> None:
+    """As it is read back from the folder, where an error that is not known is none."""
+    from crossbody.reports.sweep.figure import stress_map
+
+    cells = pd.DataFrame(
+        [("mujoco", "matched", "dt", 1e-3, a0, 4, finished, error, math.nan, "diverged 2")
+         for a0, finished, error in ((1e2, 4, 1e-3), (1e8, 2, 2.0), (1e10, 0, math.nan), (1e12, 0, math.nan))],
+        columns=list(MAP),
+    )  # fmt: skip
+    cells.to_json(tmp_path / "cells.json")
+    for known in (cells, pd.read_json(tmp_path / "cells.json"), cells.astype(object).where(cells.notna(), None)):
+        field, failed = stress_map(known).data
+        assert list(field.x) == [1e2, 1e8]
+        np.testing.assert_allclose(np.asarray(field.marker.color, float), [-3.0, math.log10(2.0)])
+        assert list(failed.x) == [1e8, 1e10, 1e12]
+        assert "0 of 4 finished; diverged 2" in failed.text[1]

@@ -140,7 +140,7 @@ def slug(text: str) -> str:
 
 
 def number(value: Any) -> str:
-    """A number for a table: four digits, a dash where there is none."""
+    """A number for a table: a count in full, any other with four digits, a dash where there is none."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
-    return f"{value:.4g}" if isinstance(value, (int, float)) and not isinstance(value, bool) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -46,7 +46,7 @@ class Table:
     Attributes:
         title: in words; also the name of the CSV file.
         columns: in order; what is not named is not shown.
-        rows: plain values; numbers are shown with four digits and saved with all.
+        rows: plain values; numbers are shown with four digits (counts in full) and saved with all.
         file: name of a file beside the page that holds all rows, where there may be more than a page shows.
         folded: whether it is closed at first.
     """

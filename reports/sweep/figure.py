@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
@@ -26,13 +26,15 @@ def stress_map(cells: pd.DataFrame) -> go.Figure:
     groups = [(key, group) for key, group in drawn.groupby(["engine", "profile", "knob"], sort=False)]
     rows = max(-(-len(groups) // 2), 1)
     titles = [f"{engine}:{profile}" for (engine, profile, _), _ in groups]
-    figure = make_subplots(rows=rows, cols=2, subplot_titles=titles, vertical_spacing=0.28 / rows)
+    figure = make_subplots(rows=rows, cols=2, subplot_titles=titles, vertical_spacing=0.4 / rows)
     for i, ((_, _, knob), group) in enumerate(groups):
         row, column = i // 2 + 1, i % 2 + 1
         figure.add_trace(_field(group, i == 0), row=row, col=column)
         figure.add_trace(_failed(group), row=row, col=column)
-        figure.update_yaxes(type="log", title_text="rtol" if knob == "rtol" else "dt [s]", row=row, col=column)
+        figure.update_yaxes(type="log", title_text="rtol [1]" if knob == "rtol" else "dt [s]", row=row, col=column)
         figure.update_xaxes(type="log", title_text="a0 [1/s^2]", row=row, col=column)
+    figure.update_xaxes(exponentformat="power")
+    figure.update_yaxes(exponentformat="power", dtick=1)
     figure.update_layout(
         title_text="Stability map: worst error over damping ratios 0 to 10", height=120 + FIELD * rows, showlegend=False
     )
@@ -40,12 +42,12 @@ def stress_map(cells: pd.DataFrame) -> go.Figure:
 
 
 def _field(group: pd.DataFrame, scale: bool) -> go.Scatter:
-    shown = [_colour(value) for value in pd.to_numeric(group["worst_error"])]
+    known = group[group["worst_error"].notna()]
+    colours = np.clip(np.log10(known["worst_error"].astype(float)), BEST, WORST)
     return go.Scatter(
-        x=group["a0"].astype(float), y=group["setting"].astype(float), mode="markers", hoverinfo="x+y+text",
-        text=[_words(row) for row in group.to_dict(orient="records")],
+        **_places(known),
         marker={
-            "symbol": "square", "size": 15, "color": shown, "cmin": BEST, "cmax": WORST, "colorscale": "Viridis_r",
+            "symbol": "square", "size": 15, "color": colours, "cmin": BEST, "cmax": WORST, "colorscale": "Viridis_r",
             "showscale": scale, "colorbar": {"title": {"text": "log10 error"}},
         },
     )  # fmt: skip
@@ -53,18 +55,19 @@ def _field(group: pd.DataFrame, scale: bool) -> go.Scatter:
 
 def _failed(group: pd.DataFrame) -> go.Scatter:
     bad = group[group["finished"].astype(float) < group["runs"].astype(float)]
-    return go.Scatter(
-        x=bad["a0"].astype(float), y=bad["setting"].astype(float), mode="markers", hoverinfo="skip",
-        marker={"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": "crimson"}},
-    )  # fmt: skip
+    return go.Scatter(**_places(bad), marker={"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": "crimson"}})
 
 
-def _colour(error: float) -> float | None:
-    if error is None or math.isnan(error):
-        return None
-    return WORST if math.isinf(error) else math.log10(max(error, 10.0**BEST))
+def _places(cells: pd.DataFrame) -> dict[str, Any]:
+    """Where cells stand, and what is told of them."""
+    return {
+        "x": cells["a0"].astype(float), "y": cells["setting"].astype(float), "mode": "markers",
+        "hoverinfo": "x+y+text", "text": [_words(row) for row in cells.to_dict(orient="records")],
+    }  # fmt: skip
 
 
 def _words(row: dict[Hashable, Any]) -> str:
-    told = f"{row['finished']} of {row['runs']} finished, worst error {row['worst_error']}"
+    told = f"{row['finished']} of {row['runs']} finished"
+    if not pd.isna(row["worst_error"]):
+        told += f", worst error {row['worst_error']:.2g}"
     return f"{told}; {row['outcomes']}" if row["outcomes"] else told
