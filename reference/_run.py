@@ -55,7 +55,7 @@ class CompiledRun:
             len(np.atleast_1d(system.discrete)),
         )  # fmt: skip
         natural = options.samples is None
-        rows, events = (ROWS if natural else len(samples) + 1), EVENTS + 16 * nc
+        rows, events = (ROWS + len(inputs_t) if natural else len(samples) + 1), EVENTS + 16 * nc  # steps end at inputs
         self.buffers: dict[str, NDArray[Any]] = {
             "inputs_t": np.array(inputs_t), "inputs_u": np.array(inputs_u), "samples": np.array(samples),
             "mode": np.zeros(nc, np.int8), "history": np.zeros((max(HISTORY, 4 * nc) + 1, nc), np.int8),
