@@ -6,6 +6,7 @@ import asyncio
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
 from crossbody.cases import SchedulerUnavailable
@@ -46,17 +47,13 @@ def processes(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
     warm(chunks)
     left = dict(chunks)
     for _ in range(2):
-        for number, rows in surviving(_alone, list(left.items()), jobs):
+        for number, rows in surviving(partial(work, alone=True), list(left.items()), jobs):
             del left[number]
             yield number, rows
         if not left:
             return
     for number, specs in left.items():
         yield number, [row for spec in specs for row in _single(spec)]
-
-
-def _alone(chunk: Chunk) -> tuple[int, Rows]:
-    return work(chunk, alone=True)
 
 
 def surviving(function: Callable[[Task], Done], tasks: Sequence[Task], jobs: int) -> Iterator[Done]:
@@ -77,7 +74,7 @@ def surviving(function: Callable[[Task], Done], tasks: Sequence[Task], jobs: int
 
 
 def _single(spec: Spec) -> Rows:
-    for _, rows in surviving(_alone, [(spec.index, [spec])], 2):  # 1 would be this process
+    for _, rows in surviving(partial(work, alone=True), [(spec.index, [spec])], 2):  # 1 would be this process
         return rows
     return [crashed(spec, ENDED)]
 
