@@ -465,3 +465,15 @@ def test_a_map_of_engines_that_fail_has_crosses_without_a_colour(tmp_path: Path)
         np.testing.assert_allclose(np.asarray(field.marker.color, float), [-3.0, math.log10(2.0)])
         assert list(failed.x) == [1e8, 1e10, 1e12]
         assert "0 of 4 finished; diverged 2" in failed.text[1]
+
+
+def test_the_colour_of_an_error_ends_where_the_scale_does() -> None:
+    from crossbody.reports.sweep.figure import BEST, WORST, stress_map
+
+    cells = pd.DataFrame(
+        [("reference", "compiled", "rtol", 1e-9, a0, 4, 4, error, 0.0, "")
+         for a0, error in ((1e2, 0.0), (1e4, 1e-6), (1e6, math.inf))],
+        columns=list(MAP),
+    )  # fmt: skip
+    field, _ = stress_map(cells).data
+    np.testing.assert_allclose(np.asarray(field.marker.color, float), [BEST, -6.0, WORST])

@@ -43,7 +43,7 @@ def stress_map(cells: pd.DataFrame) -> go.Figure:
 
 def _field(group: pd.DataFrame, scale: bool) -> go.Scatter:
     known = group[group["worst_error"].notna()]
-    colours = np.clip(np.log10(known["worst_error"].astype(float)), BEST, WORST)
+    colours = np.log10(known["worst_error"].astype(float).clip(10.0**BEST, 10.0**WORST))
     return go.Scatter(
         **_places(known),
         marker={
