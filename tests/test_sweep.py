@@ -180,7 +180,7 @@ def timeless(rows: list[dict[str, Any]]) -> pd.DataFrame:
 def test_processes_give_the_rows_of_one_process() -> None:
     specs = balls(12)
     chunks = [(i, specs[4 * i : 4 * i + 4]) for i in range(3)]
-    here = dict(pools.here(chunks))
+    here = dict(pools.surviving(pools.work, chunks, 1))
     beside = dict(pools.processes(chunks, 2))
     assert here.keys() == beside.keys()
     for number, rows in here.items():

@@ -129,7 +129,7 @@ def _executed(left: Sequence[pools.Chunk], pool: Pool) -> Iterable[tuple[int, po
     if pool.client is not None:
         return pools.cluster(left, pool.client)
     count = _processes(pool.count)
-    return pools.here(left) if count == 1 else pools.processes(left, count)
+    return pools.surviving(pools.work, left, 1) if count == 1 else pools.processes(left, count)
 
 
 def _finish(store: Store, rows: pd.DataFrame, times: pd.DataFrame, small: pd.DataFrame, told: dict[str, Any]) -> None:

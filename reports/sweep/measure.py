@@ -83,7 +83,7 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     if until > case.t_end:
         return found
     shifts = [shift for start, shift in _shifts(truth, run) if start < until]
-    apart = float(np.max(_distance(truth.at(run.t), run, run.t)[run.t < until], initial=0.0))
+    apart = float(np.max(_apart(truth, run)[run.t < until], initial=0.0))
     value = max(apart, _with_trace(max(shifts, default=0.0) / case.t_end, apart))
     return Error(value=value, tier=found.tier, until=until, why=f"diverges at t = {until:.3g} s; behind, {found.why}")
 
@@ -164,7 +164,7 @@ def _against(truth: Truth, run: Trajectory, case: Case) -> Error:
     more = len(contacts(run)) - len(contacts(truth.trajectory))
     if not more:
         return _matched(truth, run, case)
-    value = float(_distance(truth.at(run.t), run, run.t).max())
+    value = float(_apart(truth, run).max())
     return Error(value=value, tier=truth.tier.value, until=case.t_end, why=f"{more:+d} contacts, error {value:.2e}")
 
 
@@ -193,7 +193,7 @@ def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
     """
     position = metrics.load("position").measure(truth, run, case)
     shift = metrics.load("event_times").measure(truth, run, case)
-    apart = float(_distance(truth.at(run.t), run, run.t).max())
+    apart = float(_apart(truth, run).max())
     known = [] if position is None else [min(position, apart)]
     if shift is not None:
         known.append(_with_trace(shift / case.t_end, apart))
@@ -204,6 +204,11 @@ def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
 def _with_trace(shift: float, apart: float) -> float:
     """A shift of touches or releases, relative; 0 where the motion shows none of it: a gap that stood still let go."""
     return 0.0 if apart < TRACE * shift else shift
+
+
+def _apart(truth: Truth, run: Trajectory) -> Floats:
+    """Distance to the truth at the run's own instants (n,)."""
+    return _distance(truth.at(run.t), run, run.t)
 
 
 def _distance(other: Trajectory, run: Trajectory, times: Floats) -> Floats:

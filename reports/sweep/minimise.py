@@ -41,22 +41,22 @@ def reproducers(rows: pd.DataFrame, specs: Sequence[Spec], count: int, tell: Cal
         count: of processes; 1 for this one.
         tell: is told of each that is found.
     """
-    kinds = [(group.iloc[0], len(group)) for _, group in failures(rows).groupby(list(KINDS), sort=False)]
-    left = {i: (specs[int(first["index"])], first) for i, (first, _) in enumerate(kinds)}
-    small: dict[int, dict[str, Any]] = {}
-    for i, told in pools.surviving(_numbered, list(left.items()), count):
+    kinds = [group for _, group in failures(rows).groupby(list(KINDS), sort=False)]
+    firsts = [(specs[int(group["index"].iloc[0])], group.iloc[0]) for group in kinds]
+    small = [_as_it_came(*first) for first in firsts]
+    for i, told in pools.surviving(_numbered, list(enumerate(firsts)), count):
         small[i] = told
-        tell(f"{kinds[i][0]['engine']}:{kinds[i][0]['profile']} {kinds[i][0]['case']}: {kinds[i][0]['outcome']}")
+        tell("{engine}:{profile} {case}: {outcome}".format(**firsts[i][1]))
     found = [
-        {name: first[name] for name in (*KINDS, "why")} | {"count": number} | (small.get(i) or _as_it_came(*left[i]))
-        for i, (first, number) in enumerate(kinds)
+        {name: first[name] for name in (*KINDS, "why")} | {"count": len(group)} | told
+        for group, (_, first), told in zip(kinds, firsts, small, strict=True)
     ]
     return pd.DataFrame(found, columns=list(COLUMNS))
 
 
 def _numbered(task: tuple[int, tuple[Spec, pd.Series[Any]]]) -> tuple[int, dict[str, Any]]:
-    number, (spec, first) = task
-    return number, _smallest(spec, first)
+    number, first = task
+    return number, _smallest(*first)
 
 
 def _smallest(spec: Spec, first: pd.Series[Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
@@ -30,12 +30,6 @@ def work(chunk: Chunk, alone: bool = False) -> tuple[int, Rows]:
     rows = together(specs)
     rows += [execute(spec, alone) for spec in specs if not spec.ends]
     return number, sorted(rows, key=lambda row: row["index"])
-
-
-def here(chunks: Iterable[Chunk]) -> Iterator[tuple[int, Rows]]:
-    """One after another in this process."""
-    for chunk in chunks:
-        yield work(chunk)
 
 
 def processes(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
