@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Event, Mode
@@ -59,6 +60,13 @@ class Rows(Protocol):
     def elastic(self, q: Floats, v: Floats) -> Floats:
         """max(b1, sqrt(b0)) |h'| + b0 |h| of every row (nc,), m/s^2."""
         ...
+
+
+def elastic_part(fast: Floats, h: Floats, hd: Floats) -> Floats:
+    """What a COLLISION holds elastically (nc,), m/s^2, by b0 and b1 of every row (2, nc); see `Rows.elastic`."""
+    b0, b1 = fast
+    part: Floats = np.maximum(b1, np.sqrt(b0)) * np.abs(hd) + b0 * np.abs(h)
+    return part
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ import numpy as np
 from crossbody.cases import Case, Outcome, Parameter, Trajectory
 from crossbody.cases import _closed_forms as cf
 from crossbody.cases._arrays import Floats
-from crossbody.engines._line import CONTACT, FREE, Line, line
+from crossbody.engines._line import CONTACT, FREE, Line
 from crossbody.engines._peer import PeerRun, ended, events
 
 ROUNDING = 1e-9
@@ -24,7 +24,13 @@ STEPS = Parameter(default=2_000_000, doc="bound on the number of steps", low=1, 
 
 
 class Stepper(Protocol):
-    """An engine's world with the bodies in it."""
+    """An engine's world with the bodies in it.
+
+    Attributes:
+        scene: what it was built from.
+    """
+
+    scene: Line
 
     def start(self) -> None:
         """Back to the start of the case."""
@@ -127,7 +133,7 @@ def stepped(
         gravity: read back from it, m/s^2.
     """
     integrate = Steps(
-        stepper=stepper, line=line(case), t_end=case.t_end, dt=float(used["dt"]), max_steps=int(used["max_steps"])
+        stepper=stepper, line=stepper.scene, t_end=case.t_end, dt=float(used["dt"]), max_steps=int(used["max_steps"])
     )
     physics = {
         "masses": masses, "gravity": gravity, "constants": {"restitution": used["restitution"]},

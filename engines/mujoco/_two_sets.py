@@ -20,6 +20,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.engines._cradle import one_set
 from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes
+from crossbody.engines._machines import elastic_part
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._globals import Hook
 from crossbody.engines.mujoco._pairs import FAR, FREE, Pairs
@@ -125,7 +126,7 @@ class TwoSets(Pairs):
         H, on = self.jacobian(), np.flatnonzero(self.closed & pushing)
         inverse = np.linalg.inv((H[on] / self.weights) @ H[on].T)
         h, hd = self.gaps(), H @ self.data.qvel
-        elastic = np.maximum(self.fast[:, 1], np.sqrt(self.fast[:, 0])) * np.abs(hd) + self.fast[:, 0] * np.abs(h)
+        elastic = elastic_part(self.fast.T, h, hd)
         spent[on] = elastic[on] <= EPS * lam[on] / np.diag(inverse)
         return spent
 

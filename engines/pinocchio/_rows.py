@@ -11,7 +11,7 @@ import pinocchio as pin
 from crossbody.cases import Law, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Modes
-from crossbody.engines._machines import active
+from crossbody.engines._machines import active, elastic_part
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
@@ -132,9 +132,7 @@ class PinRows:
     def elastic(self, q: Floats, v: Floats) -> Floats:
         """max(b1, sqrt(b0)) |h'| + b0 |h| of every row (nc,), m/s^2."""
         h, hd = self.gaps(q, v)
-        b0, b1 = self.entered[:2]
-        part: Floats = np.maximum(b1, np.sqrt(b0)) * np.abs(hd) + b0 * np.abs(h)
-        return part
+        return elastic_part(self.entered[:2], h, hd)
 
     def accelerate(self, q: Floats, v: Floats, modes: Modes) -> tuple[Floats, Floats]:
         """Acceleration (nv,) and multipliers (nc,)."""
