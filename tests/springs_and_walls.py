@@ -66,9 +66,10 @@ def springs(M: Any, K: Any, g: Any, H: Any, c: Any, a0: float, a1: float) -> Sys
 
 
 def drawn(seed: int) -> tuple[System, list[float], list[float]]:
-    """A random system and a start outside of its walls: up to three coordinates, one to three walls."""
+    """A random system and a start outside of its walls: up to three coordinates and as many walls."""
     rng = np.random.default_rng([14, seed])
-    n, nc = int(rng.integers(1, 4)), int(rng.integers(1, 4))
+    n = int(rng.integers(1, 4))
+    nc = int(rng.integers(1, n + 1))  # no more than coordinates: all of them may press at once
     root, spring = rng.normal(size=(n, n)), rng.normal(size=(n, n))
     M, K = root @ root.T + np.eye(n), 10.0 ** rng.uniform(0.0, 2.0) * (spring @ spring.T / n + 0.1 * np.eye(n))
     g, H, c = 10.0 * rng.normal(size=n), rng.normal(size=(nc, n)), rng.uniform(0.02, 0.5, nc)

@@ -34,7 +34,7 @@ CHUNK = 500  # internal steps between two looks at the clock
 TOO_MUCH_WORK = -1
 ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
 STALLED, DAMPED = 200, 0.3  # steps bound by stability; damping ratio: beyond both the arc is stiff
-UNWATCHED = 1e6  # in units of a multiplier's size: at index 2 errors of lam are errors of the motion over the step
+UNWATCHED = 1e6  # in units of a multiplier's size: errors of lam are those of the motion, times a0 or over the step
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 FAR = 1e30  # beyond this a motion has diverged
 SAME_INSTANT = 8.0 * ULP
@@ -281,9 +281,8 @@ class IdaArc(Arc):
             self._residual(t, y, yp, out)
 
         share, size = SHARE * self.options.rtol, np.where(view.size > 0.0, view.size, 1.0)
-        loose = UNWATCHED if self.rigid else 1.0
         own = self._tolerances()
-        atol = np.concatenate([own[: 2 * n], share * size * loose, np.full(nb, UNWATCHED), own[2 * n :]])
+        atol = np.concatenate([own[: 2 * n], share * size * UNWATCHED, np.full(nb, UNWATCHED), own[2 * n :]])
         solver = IDA(
             residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), first_step=self._first_step(),
             **self.common,

@@ -24,6 +24,7 @@ COARSE, FINE = 8, 16  # degrees tried
 HALVINGS = 6
 TAIL = 2  # coefficients taken for what is left out
 CAUTION = 8.0  # what is left out, in units of that
+AT_START = 1e-6  # part of an interval from whose start a root cannot be told: a row that has just switched is at zero
 NEARLY_REAL = 1e-3  # imaginary part, in half intervals, below which a root may be a double one
 ULP = float(np.finfo(np.float64).eps)
 
@@ -90,7 +91,9 @@ def _inspect(terms: Terms, marks: list[float], armed: bool) -> float | None:
         """Exactly zero is where bodies move together: no row switches; a guard of `watch` counts from there on."""
         return guard(t) < 0.0 if armed else guard(t) <= 0.0
 
-    marks = sorted({*marks})
+    first_mark, last_mark = min(marks), max(marks)
+    near = first_mark + AT_START * (last_mark - first_mark)
+    marks = [first_mark, *sorted({t for t in marks if t > near})]
     places = sorted({*marks, *(0.5 * (x + y) for x, y in pairwise(marks))})
     before, above = places[0], not fired(places[0])
     for t in places[1:]:
