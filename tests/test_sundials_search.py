@@ -1,28 +1,15 @@
-"""No switch is missed by the SUNDIALS solvers, and none that is missing from a finished motion stays unseen."""
+"""No switch is missed by the SUNDIALS solvers: their search is their own, and is held against short steps."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
-from springs_and_walls import drawn, known, springs
+from random_walls import drawn, known
 
-from crossbody.cases import Mode
-from crossbody.reference import recheck, simulate
+from crossbody.reference import simulate
 from crossbody.reference.sundials import roots
 
 BOUNDED = {"rtol": 1e-12, "max_step": 1e-3}  # a step of a millisecond has no room for an event between its nodes
-
-
-def far(system: Any, row: int) -> Any:
-    """The same springs with one wall out of reach."""
-    n, nc = system.n, system.nc
-    p = np.array(system.p)
-    M, K, g = p[: n * n].reshape(n, n), p[n * n : 2 * n * n].reshape(n, n), p[2 * n * n : 2 * n * n + n]
-    H, c = p[2 * n * n + n : -nc].reshape(nc, n), p[-nc:].copy()
-    c[row] += 1e3
-    return springs(M, K, g, H, c, system.a0[0], system.a1[0])
 
 
 @pytest.mark.parametrize("solver", ["cvode", "ida"])
@@ -90,36 +77,3 @@ def test_a_guard_of_the_mechanism_must_rise_before_it_fires() -> None:
     )
     assert roots.first(terms, 0.0, 0.5, 1e-12, np.zeros(1), armed=False) is None
     assert roots.first(terms, 0.0, 1.0, 1e-12, np.zeros(1), armed=True) == 0.0
-
-
-@pytest.mark.parametrize("samples", [None, np.linspace(0.0, 1.0, 501)], ids=["own steps", "samples"])
-@pytest.mark.parametrize("solver", ["compiled", "cvode"])
-def test_a_wall_that_was_passed_through_is_told(solver: str, samples: Any) -> None:
-    """Motions of the same springs with one wall moved away, held against the wall where it stands; and sound ones."""
-    told = passed = 0
-    for seed in range(30):
-        system, q0, v0 = drawn(seed)
-        bounded = {"max_step": 1e-2} if solver == "compiled" else {}
-        sound = simulate(system, q0, v0, 1.0, rtol=1e-9, solver=solver, samples=samples, **bounded)
-        if sound.outcome.ok:
-            assert recheck(system, sound) == (), seed
-        blind = far(system, 0)
-        run = simulate(blind, q0, v0, 1.0, rtol=1e-9, solver=solver, samples=samples, **bounded)
-        if not run.outcome.ok:
-            continue
-        dense = simulate(blind, q0, v0, 1.0, rtol=1e-9, samples=np.linspace(0.0, 1.0, 5001))
-        depth = 1e3 - dense.gap[:, 0].min()
-        passed += bool(depth > 1e-6)
-        found = [one for one in recheck(system, run) if one.contact == 0]
-        told += bool(found)
-        assert bool(found) == bool(depth > 1e-6), (seed, depth, found)
-    assert told == passed > 10
-
-
-def test_a_row_that_is_not_caught_below_the_surface_is_told() -> None:
-    """The edge machine never catches a row below the surface that turns round there, nor one that starts there."""
-    system, q0, v0 = known()
-    run = simulate(system, q0, v0, 1.0, rtol=1e-9, fsm="edge", samples=np.linspace(0.0, 1.0, 401))
-    found = recheck(system, run)
-    assert [(one.mode, one.reason) for one in found][0] == (Mode.BALLISTIC, "closing, and would press")
-    assert 0.1655 < found[0].t < 0.1805
