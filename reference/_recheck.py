@@ -185,7 +185,7 @@ class _Recheck:
         values, errors = np.empty((last - first, *work["grid"].shape)), np.empty((last - first, work["grid"].shape[1]))
         for k in range(last - first):
             self.looks.ask(evaluation.GRID, run.t[first + k + 1], y[first + k + 1])
-            values[k], errors[k] = work["grid"], np.abs(work["check"][1] - work["check"][0])
+            values[k], errors[k] = work["grid"], np.abs(work["check"][2:] - work["check"][:2]).max(axis=0)
         step = np.diff(run.t[first : last + 1])
         places = (np.arange(evaluation.POINTS) + 0.5) / evaluation.POINTS
         t = run.t[first:last, None] + step[:, None] * places

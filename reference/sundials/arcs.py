@@ -173,14 +173,10 @@ class Arc:
 
     def _examine(self) -> tuple[float, Fired]:
         """The end of the step, or the first instant inside it at which guards fire, and these."""
-        scene, t0, t1 = self.scene, self.t0, self.t1
-        if not self.guards or t1 <= t0:
+        t1 = self.t1
+        if not self.guards or t1 <= self.t0:
             self.ask(evaluation.BEGIN, t1, self.y1)
             return t1, Fired([], [])
-        n2 = 2 * self.n
-        for j, node in enumerate(evaluation.CHECKED):
-            inner = self.solver.step(t0 + evaluation.NODES[node] * (t1 - t0), "normal")
-            scene.work["inner"][j] = inner.y[:n2]
         left = self.ask(evaluation.SCAN, t1, self.y1)
         return self._search() if left else (t1, Fired([], []))
 

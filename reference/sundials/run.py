@@ -122,7 +122,7 @@ class SundialsRun:
             if switched or (at_stop and self.state.t < t_end):
                 view = self._settle()
                 arc = self._arc(view)
-            elif arc.stiff and self.kind is CvodeArc:
+            elif self.kind is CvodeArc and arc.stiff:
                 arc = BdfArc(self.scene, self.state, view, self.options.max_step)
 
     def _check_bounds(self, began: float) -> None:

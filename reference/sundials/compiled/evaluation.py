@@ -57,9 +57,9 @@ _k = np.arange(DEGREE + 1)
 NODES = 0.5 - 0.5 * np.cos(np.pi * _k / DEGREE)  # Chebyshev-Lobatto, on the step from 0 to 1
 _half = np.where((_k == 0) | (_k == DEGREE), 0.5, 1.0)
 TO_SERIES = 2.0 / DEGREE * _half[:, None] * np.cos(np.pi * np.outer(_k, DEGREE - _k) / DEGREE) * _half
-CHECKED = (3, 5)  # nodes at which the solver's own interpolant is compared; symmetric, so that no parity hides an error
+DOUBTS = (0.4, 0.6)  # where the quintic is held against the equations; symmetric, so that no parity hides an error
 POINTS = 16  # even places of a step at which a re-check looks
-CAUTION = 16.0  # errors between the nodes in units of those seen there
+CAUTION = 16.0  # errors along the step in units of those seen at two places
 
 
 class Workspace:
@@ -97,11 +97,11 @@ class Workspace:
     shift: Floats
     group: Index  # the guard that a term belongs to
     values: Floats2  # (nodes, terms)
-    check: Floats2  # (2, terms)
+    check: Floats2  # (4, terms) at two places, without the quintic's error and with it
     grid: Floats2  # (POINTS, terms)
     y0: Floats  # (2n,) start of the step
     y1: Floats
-    inner: Floats2  # (2, 2n) the solver's own interpolant
+    curve: Floats  # (n,) v' of the quintic
     a0: Floats  # (n,)
     a1: Floats
     undecided: Index  # (guards,) whether a guard may fire inside the step
@@ -287,8 +287,8 @@ def _terms(
 
 @inlined
 def _hermite(s: Workspace, theta: float, length: float) -> None:
-    """Quintic through q, v and v' at both ends of the step, and its derivative, into q and v."""
-    n, r = s.size[0], 1.0 - theta
+    """Quintic through q, v and v' at both ends of the step, and its derivatives, into q, v and `curve`."""
+    n = s.size[0]
     for i in range(n):
         q0, q1 = s.y0[i], s.y1[i]
         v0, v1 = length * s.y0[n + i], length * s.y1[n + i]
@@ -299,9 +299,38 @@ def _hermite(s: Workspace, theta: float, length: float) -> None:
         s.q[i] = q0 + theta * (v0 + theta * (a0 + theta * (c3 + theta * (c4 + theta * c5))))
         slope = v0 + theta * (2.0 * a0 + theta * (3.0 * c3 + theta * (4.0 * c4 + theta * 5.0 * c5)))
         s.v[i] = slope / length
-    if r == 0.0:
+        curve = 2.0 * a0 + theta * (6.0 * c3 + theta * (12.0 * c4 + theta * 20.0 * c5))
+        s.curve[i] = curve / (length * length)
+
+
+@inlined
+def _doubt(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float) -> int:
+    """Terms on the quintic of the step that ends at t, and with its error taken off, at two places.
+
+    What is left out of the quintic is about C r(x), r = (x (1 - x))^3. The equations tell by how much v' is off, which
+    is C r''; the same C makes C r of q and C r' of v.
+    """
+    start, n = s.clock[2], s.size[0]
+    length = t - start
+    for j in range(2):
+        x = DOUBTS[j]
+        u, at = x * (1.0 - x), start + x * length
+        rest, slope = u**3, 3.0 * u * u * (1.0 - 2.0 * x)
+        curvature = 6.0 * u * (1.0 - 2.0 * x) ** 2 - 6.0 * u * u
+        _hermite(s, x, length)
+        code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.check[2 + j])
+        if code == GOOD:
+            code = _accelerate(dynamics, rows, s, at, s.q, s.v)
+        if code != GOOD:
+            return int(code)
         for i in range(n):
-            s.q[i], s.v[i] = s.y1[i], s.y1[n + i]
+            size = (s.solution[i, 0] - s.curve[i]) * length * length / curvature
+            s.q[i] += size * rest
+            s.v[i] += size * slope / length
+        code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.check[j])
+        if code != GOOD:
+            return int(code)
+    return GOOD
 
 
 @inlined
@@ -313,7 +342,7 @@ def _decide(s: Workspace) -> int:
     for e in range(s.size[5]):
         error, reach, middle, tail = 0.0, 0.0, 0.0, 0.0
         for j in range(2):
-            error = max(error, abs(s.check[j, e] - s.values[CHECKED[j], e]))
+            error = max(error, abs(s.check[j, e] - s.check[2 + j, e]))
         for c in range(DEGREE + 1):
             coefficient = 0.0
             for j in range(DEGREE + 1):
@@ -351,22 +380,18 @@ def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
 def _scan(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, y: Any) -> int:
     """Look whether a guard can fire inside the step that ends at t; minus a code, or the number of undecided guards.
 
-    The quintic Hermite interpolant is looked at, with the solver's own at two places to tell its error.
+    A bound on the terms along the quintic decides, with a margin for its error.
     """
-    start, n = s.clock[2], s.size[0]
+    start = s.clock[2]
     code = _carry(dynamics, rows, s, t, y)
+    for j in range(DEGREE + 1):
+        if code == GOOD:
+            _hermite(s, NODES[j], t - start)
+            code = _terms(dynamics, gaps, rows, watch, s, start + NODES[j] * (t - start), s.q, s.v, s.values[j])
+    if code == GOOD:
+        code = _doubt(dynamics, gaps, rows, watch, s, t)
     if code != GOOD:
         return int(-code)
-    for j in range(DEGREE + 1):
-        _hermite(s, NODES[j], t - start)
-        code = _terms(dynamics, gaps, rows, watch, s, start + NODES[j] * (t - start), s.q, s.v, s.values[j])
-        if code != GOOD:
-            return int(-code)
-    for j in range(2):
-        at = start + NODES[CHECKED[j]] * (t - start)
-        code = _terms(dynamics, gaps, rows, watch, s, at, s.inner[j, :n], s.inner[j, n:], s.check[j])
-        if code != GOOD:
-            return int(-code)
     left = _decide(s)
     s.clock[2] = t
     s.y0[:], s.a0[:] = s.y1, s.a1
@@ -375,29 +400,16 @@ def _scan(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: floa
 
 @compiled
 def _grid(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, y: Any) -> int:
-    """Terms at even places of the step that ends at t, on the quintic; in its middle, with and without its error.
-
-    The equations tell by how much v' is off there, and the remainder of the quintic, (x (1 - x))^3, by how much q is.
-    """
-    start, n = s.clock[2], s.size[0]
-    length = t - start
+    """Terms at even places of the step that ends at t, on the quintic, and what its error makes of them."""
+    start = s.clock[2]
     code = _carry(dynamics, rows, s, t, y)
     for j in range(POINTS):
         if code == GOOD:
-            _hermite(s, (j + 0.5) / POINTS, length)
-            at = start + (j + 0.5) / POINTS * length
+            _hermite(s, (j + 0.5) / POINTS, t - start)
+            at = start + (j + 0.5) / POINTS * (t - start)
             code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.grid[j])
     if code == GOOD:
-        _hermite(s, 0.5, length)
-        middle = start + 0.5 * length
-        code = max(
-            _terms(dynamics, gaps, rows, watch, s, middle, s.q, s.v, s.check[0]),
-            _accelerate(dynamics, rows, s, middle, s.q, s.v),
-        )
-        for i in range(n):
-            curvature = 1.5 * (s.y1[n + i] - s.y0[n + i]) / length - 0.25 * (s.a0[i] + s.a1[i])
-            s.q[i] -= (s.solution[i, 0] - curvature) * length * length / 24.0
-        code = max(code, _terms(dynamics, gaps, rows, watch, s, middle, s.q, s.v, s.check[1]))
+        code = _doubt(dynamics, gaps, rows, watch, s, t)
     s.clock[2] = t
     s.y0[:], s.a0[:] = s.y1, s.a1
     return int(code)
@@ -476,12 +488,12 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
     n, nc, all_ = system.n, system.nc, system.n + system.nc
     shapes: dict[str, tuple[int, ...]] = {
         "size": (7,), "count": (3,), "clock": (3,), "w": (system.scratch,), "blocks": (n, system.mass_block),
-        **dict.fromkeys(("f", "q", "v", "a0", "a1"), (n,)), "H": (nc, n), "two": (2,),
+        **dict.fromkeys(("f", "q", "v", "a0", "a1", "curve"), (n,)), "H": (nc, n), "two": (2,),
         "matrix": (all_, all_ + 2), "solution": (all_, 2), "law": (nc, 3), "law_if": (nc, 3), "trial": (nc + 1,),
         "watched": (system.guards if system.watch is not None else 0,),
         **dict.fromkeys(("kind", "row", "shift", "group", "undecided"), (terms,)), "side": (terms, 2),
-        "values": (DEGREE + 1, terms), "check": (2, terms), "grid": (POINTS, terms),
-        "y0": (2 * n,), "y1": (2 * n,), "inner": (2, 2 * n),
+        "values": (DEGREE + 1, terms), "check": (4, terms), "grid": (POINTS, terms),
+        "y0": (2 * n,), "y1": (2 * n,),
     }  # fmt: skip
     kinds = {"Index": np.int64}
     arrays = {
