@@ -93,7 +93,9 @@ BROKEN: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_nan_is_not_finished(name: str, solver: str, shortcuts: bool, samples: Any) -> None:
     fields = ball.KERNELS | BROKEN[name]
-    system = System(n=1, parameters=[1.0, 9.81], a0=[1e4], a1=20.0, affine=shortcuts, **fields)
+    system = System(
+        n=1, parameters=[1.0, 9.81], a0=[1e4], a1=20.0, affine=shortcuts and name not in ("force", "mass"), **fields
+    )
     run = simulate(system, [1.0], [0.0], 1.0, solver=solver, shortcuts=shortcuts, samples=samples, ledger=True)
     ends = {Outcome.NOT_FINITE, Outcome.ILL_POSED} if name == "mass" else {Outcome.NOT_FINITE}
     assert run.outcome in ends, run.message

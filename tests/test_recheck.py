@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,10 +47,21 @@ def test_a_wall_that_was_passed_through_is_told(solver: str, samples: Any) -> No
     assert told == passed > 10
 
 
-def test_a_row_that_is_not_caught_below_the_surface_is_told() -> None:
-    """The edge machine never catches a row below the surface that turns round there, nor one that starts there."""
+WRONG = {
+    (Mode.CONTACT, Mode.BALLISTIC): "closing, and would press",
+    (Mode.CONTACT, Mode.FREE): "below the surface",
+    (Mode.FREE, Mode.CONTACT): "pulls",
+    (Mode.FREE, Mode.BALLISTIC): "above the surface",
+}
+
+
+@pytest.mark.parametrize(("right", "wrong"), WRONG)
+def test_a_wrong_mode_is_told_with_its_reason(right: Mode, wrong: Mode) -> None:
+    """A sound motion with other modes written beside it."""
     system, q0, v0 = known()
-    run = simulate(system, q0, v0, 1.0, rtol=1e-9, fsm="edge", samples=np.linspace(0.0, 1.0, 401))
-    found = recheck(system, run)
-    assert (found[0].mode, found[0].reason) == (Mode.BALLISTIC, "closing, and would press")
-    assert 0.1655 < found[0].t < 0.1805
+    run = simulate(system, q0, v0, 1.0, rtol=1e-10, solver="cvode", samples=np.linspace(0.0, 1.0, 5001))
+    assert recheck(system, run) == ()
+    mode = run.mode.copy()
+    mode[run.mode == right] = wrong
+    found = recheck(system, replace(run, mode=mode))
+    assert (0, wrong, WRONG[right, wrong]) in [(one.contact, one.mode, one.reason) for one in found]
