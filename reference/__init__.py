@@ -3,6 +3,7 @@
 System      a mechanism: kernels, parameters, the law of every row
 simulate    one motion of it
 ensemble    many motions of it, in threads
+recheck     whether a finished motion stands in the modes that it should
 kernels     decorators that declare the functions of a mechanism
 """
 
@@ -15,13 +16,15 @@ if TYPE_CHECKING:
     from crossbody.reference import kernels
     from crossbody.reference._ensemble import Ensemble, ensemble
     from crossbody.reference._options import Options
+    from crossbody.reference._recheck import Violation, recheck
     from crossbody.reference._simulate import prepare, simulate
     from crossbody.reference._system import System
 
-__all__ = ["Ensemble", "Options", "System", "ensemble", "kernels", "prepare", "simulate"]
+__all__ = ["Ensemble", "Options", "System", "Violation", "ensemble", "kernels", "prepare", "recheck", "simulate"]
 _LAZY = {"Options": "_options", "System": "_system", "simulate": "_simulate", "prepare": "_simulate"} | dict.fromkeys(
     ("Ensemble", "ensemble"), "_ensemble"
 )
+_LAZY |= dict.fromkeys(("Violation", "recheck"), "_recheck")
 
 
 def __getattr__(name: str) -> Any:

@@ -123,7 +123,7 @@ class CompiledRun:
                     return Outcome.STEP_LIMIT
                 code = self.slice(min(budget, limit - steps))
                 if code == layout.DONE:
-                    return Outcome.FINISHED
+                    return Outcome.FINISHED if self._finite_rows() == self.state["rows"][0] else Outcome.NOT_FINITE
                 if code < 0:
                     return OUTCOMES[code]
                 self._grow(code)
@@ -137,6 +137,12 @@ class CompiledRun:
         except KeyboardInterrupt:
             return Outcome.INTERRUPTED
 
+    def _finite_rows(self) -> int:
+        """Rows before the first one that holds NaN or infinity: energies and powers steer no step, but are told."""
+        rows = self.buffers["out"][: int(self.state["rows"][0])]
+        good = np.isfinite(rows).all(axis=1)
+        return len(rows) if good.all() else int(np.argmin(good))
+
     def _grow(self, code: int) -> None:
         """Double the buffers that are full."""
         full = {layout.ROWS_FULL: ("out", "modes"), layout.EVENTS_FULL: _EVENT_BUFFERS}.get(code, ())
@@ -149,7 +155,7 @@ class CompiledRun:
         """What was recorded, as a Trajectory."""
         n, nc = self.system.n, self.system.nc
         state = self.state[0]
-        rows = self.buffers["out"][: int(state["rows"])]
+        rows = self.buffers["out"][: self._finite_rows()]
         cuts = np.cumsum([1, n, n, nc, nc, 2])
         t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
         return Trajectory(

@@ -10,7 +10,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Index
 from crossbody.reference.core import choice, dense, dop853, events, exact, journal, record, settle, stepping
 from crossbody.reference.core.acceleration import scatter
-from crossbody.reference.core.algebra import ULP, copy
+from crossbody.reference.core.algebra import ULP, all_finite, copy
 from crossbody.reference.core.layout import (
     DONE,
     EVENTS_FULL,
@@ -22,6 +22,7 @@ from crossbody.reference.core.layout import (
     MODE_CYCLE,
     MORE,
     NODES,
+    NOT_FINITE,
     ROWS_FULL,
     SHORT,
     Buffers,
@@ -173,6 +174,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.implicit_steps += s.method == IMPLICIT
     if events.scan(K, s, m, w, b.mode) != 0:
         return ILL_POSED
+    if s.ng > 0 and not all_finite(w.guards[NODES - 1]):
+        return NOT_FINITE
     fired = s.theta <= 1.0
     at_stop = s.t_old + s.hs >= s.stop - 4.0 * ULP * abs(s.stop)
     t = s.t_old + s.theta * s.hs if fired else (s.stop if at_stop else s.t_old + s.hs)

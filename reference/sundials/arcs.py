@@ -1,11 +1,13 @@
-"""One smooth arc between two events: CVODE on the reduced equations, or IDA on the DAE; root finding is SUNDIALS' own.
+"""One smooth arc between two events: CVODE on the reduced equations, or IDA on the DAE.
 
     cvode            q' = v, v' from the KKT matrix
     ida, index 1     q' = v, M v' = f + H_A^T lam_A, active rows H v' + H' v + a1 h' + a0 h + a2 h^3 = 0, else lam = 0
     ida, index 3     for bilateral rows h = 0 in the stabilised form of index 2 (Gear, Leimkuhler and Gupta 1985):
                      q' = v + H^T mu, h = 0, H v = 0; unilateral rows keep their law
 
-The work of rows, inputs and damping is integrated beside the motion (z), in the same error control.
+The work of rows, inputs and damping is integrated beside the motion (z), in the same error control. SUNDIALS' own root
+finding sees changes of sign between the ends of its steps alone: it is not used. Every step is examined on the solver's
+dense output (`roots`), unless a bound says that no guard can fire inside it (`evaluation`).
 """
 
 from __future__ import annotations
@@ -20,17 +22,25 @@ from sksundae.ida import IDA
 from crossbody.cases import Outcome
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
+from crossbody.reference.sundials import roots
+from crossbody.reference.sundials.compiled import evaluation
 from crossbody.reference.sundials.discrete import Discrete
-from crossbody.reference.sundials.equations import Ended, Equations
+from crossbody.reference.sundials.equations import ULP, Ended, Equations
+from crossbody.reference.sundials.evaluator import ENDS, Evaluator
 from crossbody.reference.sundials.level_machine import LevelMachine, View, Watch
 
 SHARE = 0.1  # of the tolerance asked for: a multistep method's error grows well beyond that of one step
 CHUNK = 500  # internal steps between two looks at the clock
-ROOT, TOO_MUCH_WORK = 2, -1
+TOO_MUCH_WORK = -1
 ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
-STALLED, LIMIT, DAMPED = 200, 0.3, 0.3  # steps; step times pole; damping ratio: beyond all three the arc is stiff
-UNWATCHED = 1e6  # in units of a multiplier's size: at index 2 errors of lam are errors of the motion over the step
+STALLED, DAMPED = 200, 0.3  # steps bound by stability; damping ratio: beyond both the arc is stiff
+UNWATCHED = 1e6  # in units of a multiplier's size: errors of lam are those of the motion, times a0 or over the step
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
+FAR = 1e30  # beyond this a motion has diverged
+SAME_INSTANT = 8.0 * ULP
+ROUNDING = 4.0 * ULP  # of the largest value
+NOISY = 64.0  # rounding of a multiplier along a step, in units of its bound at the start
+MOST_TERMS = 5  # of the guards of one row
 
 
 @dataclass(slots=True)
@@ -46,25 +56,41 @@ class State:
 
 @dataclass(slots=True)
 class Fired:
-    """What a root call located: (row, function) of the machine, and guards of the mechanism."""
+    """What was located: (row, function) of the machine, and guards of the mechanism."""
 
     rows: list[tuple[int, Watch]]
     guards: list[int]
 
 
-@dataclass(slots=True)
 class Scene:
-    """What all arcs of a run share."""
+    """What all arcs of a run share.
 
-    equations: Equations
-    machine: LevelMachine
-    discrete: Discrete
-    options: Options
-    nz: int
-    scale: float
-    """Size of the energies, J."""
-    steps: int = 0
-    """Instants at which the equations were evaluated: steps tried."""
+    Attributes:
+        equations, machine, discrete, options: of the run.
+        nz: accounts of work.
+        scale: size of the energies, J.
+        looks: compiled looks at a state.
+    """
+
+    def __init__(
+        self, equations: Equations, machine: LevelMachine, discrete: Discrete, options: Options, nz: int, scale: float
+    ) -> None:
+        self.equations, self.machine, self.discrete, self.options = equations, machine, discrete, options
+        self.nz, self.scale = nz, scale
+        self.looks = Evaluator(equations, MOST_TERMS * len(machine.rows) + discrete.guards, nz)
+        self.work = self.looks.work
+        self.largest = np.zeros(2 * equations.system.n)
+        """Largest q and v at the ends of IDA's steps."""
+
+    @property
+    def steps(self) -> int:
+        """Instants at which the equations were evaluated: steps tried."""
+        return int(self.work["count"][1])
+
+    @property
+    def evaluations(self) -> int:
+        """Right-hand sides so far, in compiled code and at events."""
+        return int(self.work["count"][0]) + self.equations.evaluations
 
 
 def _damped_pole(equations: Equations) -> float:
@@ -87,20 +113,23 @@ class Arc:
 
     def __init__(self, scene: Scene, start: State, view: View, longest: float) -> None:
         self.scene, self.options, self.n = scene, scene.options, scene.equations.system.n
-        self.q, self.v = start.q.copy(), start.v.copy()
-        self._last = -np.inf
-        self._known = start.t, view.lam
-        self._stalled, self._pole = 0, _damped_pole(scene.equations)
+        self.guards = [*scene.machine.guards, *scene.discrete.watched()]
+        scene.looks.begin(self.guards, scene.machine.frozen)
+        self.ask = scene.looks.ask
+        scene.work["clock"][:2] = -np.inf, _damped_pole(scene.equations)
+        scene.work["count"][2] = 0
         self.common = {
             "rtol": SHARE * self.options.rtol,
             "max_num_steps": CHUNK,
             "max_step": longest if np.isfinite(longest) else 0.0,
         }
-        self.of_rows = len(Watch) * len(scene.machine.rows)
-        self.watched = self.of_rows + scene.discrete.guards
-        self.solver = self._begin(start, view)
+        self.solver, y = self._begin(start, view)
+        self.t0, self.t1, self.y0, self.y1 = start.t, start.t, y, y
+        self._defect: Floats | None = None
+        self.ask(evaluation.BEGIN, start.t, y)
 
-    def _begin(self, start: State, view: View) -> Any:
+    def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
+        """The solver, and where it starts."""
         raise NotImplementedError
 
     def _state(self, t: float, y: Floats) -> State:
@@ -109,65 +138,96 @@ class Arc:
     @property
     def stiff(self) -> bool:
         """Whether the damped poles of the active rows, not accuracy, have bound the steps for long."""
-        return self._stalled >= STALLED
-
-    def _take(self, t: float, y: Floats) -> None:
-        """Copy the solver's read-only state for the kernels, and count the steps."""
-        n = self.n
-        self.q[:], self.v[:] = y[:n], y[n : 2 * n]
-        if t != self._last:
-            self._stalled = self._stalled + 1 if (t - self._last) * self._pole > LIMIT else 0
-            self._last = t
-            self.scene.steps += 1
-
-    def _watch(self, t: float, y: Floats, out: Floats) -> None:
-        n, scene = self.n, self.scene
-        self.q[:], self.v[:] = y[:n], y[n : 2 * n]
-        _, lam = scene.equations.accelerate(t, self.q, self.v)
-        self._known = t, lam
-        scene.machine.guards(t, self.q, self.v, lam, out[: self.of_rows])
-        scene.discrete.watch(t, self.q, self.v, out[self.of_rows :])
+        return bool(self.scene.work["count"][2] >= STALLED)
 
     def multipliers(self, s: State) -> Floats:
-        """Lam at a state that `step` returned: the solver's own, or that of the last look at the guards."""
+        """Lam at a state of the last step: the solver's own, or from the equations."""
         if s.lam is not None:
             return s.lam
-        t, lam = self._known
-        return lam if t == s.t else self.scene.equations.accelerate(s.t, s.q, s.v)[1]
-
-    def _guards(self, function: Any) -> dict[str, Any]:
-        """The options of root finding: every function fires where it falls through zero."""
-        if not self.watched:
-            return {}
-        function.direction = [-1] * self.watched
-        return {"eventsfn": function, "num_events": self.watched}
+        if s.t == self.t1:
+            return self.scene.work["lam1"].copy()
+        self.ask(evaluation.FORCES, s.t, np.concatenate([s.q, s.v]))
+        return self.scene.work["lam"].copy()
 
     def _tolerances(self) -> Floats:
         """Absolute ones, for q, v and the work."""
         share = SHARE * self.options.tolerance
         return np.concatenate([np.full(2 * self.n, share), np.full(self.scene.nz, share * self.scene.scale)])
 
-    def step(self, target: float, stop: float, natural: bool) -> tuple[State, Fired]:
-        """Go on by one step of the solver's own, or to `target`; never beyond `stop`.
-
-        Returns:
-            The state, and what fired there.
+    def step(self, stop: float) -> tuple[State, Fired]:
+        """Go on by one step of the solver's own, never beyond `stop`, or to the first guard that fires inside it.
 
         Raises:
             Ended: with the outcome if the solver gives up.
         """
-        done = self.solver.step(target, "onestep" if natural else "normal", stop)
+        done = self.solver.step(stop, "onestep", stop)
         if done.status < 0 and done.status != TOO_MUCH_WORK:
             raise Ended(Outcome.STEP_TOO_SMALL)
-        if not np.isfinite(done.y).all():
-            raise Ended(Outcome.NOT_FINITE)
-        fired = np.flatnonzero(done.i_events[-1]).tolist() if done.status == ROOT else []
-        return self._state(float(done.t), done.y), self._fired(fired)
+        self._check(done.y)
+        self.t0, self.y0, self.t1, self.y1 = self.t1, self.y1, float(done.t), done.y
+        self._defect = None
+        t, fired = self._examine()
+        return self.at(t), fired
 
-    def _fired(self, places: list[int]) -> Fired:
-        rows, own = self.scene.machine.rows, self.of_rows
-        pairs = [(rows[j // len(Watch)], Watch(j % len(Watch))) for j in places if j < own]
-        return Fired(pairs, [j - own for j in places if j >= own])
+    def _check(self, y: Floats) -> None:
+        size = float(y.dot(y))
+        if not size < FAR**2:
+            raise Ended(Outcome.DIVERGED if np.isfinite(y).all() else Outcome.NOT_FINITE)
+
+    def _examine(self) -> tuple[float, Fired]:
+        """The end of the step, or the first instant inside it at which guards fire, and these."""
+        t1 = self.t1
+        if not self.guards or t1 <= self.t0:
+            self.ask(evaluation.BEGIN, t1, self.y1)
+            return t1, Fired([], [])
+        left = self.ask(evaluation.SCAN, t1, self.y1)
+        return self._search() if left else (t1, Fired([], []))
+
+    def _search(self) -> tuple[float, Fired]:
+        """The first of the guards that may fire inside the step, and all that fire with it."""
+        known: dict[float, Floats] = {}
+
+        def terms(t: float) -> Floats:
+            if t not in known:
+                self.ask(evaluation.TERMS, t, self._between(t))
+                known[t] = self.scene.looks.values.copy()
+            return known[t]
+
+        end, found, at = self.t1, [], 0
+        precision = max(64.0 * ULP, SHARE * self.options.rtol)
+        for guard, open_ in zip(self.guards, self.scene.work["undecided"].tolist(), strict=False):
+            mine, at = slice(at, at + len(guard.terms)), at + len(guard.terms)
+            if not open_:
+                continue
+
+            def its_own(t: float, mine: slice = mine) -> Floats:
+                return terms(t)[mine]
+
+            noise = np.array([NOISY * term.noise for term in guard.terms])
+            armed = guard.watch is not None  # a guard of the mechanism counts from above zero on
+            t = roots.first(its_own, self.t0, end, precision, noise, armed)
+            if t is not None:
+                end = min(t, end)
+                found.append((t, guard))
+        now = [guard for t, guard in found if t - end <= SAME_INSTANT * abs(end)]
+        rows = [(guard.row, guard.watch) for guard in now if guard.watch is not None]
+        return end, Fired(rows, [guard.row for guard in now if guard.watch is None])
+
+    def _between(self, t: float) -> Floats:
+        """The solver's dense output, joined to where the step began: its own polynomial misses that by its error."""
+        if t >= self.t1:
+            return self.y1
+        if t <= self.t0:
+            return self.y0
+        if self._defect is None:
+            self._defect = self.y0 - self.solver.step(self.t0, "normal").y
+        part = (t - self.t0) / (self.t1 - self.t0)
+        y: Floats = self.solver.step(t, "normal").y + ((1.0 - part) ** 2 * (1.0 + 2.0 * part)) * self._defect
+        return y
+
+    def at(self, t: float) -> State:
+        """The state at an instant of the last step."""
+        return self._state(t, self._between(t))
 
 
 class CvodeArc(Arc):
@@ -175,27 +235,22 @@ class CvodeArc(Arc):
 
     method = "Adams"
 
-    def _begin(self, start: State, view: View) -> Any:
+    def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
+        scene, call, lines = self.scene, self.scene.looks.call, self.scene.looks.lines
+
         def rhs(t: float, y: Floats, yp: Floats) -> None:
-            self._take(t, y)
-            n, e = self.n, self.scene.equations
-            vd, lam = e.accelerate(t, self.q, self.v)
-            yp[:n], yp[n : 2 * n] = self.v, vd
-            if self.scene.nz:
-                yp[2 * n :] = e.powers(t, self.q, self.v, lam)
+            if code := call(evaluation.DERIVATIVE, t, y, yp, lines):
+                raise Ended(ENDS[code], scene.equations.active)
 
-        def watch(t: float, y: Floats, out: Floats) -> None:
-            self._watch(t, y, out)
-
-        guards, e = self._guards(watch), self.scene.equations
-        order = {} if self.method == "BDF" else {"max_order": ORDER_IN_CONTACT if e.active else ORDER}
-        solver = CVODE(rhs, method=self.method, atol=self._tolerances(), **self.common, **order, **guards)
-        solver.init_step(start.t, np.concatenate([start.q, start.v, start.z]))
-        return solver
+        order = {"max_order": ORDER_IN_CONTACT if scene.equations.active else ORDER} if self.method == "Adams" else {}
+        solver = CVODE(rhs, method=self.method, atol=self._tolerances(), **self.common, **order)
+        y = np.concatenate([start.q, start.v, start.z])
+        solver.init_step(start.t, y)
+        return solver, y
 
     def _state(self, t: float, y: Floats) -> State:
         n = self.n
-        return State(t, y[:n].copy(), y[n : 2 * n].copy(), y[2 * n :].copy())
+        return State(t, y[:n], y[n : 2 * n], y[2 * n :])
 
 
 class BdfArc(CvodeArc):
@@ -207,37 +262,42 @@ class BdfArc(CvodeArc):
 class IdaArc(Arc):
     """IDA on (q, v, lam), with the multipliers mu of the stabilised form where bilateral rows are rigid."""
 
-    def _begin(self, start: State, view: View) -> Any:
+    def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
         n, nc, e = self.n, self.scene.equations.system.nc, self.scene.equations
         bilateral = ~np.asarray(e.system.unilateral, dtype=bool)
         self.rigid = np.flatnonzero(bilateral).tolist() if self.options.index == 3 else []
         nb = len(self.rigid)
         self.lam, self.mu = slice(2 * n, 2 * n + nc), slice(2 * n + nc, 2 * n + nc + nb)
         self.work = slice(2 * n + nc + nb, None)
+        self.q, self.v = start.q.copy(), start.v.copy()
+        count, clock = self.scene.work["count"], self.scene.work["clock"]
 
         def residual(t: float, y: Floats, yp: Floats, out: Floats) -> None:
-            self._take(t, y)
+            self.q[:], self.v[:] = y[:n], y[n : 2 * n]
+            if t != clock[0]:
+                count[1] += 1
+                clock[0] = t
             self._residual(t, y, yp, out)
 
-        def watch(t: float, y: Floats, yp: Floats, out: Floats) -> None:
-            self._watch(t, y, out)
-
         share, size = SHARE * self.options.rtol, np.where(view.size > 0.0, view.size, 1.0)
-        loose = UNWATCHED if self.rigid else 1.0
         own = self._tolerances()
-        atol = np.concatenate([own[: 2 * n], share * size * loose, np.full(nb, UNWATCHED), own[2 * n :]])
+        motion = np.maximum(own[: 2 * n], ROUNDING * self.scene.largest)  # a speed at its turn is known no better
+        atol = np.concatenate([motion, share * size * UNWATCHED, np.full(nb, UNWATCHED), own[2 * n :]])
         solver = IDA(
             residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), first_step=self._first_step(),
-            **self.common, **self._guards(watch),
+            **self.common,
         )  # fmt: skip
         powers = e.powers(start.t, start.q, start.v, view.lam) if self.scene.nz else np.zeros(0)
         zero = np.zeros(nb)
-        solver.init_step(
-            start.t,
-            np.concatenate([start.q, start.v, view.lam, zero, start.z]),
-            np.concatenate([start.v, view.vd, np.zeros(nc), zero, powers]),
-        )
-        return solver
+        y = np.concatenate([start.q, start.v, view.lam, zero, start.z])
+        solver.init_step(start.t, y, np.concatenate([start.v, view.vd, np.zeros(nc), zero, powers]))
+        return solver, y
+
+    def step(self, stop: float) -> tuple[State, Fired]:
+        """As every arc; what the motion has reached bounds how well it can be known."""
+        state, fired = super().step(stop)
+        np.maximum(self.scene.largest, np.abs(self.y1[: 2 * self.n]), out=self.scene.largest)
+        return state, fired
 
     def _first_step(self) -> float:
         """0 to let IDA guess; at index 2 its guess is so short that it sees rounding over the step and nothing else."""
@@ -270,4 +330,4 @@ class IdaArc(Arc):
 
     def _state(self, t: float, y: Floats) -> State:
         n = self.n
-        return State(t, y[:n].copy(), y[n : 2 * n].copy(), y[self.work].copy(), y[self.lam].copy())
+        return State(t, y[:n], y[n : 2 * n], y[self.work], y[self.lam])

@@ -8,11 +8,11 @@ from crossbody.cases import Mode, Outcome, Switch
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.kernels import CHANGED, LOST, START, TOUCHED
+from crossbody.reference.sundials.compiled.evaluation import Kind
 from crossbody.reference.sundials.equations import Ended, Equations
+from crossbody.reference.sundials.level_machine import Guard, Term
 
 __all__ = ["START", "TOUCHED", "Discrete"]
-
-TINY = 1e-300  # in place of 0: a guard at 0 has fired, and SUNDIALS takes one that starts at 0 for absent
 
 
 class Discrete:
@@ -30,11 +30,9 @@ class Discrete:
         end = len(self.p) - system.latched
         self._values = self.p[end - np.size(system.discrete) : end]
 
-    def watch(self, t: float, q: Floats, v: Floats, out: Floats) -> None:
-        """All guards (guards,): each fires where it falls from above 0 to 0 or below."""
-        if self.guards:
-            self.system.watch(t, q, v, self.p, out)
-            out[out == 0.0] = -TINY
+    def watched(self) -> list[Guard]:
+        """The mechanism's own guards."""
+        return [Guard(i, None, [Term(Kind.WATCH, i)]) for i in range(self.guards)]
 
     def switch(self, t: float, q: Floats, v: Floats, modes: list[Mode], fired: int) -> tuple[bool, list[Mode]]:
         """Call the kernel; whether it changed anything, and the modes that it wants.

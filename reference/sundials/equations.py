@@ -240,14 +240,3 @@ class Equations:
         self._check_rank(G)
         x: Floats = X @ np.linalg.solve(G, error(H, h))
         return x
-
-    def elastic_part(self, t: float, q: Floats, v: Floats, i: int) -> tuple[float, float]:
-        """Elastic part max(b1, sqrt(b0)) |h'| + b0 |h| of active row i, and lam_i / (G_A^-1)_ii (spec 1.2), m/s^2."""
-        _, lam = self.accelerate(t, q, v)
-        M, _ = self.terms(t, q, v)
-        H, h, _ = self.rows(t, q, v)
-        j = self.active.index(i)
-        inverse = np.linalg.inv(H @ np.linalg.solve(M, H.T))
-        b0, b1 = self.law[i, :2].tolist()
-        elastic = max(b1, b0**0.5) * abs(float(H[j] @ v)) + b0 * abs(float(h[j]))
-        return elastic, float(lam[i] / inverse[j, j])

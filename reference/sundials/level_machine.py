@@ -20,24 +20,44 @@ import numpy as np
 from crossbody.cases import Event, Mode, Outcome
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System, initial_modes
+from crossbody.reference.sundials.compiled.evaluation import Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 
-SLOW, DEEP, SPENT = 1e-9, 1e-9, 0.01
+SLOW, DEEP = 1e-9, 1e-9
 SAME_INSTANT = 8.0 * ULP
-TINY = 1e-300  # in place of 0: SUNDIALS takes a function that is zero at the start for one that is absent
+SIDES = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))  # |x| + |y| <= z: so for each choice of signs
 
 
 class Watch(IntEnum):
-    """The functions watched for each row; each is positive until it fires."""
+    """What a guard of a row is for."""
 
     SWITCH = 0
     """FREE: touch. Active: release. BALLISTIC: leave."""
-    TURN = 1
-    """The gap has its extremum: nothing switches, but a touch and a leave inside one step are seen, and a hand-over."""
-    OTHER = 2
+    OTHER = 1
     """BALLISTIC: catch. COLLISION: hand-over."""
-    PASS = 3
-    """COLLISION: the gap passes through zero, where the elastic part is least as well; nothing switches."""
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One smooth function of the state: `kind` of a row (or the number of a `watch` function), plus `shift`.
+
+    `noise` is what rounding makes of it; `sides` are the signs of h' and h in a hand-over.
+    """
+
+    kind: Kind
+    row: int
+    shift: float = 0.0
+    noise: float = 0.0
+    sides: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """It fires where all of its terms are at or below zero; `watch` is None for one of the mechanism's own."""
+
+    row: int
+    watch: Watch | None
+    terms: list[Term]
 
 
 @dataclass(slots=True)
@@ -59,6 +79,7 @@ class LevelMachine:
         modes: of every row.
         events: transitions in order.
         frozen: rows whose collisions take no time; none in this machine.
+        guards: of all rows, as the last `settle` left them.
         deep: depth beyond which a gap that does not close was started in penetration, m.
         work (nc,): done by the impulses of every row so far, J.
     """
@@ -77,8 +98,7 @@ class LevelMachine:
         self._instant = -np.inf
         self._seen: set[tuple[int, ...]] = set()
         self._one_by_one = False
-        self._shift: list[float] = []
-        self._inside: set[int] = set()
+        self.guards: list[Guard] = []
 
     @property
     def slow(self) -> float:
@@ -213,7 +233,7 @@ class LevelMachine:
         gap, _ = self.equations.gaps(t, q, v)
         self._repeats(t)
         before = len(self.events)
-        for i, watch in {i: watch for i, watch in fired if watch in (Watch.SWITCH, Watch.OTHER)}.items():
+        for i, watch in dict(fired).items():
             mode = self.modes[i]
             if watch == Watch.OTHER:
                 self._switch(t, i, Mode.CONTACT if mode == Mode.COLLISION else self._active_mode(i))
@@ -230,36 +250,22 @@ class LevelMachine:
                 self._switch(t, i, after)
 
     def _arm(self, view: View, q: Floats) -> None:
-        """Lift every guard that starts at or below zero to just above: it has fired already, or is round-off."""
-        self._inside = {i for i in self.rows if self._touches(i, float(view.gap[i]), q)}
-        self._shift = [0.0] * (len(Watch) * len(self.rows))
-        for j, i in enumerate(self.rows):
-            start = view.lam[i] if self.modes[i] in ACTIVE else view.gap[i]
-            if self.modes[i] not in (Mode.FREE, *ACTIVE):
-                start = -start
-            if start <= 0.0 and not (self.modes[i] == Mode.FREE and i in self._inside):
-                self._shift[len(Watch) * j] = -start + view.noise[i]
+        """Set up the guards that hold until the next event."""
+        inside = [i for i in self.rows if self._touches(i, float(view.gap[i]), q)]
+        self.guards = [guard for i in self.rows for guard in self._guards(i, view, i in inside)]
 
-    def guards(self, t: float, q: Floats, v: Floats, lam: Floats, out: Floats) -> None:
-        """All watched functions (4 a row) at a state with its multipliers."""
-        gap, rate = (a.copy() for a in self.equations.gaps(t, q, v))
-        out[:] = 1.0
-        for j, i in enumerate(self.rows):
-            at, mode = len(Watch) * j, self.modes[i]
-            h, hd = float(gap[i]), float(rate[i])
-            if mode in ACTIVE:
-                out[at] = lam[i]
-                if mode == Mode.COLLISION:
-                    elastic, inertial = self.equations.elastic_part(t, q, v, i)
-                    out[at + Watch.OTHER] = elastic - SPENT * max(inertial, 0.0)
-                    out[at + Watch.TURN], out[at + Watch.PASS] = h * hd, -h * hd
-            elif mode == Mode.FREE:
-                out[at] = max(h, hd + self.slow) if i in self._inside else h
-                out[at + Watch.TURN] = (self.slow if i in self.frozen else 0.0) - hd
-            else:
-                closing = hd + self.slow
-                out[at], out[at + Watch.TURN] = -h, hd
-                catches = closing <= 0.0 and i not in self.frozen
-                out[at + Watch.OTHER] = max(closing, -self.pressure(i, t, q, v)[0]) if catches else closing
-        out += self._shift
-        out[out == 0.0] = TINY
+    def _guards(self, i: int, view: View, inside: bool) -> list[Guard]:
+        mode, noise = self.modes[i], float(view.noise[i])
+        # The rate's own zero is the place; one that stands still there already must close first.
+        still = i in self.frozen or view.rate[i] <= self.slow
+        closing = Term(Kind.RATE, i, self.slow if still else 0.0)
+        if mode in ACTIVE:
+            lam = float(view.lam[i])  # one that starts at or below zero is round-off, or has fired already
+            released = Guard(i, Watch.SWITCH, [Term(Kind.FORCE, i, noise - lam if lam <= 0.0 else 0.0, noise)])
+            if mode != Mode.COLLISION:
+                return [released]
+            return [released, Guard(i, Watch.OTHER, [Term(Kind.SPENT, i, sides=sides) for sides in SIDES])]
+        if mode == Mode.FREE:
+            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i), closing] if inside else [Term(Kind.GAP, i)])]
+        catch = [closing] if i in self.frozen else [closing, Term(Kind.PRESS, i)]
+        return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i)]), Guard(i, Watch.OTHER, catch)]

@@ -1,14 +1,15 @@
 """A run by SUNDIALS through scikit-sundae (Hindmarsh et al. 2005): the independent check on the compiled loop.
 
 It shares nothing with the compiled loop but the mechanism's kernels: equations, state machine, integrator and root
-finding are others. It is slower by the price of Python callbacks. Every arc between two events, changes of the inputs
-or ticks of the controller begins anew at order one.
+finding are others. It is slower by the price of some Python calls a step. Every arc between two events, changes of the
+inputs or ticks of the controller begins anew at order one.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from math import isfinite
 from types import MappingProxyType
 
 import numpy as np
@@ -18,14 +19,15 @@ from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
 from crossbody.reference._system import System
 from crossbody.reference.sundials.arcs import Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
+from crossbody.reference.sundials.compiled.evaluation import entry
 from crossbody.reference.sundials.discrete import START, TOUCHED, Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.frozen_machine import FrozenMachine
 from crossbody.reference.sundials.level_machine import LevelMachine, View
 from crossbody.reference.sundials.quiet import quiet
 
-FAR = 1e30
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
+AGAIN = (Outcome.NOT_FINITE, Outcome.STEP_TOO_SMALL)  # a fresh start at order one also gets past a weight near zero
 ROUNDS = 100  # of rows and discrete variables that switch each other at one instant
 STILL = 200  # steps in a row, each within rounding of the time
 ON_THE_MANIFOLD = 1e-6
@@ -50,6 +52,7 @@ class SundialsRun:
         self.system, self.options, self.q0, self.v0 = system, options, q0, v0
         self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
         self.natural = options.samples is None
+        entry(system)  # the kernels are built into the compiled equations before the clock runs
         self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
         held = ~np.asarray(system.unilateral, dtype=bool)
         self.rigid: list[int] = np.flatnonzero(held).tolist() if options.index == 3 else []
@@ -62,7 +65,7 @@ class SundialsRun:
             raise SceneError(f"index=3 needs a start with h = h' = 0 in every bilateral row; the largest is {off:.3g}.")
 
     def warm(self) -> None:
-        """Nothing to prepare: kernels are compiled where they are declared."""
+        """Nothing to prepare: what is compiled is compiled when the run is made."""
 
     def start(self) -> None:
         """Back to the beginning."""
@@ -119,7 +122,7 @@ class SundialsRun:
             if switched or (at_stop and self.state.t < t_end):
                 view = self._settle()
                 arc = self._arc(view)
-            elif arc.stiff and self.kind is CvodeArc:
+            elif self.kind is CvodeArc and arc.stiff:
                 arc = BdfArc(self.scene, self.state, view, self.options.max_step)
 
     def _check_bounds(self, began: float) -> None:
@@ -177,28 +180,25 @@ class SundialsRun:
         before = self.state
         if stop - before.t <= 16.0 * ULP * stop:
             self.state.t = stop
-            return False
-        target = stop if self.natural else min(stop, self._next_sample())
-        if target - before.t <= 16.0 * ULP * stop:  # a sample at an event, apart by rounding: no solver starts so near
-            before.t = target
-            self._sample(self.equations.accelerate(target, before.q, before.v)[1])
+            if self._next_sample() <= stop:
+                self._sample(self.equations.accelerate(stop, before.q, before.v)[1])
             return False
         try:
-            state, fired = arc.step(target, stop, self.natural)
+            state, fired = arc.step(stop)
         except Ended as end:
-            if end.outcome is not Outcome.NOT_FINITE or self.retries >= RETRIES:
+            if end.outcome not in AGAIN or self.retries >= RETRIES:
                 raise
             self.retries += 1
             return None
-        if max(np.abs(state.q).max(), np.abs(state.v).max()) > FAR:
-            raise Ended(Outcome.DIVERGED)
+        while self._next_sample() < state.t:
+            self.state = arc.at(self._next_sample())
+            self._sample(arc.multipliers(self.state))
         self.state = state
         self._check_progress(state.t - before.t > 16.0 * ULP * stop)
-        lam = arc.multipliers(state)
         if self.natural:
-            self._record(lam)
-        else:
-            self._sample(lam)
+            self._record(arc.multipliers(state))
+        elif self._next_sample() == state.t:
+            self._sample(arc.multipliers(state))
         return self._fire(fired)
 
     def _fire(self, fired: Fired) -> bool:
@@ -227,8 +227,10 @@ class SundialsRun:
 
     def _record(self, lam: Floats) -> None:
         s, e = self.state, self.equations
-        gap = e.gaps(s.t, s.q, s.v)[0].copy()
-        self.rows.append((s.t, s.q, s.v, gap, lam, e.energy(s.q, s.v), [int(m) for m in self.machine.modes], s.z))
+        gap, energy = e.gaps(s.t, s.q, s.v)[0].copy(), e.energy(s.q, s.v)
+        if not isfinite(gap.sum() + energy.sum()):
+            raise Ended(Outcome.NOT_FINITE)
+        self.rows.append((s.t, s.q, s.v, gap, lam, energy, [int(m) for m in self.machine.modes], s.z))
 
     def _take_inputs(self) -> float:
         """Put the inputs that hold from now on in force; the next instant at which they change."""
@@ -258,7 +260,7 @@ class SundialsRun:
             t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, events=tuple(self.machine.events),
             switches=tuple(self.discrete.switches),
             outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
-            counts=MappingProxyType({"rhs": self.equations.evaluations}),
+            counts=MappingProxyType({"rhs": self.scene.evaluations}),
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
         )  # fmt: skip
 

@@ -14,6 +14,7 @@ from crossbody.cases import Case, Tier, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.cases._trajectory import Ledger
 from crossbody.reports.judging._between import between
+from crossbody.reports.judging.modes import violated
 
 SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
@@ -144,7 +145,19 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     source = f"compiled reference at rtol {case.tight:g}, {other} at {SECOND * case.tight:g} agrees: {said}"
     if truth.trusted < case.t_end:
         source += f"; compared until they part at t = {truth.trusted:.4g} s"
-    return replace(truth, source=source, agreement=found)
+    return _rechecked(replace(truth, source=source, agreement=found), case)
+
+
+def _rechecked(truth: Truth, case: Case) -> Truth:
+    """The truth up to the first mode that does not hold: two searches may miss the same event."""
+    broken = violated(case, truth.trajectory, SECOND * case.tight) or ()
+    if not broken:
+        return truth
+    first = min(broken, key=lambda one: one.t)
+    told = (
+        f"; row {first.contact} is {first.mode.name} at t = {first.t:.6g} s, but {first.reason}: not trusted from there"
+    )
+    return replace(truth, source=truth.source + told, trusted=min(truth.trusted, first.t))
 
 
 def _trusted(truth: Truth, second: Trajectory) -> float:

@@ -1,0 +1,506 @@
+"""The reduced equations and the guards at one state, compiled: called once for every look of a SUNDIALS solver.
+
+    [ M   -H_A^T ] [ v'  ]   [ f                                          ]
+    [ H_A    0   ] [ lam ] = [ -(H_A' v + a1 h' + a0 h + a2 h^3)_A        ]
+
+The whole matrix goes through elimination with partial pivoting; the compiled loop of `reference.core` forms H M^-1 H^T
+instead, and shares no function with this file. A guard is a conjunction of smooth functions, its terms: it fires where
+all of them are at or below zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+
+from crossbody.reference import kernels
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Array, Floats, Floats2, Index
+from crossbody.reference._program import Address
+from crossbody.reference._system import System
+from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
+
+# What is asked of `evaluate`.
+DERIVATIVE, TERMS, FORCES, BEGIN, SCAN, GRID = range(6)
+
+
+class Kind(IntEnum):
+    """What a term of a guard is."""
+
+    GAP = 0
+    BELOW = 1
+    """The gap's negative."""
+    RATE = 2
+    FORCE = 3
+    """The multiplier of an active row."""
+    PRESS = 4
+    """Minus the multiplier that an inactive row would have."""
+    SPENT = 5
+    """One side of the hand-over c |h'| + b0 |h| <= eps lam / (G^-1)_ii of a collision."""
+    WATCH = 6
+    """A function of the mechanism's `watch`."""
+
+
+GAP, BELOW, RATE, FORCE, PRESS, SPENT, WATCH = (int(kind) for kind in Kind)
+SPENT_PART = 0.01  # elastic part of lam at which a collision hands over to contact
+GOOD, ILL_POSED, NOT_FINITE = range(3)
+STIFF = 0.3  # step times damped pole beyond which a step counts as bound by stability
+
+DEGREE = 8
+_k = np.arange(DEGREE + 1)
+NODES = 0.5 - 0.5 * np.cos(np.pi * _k / DEGREE)  # Chebyshev-Lobatto, on the step from 0 to 1
+_half = np.where((_k == 0) | (_k == DEGREE), 0.5, 1.0)
+TO_SERIES = 2.0 / DEGREE * _half[:, None] * np.cos(np.pi * np.outer(_k, DEGREE - _k) / DEGREE) * _half
+DOUBTS = (0.4, 0.6)  # where the quintic is held against the equations; symmetric, so that no parity hides an error
+POINTS = 16  # even places of a step at which a re-check looks
+CAUTION = 16.0  # errors along the step in units of those seen at two places
+
+
+class Workspace:
+    """Everything that `evaluate` reads and writes."""
+
+    size: Index  # n, nc, k, nz, na, terms, guards
+    count: Index  # evaluations, steps, steps in a row that stability binds
+    clock: Floats  # last instant, fastest damped pole, start of the step
+    p: Floats
+    u: Floats
+    w: Floats
+    blocks: Floats2  # (n, k)
+    f: Floats
+    q: Floats
+    v: Floats
+    H: Floats2  # (nc, n), compact, as h, Hdv
+    h: Floats
+    Hdv: Floats
+    gap: Floats
+    rate: Floats
+    lam: Floats  # (nc,) of all rows at the last evaluation
+    lam1: Floats  # at the end of the step
+    two: Floats
+    matrix: Floats2  # (n + nc, n + nc + 2): the last columns are right-hand sides
+    solution: Floats2  # (n + nc, 2)
+    law: Floats2  # (nc, 3) in force
+    law_if: Floats2  # the same, with every inactive row as it would be
+    idx: Index
+    trial: Index
+    follows: Index
+    watched: Floats  # (guards of the mechanism,)
+    kind: Index  # of every term
+    row: Index
+    side: Floats2  # (terms, 2) signs of h' and h on one side of the hand-over
+    shift: Floats
+    group: Index  # the guard that a term belongs to
+    values: Floats2  # (nodes, terms)
+    check: Floats2  # (4, terms) at two places, without the quintic's error and with it
+    grid: Floats2  # (POINTS, terms)
+    y0: Floats  # (2n,) start of the step
+    y1: Floats
+    curve: Floats  # (n,) v' of the quintic
+    a0: Floats  # (n,)
+    a1: Floats
+    undecided: Index  # (guards,) whether a guard may fire inside the step
+
+
+WORKSPACE = bundle_type(Workspace)
+open_work = opener(WORKSPACE)
+
+
+@inlined
+def _eliminate(A: Floats2, x: Floats2, size: int, sides: int) -> int:
+    """Solve A[:, :size] x = A[:, size:] by Gaussian elimination with partial pivoting; zeros are passed over."""
+    end = size + sides
+    for c in range(size):
+        best, at = abs(A[c, c]), c
+        for r in range(c + 1, size):
+            if abs(A[r, c]) > best:
+                best, at = abs(A[r, c]), r
+        if best == 0.0:
+            return 1
+        if at != c:
+            for j in range(c, end):
+                A[c, j], A[at, j] = A[at, j], A[c, j]
+        inverse = 1.0 / A[c, c]
+        for r in range(c + 1, size):
+            factor = A[r, c] * inverse
+            if factor != 0.0:
+                for j in range(c + 1, end):
+                    A[r, j] -= factor * A[c, j]
+    for side in range(sides):
+        for c in range(size - 1, -1, -1):
+            total = A[c, size + side]
+            for j in range(c + 1, size):
+                total -= A[c, j] * x[j, side]
+            x[c, side] = total / A[c, c]
+    return 0
+
+
+@compiled
+def _solve(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, idx: Index, na: int, law: Floats2,
+           unit: int) -> int:  # fmt: skip
+    """V' and lam of the rows in idx into `solution`; with unit >= 0 the response to that row alone beside it."""
+    n, k, A = s.size[0], s.size[2], s.matrix
+    size = n + na
+    s.count[0] += 1
+    dynamics(t, q, v, s.u, s.p, s.blocks, s.f, s.w)
+    A[:size, : size + 2] = 0.0
+    for i in range(n):
+        first = i // k * k
+        for j in range(k):
+            A[i, first + j] = s.blocks[i, j]
+        A[i, size] = s.f[i]
+    if na > 0:
+        s.H[:na] = 0.0  # kernels need not write the zeros
+        rows(t, q, v, s.p, s.w, idx, na, s.H, s.h, s.Hdv)
+        for j in range(na):
+            rate = 0.0
+            for c in range(n):
+                A[n + j, c] = s.H[j, c]
+                A[c, n + j] = -s.H[j, c]
+                rate += s.H[j, c] * v[c]
+            h, i = s.h[j], idx[j]
+            A[n + j, size] = -(s.Hdv[j] + law[i, 1] * rate + (law[i, 0] + law[i, 2] * h * h) * h)
+        if unit >= 0:
+            A[n + unit, size + 1] = 1.0
+    total = 0.0
+    for i in range(size):
+        for j in range(size + 1):
+            total += A[i, j]
+    if _eliminate(A, s.solution, size, 2 if unit >= 0 else 1) != 0:
+        return ILL_POSED if np.isfinite(total) else NOT_FINITE
+    for i in range(size):
+        if not np.isfinite(s.solution[i, 0]):
+            return ILL_POSED if np.isfinite(total) else NOT_FINITE
+    return GOOD
+
+
+@compiled
+def _accelerate(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats) -> int:
+    """V' into `solution`, multipliers of all rows into `lam`."""
+    code = _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, -1)
+    s.lam[:] = 0.0
+    for j in range(s.size[4]):
+        s.lam[s.idx[j]] = s.solution[s.size[0] + j, 0]
+    return int(code)
+
+
+@inlined
+def _derivative(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t: float, y: Any, yp: Any) -> int:
+    """Y' of q, v and the work done by rows, by inputs and against damping."""
+    n, nc, nz = s.size[0], s.size[1], s.size[3]
+    if t != s.clock[0]:
+        s.count[1] += 1
+        s.count[2] = s.count[2] + 1 if (t - s.clock[0]) * s.clock[1] > STIFF else 0
+        s.clock[0] = t
+    for i in range(n):
+        s.q[i], s.v[i] = y[i], y[n + i]
+    code = _accelerate(dynamics, rows, s, t, s.q, s.v)
+    for i in range(n):
+        yp[i], yp[n + i] = s.v[i], s.solution[i, 0]
+    if code == GOOD and nz > 0:
+        gaps(t, s.q, s.v, s.p, s.gap, s.rate)
+        power(t, s.q, s.v, s.u, s.p, s.two)
+        for i in range(nc):
+            yp[2 * n + i] = s.lam[i] * s.rate[i]
+        yp[2 * n + nc], yp[2 * n + nc + 1] = s.two[0], s.two[1]
+        for i in range(2 * n, 2 * n + nz):
+            if not np.isfinite(yp[i]):
+                return NOT_FINITE
+    return int(code)
+
+
+@inlined
+def _would_press(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, i: int) -> float:
+    """Multiplier of the inactive row i if it were active now; -inf where that is ill posed."""
+    na = s.size[4]
+    for j in range(na):
+        s.trial[j] = s.idx[j]
+    s.trial[na] = i
+    count = na + 1
+    for j in range(s.size[1]):
+        if s.follows[j] == i:
+            s.trial[count] = j
+            count += 1
+    if _solve(dynamics, rows, s, t, q, v, s.trial, count, s.law_if, -1) != GOOD:
+        return -np.inf
+    return float(s.solution[s.size[0] + na, 0])
+
+
+@inlined
+def _spent(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, e: int) -> float:
+    """One side of the hand-over: +-c h' +- b0 h - eps lam_i / (G^-1)_ii, with c = max(b1, sqrt(b0))."""
+    i = s.row[e]
+    for j in range(s.size[4]):
+        if s.idx[j] == i:
+            if _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, j) != GOOD:
+                return np.nan
+            at = s.size[0] + j
+            inertial = s.solution[at, 0] / s.solution[at, 1]
+            c = max(s.law[i, 1], np.sqrt(s.law[i, 0]))
+            elastic = s.side[e, 0] * c * s.rate[i] + s.side[e, 1] * s.law[i, 0] * s.gap[i]
+            return float(elastic - SPENT_PART * inertial)
+    return np.nan
+
+
+@compiled
+def _terms(
+    dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, q: Floats, v: Floats, out: Any
+) -> int:
+    """All terms of all guards at one state."""
+    gaps(t, q, v, s.p, s.gap, s.rate)
+    if len(s.watched) > 0:
+        watch(t, q, v, s.p, s.watched)
+    known = False
+    for e in range(s.size[5]):
+        kind, i = s.kind[e], s.row[e]
+        if kind == FORCE and not known:
+            if _accelerate(dynamics, rows, s, t, q, v) != GOOD:
+                return NOT_FINITE
+            known = True
+        if kind == GAP:
+            value = s.gap[i]
+        elif kind == BELOW:
+            value = -s.gap[i]
+        elif kind == RATE:
+            value = s.rate[i]
+        elif kind == FORCE:
+            value = s.lam[i]
+        elif kind == PRESS:
+            value = -_would_press(dynamics, rows, s, t, q, v, i)
+        elif kind == SPENT:
+            value = _spent(dynamics, rows, s, t, q, v, e)
+        else:
+            value = s.watched[i]
+        out[e] = value + s.shift[e]
+        if np.isnan(value):
+            return NOT_FINITE
+    for i in range(s.size[1]):
+        if not np.isfinite(s.gap[i]) or not np.isfinite(s.rate[i]):
+            return NOT_FINITE
+    return GOOD
+
+
+@inlined
+def _hermite(s: Workspace, theta: float, length: float) -> None:
+    """Quintic through q, v and v' at both ends of the step, and its derivatives, into q, v and `curve`."""
+    n = s.size[0]
+    for i in range(n):
+        q0, q1 = s.y0[i], s.y1[i]
+        v0, v1 = length * s.y0[n + i], length * s.y1[n + i]
+        a0, a1 = 0.5 * length * length * s.a0[i], 0.5 * length * length * s.a1[i]
+        # In powers of theta, from q0 on: c3, c4, c5 close the other end.
+        d, dv, da = q1 - q0 - v0 - a0, v1 - v0 - 2.0 * a0, 2.0 * (a1 - a0)
+        c3, c4, c5 = 10.0 * d - 4.0 * dv + 0.5 * da, -15.0 * d + 7.0 * dv - da, 6.0 * d - 3.0 * dv + 0.5 * da
+        s.q[i] = q0 + theta * (v0 + theta * (a0 + theta * (c3 + theta * (c4 + theta * c5))))
+        slope = v0 + theta * (2.0 * a0 + theta * (3.0 * c3 + theta * (4.0 * c4 + theta * 5.0 * c5)))
+        s.v[i] = slope / length
+        curve = 2.0 * a0 + theta * (6.0 * c3 + theta * (12.0 * c4 + theta * 20.0 * c5))
+        s.curve[i] = curve / (length * length)
+
+
+@inlined
+def _doubt(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float) -> int:
+    """Terms on the quintic of the step that ends at t, and with its error taken off, at two places.
+
+    What is left out of the quintic is about C r(x), r = (x (1 - x))^3. The equations tell by how much v' is off, which
+    is C r''; the same C makes C r of q and C r' of v.
+    """
+    start, n = s.clock[2], s.size[0]
+    length = t - start
+    for j in range(2):
+        x = DOUBTS[j]
+        u, at = x * (1.0 - x), start + x * length
+        rest, slope = u**3, 3.0 * u * u * (1.0 - 2.0 * x)
+        curvature = 6.0 * u * (1.0 - 2.0 * x) ** 2 - 6.0 * u * u
+        _hermite(s, x, length)
+        code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.check[2 + j])
+        if code == GOOD:
+            code = _accelerate(dynamics, rows, s, at, s.q, s.v)
+        if code != GOOD:
+            return int(code)
+        for i in range(n):
+            size = (s.solution[i, 0] - s.curve[i]) * length * length / curvature
+            s.q[i] += size * rest
+            s.v[i] += size * slope / length
+        code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.check[j])
+        if code != GOOD:
+            return int(code)
+    return GOOD
+
+
+@inlined
+def _decide(s: Workspace) -> int:
+    """Mark the guards that may fire inside the step: none of their terms is positive beyond its error throughout."""
+    guards = s.size[6]
+    for g in range(guards):
+        s.undecided[g] = 1
+    for e in range(s.size[5]):
+        error, reach, middle, tail = 0.0, 0.0, 0.0, 0.0
+        for j in range(2):
+            error = max(error, abs(s.check[j, e] - s.check[2 + j, e]))
+        for c in range(DEGREE + 1):
+            coefficient = 0.0
+            for j in range(DEGREE + 1):
+                coefficient += TO_SERIES[c, j] * s.values[j, e]
+            if c == 0:
+                middle = coefficient
+            else:
+                reach += abs(coefficient)
+            if c >= DEGREE - 1:
+                tail += abs(coefficient)
+        margin = reach + CAUTION * (error + tail)
+        if middle > margin or (s.kind[e] == WATCH and middle < -margin):  # one that has fired must rise first
+            s.undecided[s.group[e]] = 0
+    left = 0
+    for g in range(guards):
+        left += s.undecided[g]
+    return int(left)
+
+
+@inlined
+def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
+    """The end of the step becomes the start of the next one."""
+    n = s.size[0]
+    for i in range(n):
+        s.q[i], s.v[i] = y[i], y[n + i]
+        s.y1[i], s.y1[n + i] = y[i], y[n + i]
+    code = _accelerate(dynamics, rows, s, t, s.q, s.v)
+    for i in range(n):
+        s.a1[i] = s.solution[i, 0]
+    s.lam1[:] = s.lam
+    return int(code)
+
+
+@compiled
+def _scan(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, y: Any) -> int:
+    """Look whether a guard can fire inside the step that ends at t; minus a code, or the number of undecided guards.
+
+    A bound on the terms along the quintic decides, with a margin for its error.
+    """
+    start = s.clock[2]
+    code = _carry(dynamics, rows, s, t, y)
+    for j in range(DEGREE + 1):
+        if code == GOOD:
+            _hermite(s, NODES[j], t - start)
+            code = _terms(dynamics, gaps, rows, watch, s, start + NODES[j] * (t - start), s.q, s.v, s.values[j])
+    if code == GOOD:
+        code = _doubt(dynamics, gaps, rows, watch, s, t)
+    if code != GOOD:
+        return int(-code)
+    left = _decide(s)
+    s.clock[2] = t
+    s.y0[:], s.a0[:] = s.y1, s.a1
+    return int(left)
+
+
+@compiled
+def _grid(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, y: Any) -> int:
+    """Terms at even places of the step that ends at t, on the quintic, and what its error makes of them."""
+    start = s.clock[2]
+    code = _carry(dynamics, rows, s, t, y)
+    for j in range(POINTS):
+        if code == GOOD:
+            _hermite(s, (j + 0.5) / POINTS, t - start)
+            at = start + (j + 0.5) / POINTS * (t - start)
+            code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.grid[j])
+    if code == GOOD:
+        code = _doubt(dynamics, gaps, rows, watch, s, t)
+    s.clock[2] = t
+    s.y0[:], s.a0[:] = s.y1, s.a1
+    return int(code)
+
+
+def evaluate(
+    dynamics: Any, gaps: Any, rows: Any, power: Any, watch: Any, what: int, t: float, y: Floats, out: Floats, lines: Any
+) -> int:
+    """Do what is asked at (t, y); GOOD or what went wrong, except for SCAN, as `_scan`.
+
+    DERIVATIVE: y' into out. TERMS: all terms into out. FORCES: the multipliers. BEGIN: a step begins here. SCAN, GRID:
+    a step ends here.
+    """
+    s = open_work(lines)
+    n = s.size[0]
+    if what == DERIVATIVE:
+        return int(_derivative(dynamics, gaps, rows, power, s, t, y, out))
+    if what == TERMS:
+        for i in range(n):
+            s.q[i], s.v[i] = y[i], y[n + i]
+        return int(_terms(dynamics, gaps, rows, watch, s, t, s.q, s.v, out))
+    if what == FORCES:
+        for i in range(n):
+            s.q[i], s.v[i] = y[i], y[n + i]
+        return int(_accelerate(dynamics, rows, s, t, s.q, s.v))
+    if what == BEGIN:
+        code = _carry(dynamics, rows, s, t, y)
+        s.clock[2] = t
+        s.y0[:], s.a0[:] = s.y1, s.a1
+        return int(code)
+    if what == GRID:
+        return int(_grid(dynamics, gaps, rows, watch, s, t, y))
+    return int(_scan(dynamics, gaps, rows, watch, s, t, y))
+
+
+_USED = ("dynamics", "gaps", "rows", "power", "watch")
+_ARGUMENTS = (
+    types.int64, types.float64, types.Array(types.float64, 1, "C", readonly=True), types.float64[::1], TABLE,
+)  # fmt: skip
+
+
+@cache
+def _address() -> Address:
+    signature = types.int64(*(kernels.function_type(name) for name in _USED), *_ARGUMENTS)
+    return Address(compiled(evaluate, [signature]), signature)
+
+
+@cache
+def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
+    """`evaluate` with one system's kernels built in."""
+    general = _address()
+    dynamics, gaps, rows, power, watch = functions
+
+    def call(what, t, y, out, lines):  # type: ignore[no-untyped-def]
+        return general(dynamics, gaps, rows, power, watch, what, t, y, out, lines)
+
+    return numba.njit([types.int64(*_ARGUMENTS)])(call)  # type: ignore[no-any-return]
+
+
+def entry(system: System) -> Callable[..., int]:
+    """The compiled `evaluate(what, t, y, out, lines)` of one system."""
+    functions = system.kernels
+    return _entry(tuple(functions[name] for name in _USED))
+
+
+def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tuple[dict[str, Array], Array]:
+    """Arrays of `Workspace` by name, and the table that compiled code reads them by.
+
+    Args:
+        system: the mechanism.
+        p: parameters in force, shared and not copied.
+        u: inputs in force, likewise.
+        terms: largest number of terms of its guards.
+        nz: accounts of work.
+    """
+    n, nc, all_ = system.n, system.nc, system.n + system.nc
+    shapes: dict[str, tuple[int, ...]] = {
+        "size": (7,), "count": (3,), "clock": (3,), "w": (system.scratch,), "blocks": (n, system.mass_block),
+        **dict.fromkeys(("f", "q", "v", "a0", "a1", "curve"), (n,)), "H": (nc, n), "two": (2,),
+        "matrix": (all_, all_ + 2), "solution": (all_, 2), "law": (nc, 3), "law_if": (nc, 3), "trial": (nc + 1,),
+        "watched": (system.guards if system.watch is not None else 0,),
+        **dict.fromkeys(("kind", "row", "shift", "group", "undecided"), (terms,)), "side": (terms, 2),
+        "values": (DEGREE + 1, terms), "check": (4, terms), "grid": (POINTS, terms),
+        "y0": (2 * n,), "y1": (2 * n,),
+    }  # fmt: skip
+    kinds = {"Index": np.int64}
+    arrays = {
+        name: np.zeros(shapes.get(name, (nc,)), dtype=kinds.get(kind, np.float64))
+        for name, kind in Workspace.__annotations__.items()
+    }
+    arrays["p"], arrays["u"] = p, u
+    arrays["follows"][:] = system.follows
+    arrays["size"][:4] = n, nc, system.mass_block, nz
+    return arrays, table([*arrays.values()])

@@ -1,0 +1,57 @@
+"""IDA on closed loops at index 1: as many steps as the library needs on its own, and no failure at tight tolerances."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from sksundae.ida import IDA
+
+from crossbody.reference import delta, simulate
+from crossbody.reference.sundials.equations import Equations
+from crossbody.reference.sundials.quiet import quiet
+
+T_END = 0.3
+ROBOT = delta.system(delta.LIGHT)
+POSE = np.array(delta.inverse(delta.LIGHT, (0.05, 0.0, 0.6)))
+
+
+def direct_steps(rtol: float) -> int:
+    """Steps of the bare library from the same rest, every component held to the same tolerance."""
+    e, n, nc = Equations(ROBOT), ROBOT.n, ROBOT.nc
+    e.activate([5] * nc)
+
+    def residual(t: float, y: Any, yp: Any, out: Any) -> None:
+        q, v, vd = y[:n].copy(), y[n : 2 * n].copy(), yp[n : 2 * n]
+        M, f = e.terms(t, q, v)
+        H, h, Hdv = e.rows(t, q, v)
+        out[:n], out[n : 2 * n] = yp[:n] - v, M @ vd - f - H.T @ y[2 * n :]
+        out[2 * n :] = H @ vd + Hdv + e.drive(h, H @ v)
+
+    vd, lam = e.accelerate(0.0, POSE, np.zeros(n))
+    places = list(range(2 * n, 2 * n + nc))
+    with quiet():
+        solver = IDA(residual, rtol=rtol, atol=1e-3 * rtol, algebraic_idx=places, max_num_steps=100_000)
+        found = solver.solve(
+            np.array([0.0, T_END]), np.concatenate([POSE, np.zeros(n), lam]),
+            np.concatenate([np.zeros(n), vd, np.zeros(nc)]),
+        )  # fmt: skip
+    assert found.status >= 0
+    return len(found.t)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_a_closed_loop_takes_no_more_steps_than_the_bare_library(rtol: float) -> None:
+    run = simulate(ROBOT, POSE, np.zeros(9), T_END, rtol=rtol, solver="ida", samples=[T_END])
+    assert run.outcome.ok, run.message
+    assert run.steps <= direct_steps(rtol)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+def test_a_closed_loop_released_at_rest_is_followed(rtol: float) -> None:
+    run = simulate(ROBOT, POSE, np.zeros(9), T_END, rtol=rtol, solver="ida", samples=[0.0, T_END])
+    truth = simulate(ROBOT, POSE, np.zeros(9), T_END, rtol=1e-13, samples=[0.0, T_END])
+    assert run.outcome.ok, run.message
+    np.testing.assert_allclose(run.q[-1], truth.q[-1], atol=100.0 * rtol)
+    np.testing.assert_allclose(run.lam[-1], truth.lam[-1], rtol=0.0, atol=1e4 * rtol * np.abs(truth.lam).max())

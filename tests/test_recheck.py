@@ -1,0 +1,67 @@
+"""A mode that does not hold in a finished motion is told; a sound motion is left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from random_walls import drawn, known, springs
+
+from crossbody.cases import Mode
+from crossbody.reference import recheck, simulate
+
+
+def far(system: Any, row: int) -> Any:
+    """The same springs with one wall out of reach."""
+    n, nc = system.n, system.nc
+    p = np.array(system.p)
+    M, K, g = p[: n * n].reshape(n, n), p[n * n : 2 * n * n].reshape(n, n), p[2 * n * n : 2 * n * n + n]
+    H, c = p[2 * n * n + n : -nc].reshape(nc, n), p[-nc:].copy()
+    c[row] += 1e3
+    return springs(M, K, g, H, c, system.a0[0], system.a1[0])
+
+
+@pytest.mark.parametrize("samples", [None, np.linspace(0.0, 1.0, 501)], ids=["own steps", "samples"])
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+def test_a_wall_that_was_passed_through_is_told(solver: str, samples: Any) -> None:
+    """Motions of the same springs with one wall moved away, held against the wall where it stands; and sound ones."""
+    told = passed = 0
+    for seed in range(30):
+        system, q0, v0 = drawn(seed)
+        bounded = {"max_step": 1e-2} if solver == "compiled" else {}
+        sound = simulate(system, q0, v0, 1.0, rtol=1e-9, solver=solver, samples=samples, **bounded)
+        if sound.outcome.ok:
+            assert recheck(system, sound) == (), seed
+        blind = far(system, 0)
+        run = simulate(blind, q0, v0, 1.0, rtol=1e-9, solver=solver, samples=samples, **bounded)
+        if not run.outcome.ok:
+            continue
+        dense = simulate(blind, q0, v0, 1.0, rtol=1e-9, samples=np.linspace(0.0, 1.0, 5001))
+        depth = 1e3 - dense.gap[:, 0].min()
+        passed += bool(depth > 1e-6)
+        found = [one for one in recheck(system, run) if one.contact == 0]
+        told += bool(found)
+        assert bool(found) == bool(depth > 1e-6), (seed, depth, found)
+    assert told == passed > 10
+
+
+WRONG = {
+    (Mode.CONTACT, Mode.BALLISTIC): "closing, and would press",
+    (Mode.CONTACT, Mode.FREE): "below the surface",
+    (Mode.FREE, Mode.CONTACT): "pulls",
+    (Mode.FREE, Mode.BALLISTIC): "above the surface",
+}
+
+
+@pytest.mark.parametrize(("right", "wrong"), WRONG)
+def test_a_wrong_mode_is_told_with_its_reason(right: Mode, wrong: Mode) -> None:
+    """A sound motion with other modes written beside it."""
+    system, q0, v0 = known()
+    run = simulate(system, q0, v0, 1.0, rtol=1e-10, solver="cvode", samples=np.linspace(0.0, 1.0, 5001))
+    assert recheck(system, run) == ()
+    mode = run.mode.copy()
+    mode[run.mode == right] = wrong
+    found = recheck(system, replace(run, mode=mode))
+    assert (0, wrong, WRONG[right, wrong]) in [(one.contact, one.mode, one.reason) for one in found]
