@@ -81,10 +81,10 @@ def function_type(name: str) -> core_types.FunctionType:
 
 
 def _declare(name: str) -> Callable[[Callable[..., Any]], Any]:
-    signatures = [REAL[name]] + ([COMPLEX[name]] if name in COMPLEX else [])
+    lazy = [COMPLEX[name]] if name in COMPLEX else []
 
     def decorate(function: Callable[..., Any]) -> Any:
-        return compiled(function, signatures)
+        return compiled(function, [REAL[name]], lazy=lazy)
 
     return decorate
 
