@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -16,9 +17,11 @@ from pathlib import Path
 import numba.core.config as numba_config
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from crossbody.reference import _store, kernels
 from crossbody.reference._store import CODE, LOCK, Store
+from crossbody.reports.cli import cli
 
 ROOT = os.name == "posix" and os.geteuid() == 0
 PROGRAM = """
@@ -290,3 +293,16 @@ def test_what_is_not_used_and_what_is_too_much_goes(folder):
     assert time.time() - (folder / f"{names[1]}{CODE}").stat().st_mtime < 3600.0, "it was read just now"
     assert store.clear() == 2
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
+
+
+def test_the_command_shows_and_clears(folder):
+    _value(_kernel(30.0))
+    run = CliRunner()
+    (path,) = folder.iterdir()
+    shown = run.invoke(cli, ["cache", "show", "--json"])
+    assert json.loads(shown.output) == {
+        "folder": str(folder), "usable": True, "files": 1, "bytes": path.stat().st_size
+    }  # fmt: skip
+    assert f"{folder}: 1 files" in run.invoke(cli, ["cache"]).output
+    assert json.loads(run.invoke(cli, ["cache", "clear", "--json"]).output) == {"removed": 1}
+    assert not list(folder.iterdir())

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import textwrap
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -190,3 +195,34 @@ def test_a_run_checks_its_system_once(monkeypatch):
     for _ in range(3):
         prepare(good, [0.2, 0.3, 0.4], [0.0, 0.0, 0.0], Options(t_end=1.0))
     assert calls == [1]
+
+
+DEBUG = """
+    import numpy as np
+    from mechanisms import ball, flyby, oscillator, sliders
+    from crossbody.reference import System, kernels
+
+    for system, n in ((ball(), 1), (oscillator(-0.5), 1), (flyby(0.2), 2), (sliders(3), 3)):
+        system.check(0.3 + 0.1 * np.arange(n), np.ones(n))
+
+    @kernels.energy
+    def energy(q, v, p, e):
+        e[0], e[1] = p[2], 0.0
+
+    good = ball()
+    wrong = System(n=1, dynamics=good.dynamics, energy=energy, parameters=[1.0, 9.81])
+    try:
+        wrong.check([1.0])
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+def test_with_debugging_on_kernels_check_their_indices(tmp_path):
+    environment = {**os.environ, "CROSSBODY_DEBUG": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(DEBUG)], cwd=Path(__file__).parent, env=environment,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("SceneError Kernel energy reads or writes beyond an array: index")
