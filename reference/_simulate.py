@@ -7,6 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from crossbody.cases import Trajectory
+from crossbody.reference._check import check_once
 from crossbody.reference._options import Options
 from crossbody.reference._system import System
 
@@ -25,7 +26,7 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
         The motion. Numerical failure is its `outcome`, with place and state in `message`.
 
     Raises:
-        SceneError: if q0 or v0 has another shape or is not finite.
+        SceneError: if q0 or v0 has another shape or is not finite, or if a kernel is wrong there (`System.check`).
         InvalidValue, UnknownName: for an option outside what it admits.
     """
     run = prepare(system, q0, v0, Options(t_end=t_end, **options))
@@ -36,6 +37,7 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
 def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> Any:
     """A run that can be repeated: everything that does not depend on time is decided here."""
     start = system.checked_state("q0", q0), system.checked_state("v0", v0)
+    check_once(system, *start, options.t_end)
     if options.solver == "compiled":
         from crossbody.reference._run import CompiledRun
 

@@ -16,7 +16,7 @@ from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
 class System:
     """The equations of one mechanism, ready for `simulate`.
 
@@ -189,6 +189,26 @@ class System:
         h, hd = np.zeros(self.nc), np.zeros(self.nc)
         self.gaps(0.0, *self._state(q, v), np.array(self.p), h, hd)
         return h, hd
+
+    def check(self, q: ArrayLike, v: ArrayLike | None = None, *, states: int = 100, t_end: float = 1.0) -> None:
+        """Check the kernels at a state and at random ones near it.
+
+        Every run does so at two states near its start when it is prepared for the first time.
+
+        Args:
+            q: positions (n,).
+            v: velocities (n,); zeros if not given.
+            states: number of random states.
+            t_end: the random states lie at times in [0, t_end], s.
+
+        Raises:
+            SceneError: naming the kernel, the entry and both values: if h, H, h' and H'v do not belong together, if M
+                is not symmetric and positive definite, if something is left unfilled or read or written beyond an
+                array, or if `span`, `constant_mass` or `affine` are not true.
+        """
+        from crossbody.reference._check import check_kernels
+
+        check_kernels(self, *self._state(q, v), t_end=t_end, states=states)
 
     def checked_state(self, name: str, value: ArrayLike) -> Floats:
         """A copy of q0 or v0.

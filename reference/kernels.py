@@ -1,7 +1,8 @@
 """The functions that make up a mechanism, each with one fixed signature.
 
 n coordinates, nc constraint rows, nu inputs, k the size of the blocks on the mass matrix's diagonal
-(n dense, 1 diagonal), na active rows. Every array is filled by the kernel, none is allocated.
+(n dense, 1 diagonal), na active rows. Every array is filled by the kernel (H is zero where it writes nothing), none is
+allocated. A run checks this, and that rows, gaps and mass matrix belong together, before it starts (`System.check`).
 
     dynamics(t, q, v, u, p, M, f, w)     M (n, k) mass blocks: row i holds row i of its own block
                                          f (n,) = B u + tau_ext - c - d - g;  w scratch that `rows` may read
@@ -21,8 +22,9 @@ n coordinates, nc constraint rows, nu inputs, k the size of the blocks on the ma
                                          the rows have settled, until it returns UNCHANGED; else CHANGED, or LOST,
                                          which ends the run
 
-Each is compiled for float64 and complex128, so that derivatives can be checked by complex step: use np functions
-only, and neither abs, hypot, atan2 nor a branch on a complex value. `control` and `solve` are float64 alone.
+Each is compiled for float64, and for complex128 when a derivative is first asked for, which is a complex step: use np
+functions only, and neither abs, hypot, atan2 nor a branch on a complex value. `control` and `solve` are float64 alone.
+With CROSSBODY_DEBUG=1 in the environment every index is checked.
 
 Gaps must not depend on time (scleronomic): h' = H v. Discrete variables stand at the end of p, as numbers: what a
 kernel branches on is constant between events. A row that cannot be touched in the present discrete state reports a
@@ -81,10 +83,10 @@ def function_type(name: str) -> core_types.FunctionType:
 
 
 def _declare(name: str) -> Callable[[Callable[..., Any]], Any]:
-    signatures = [REAL[name]] + ([COMPLEX[name]] if name in COMPLEX else [])
+    lazy = [COMPLEX[name]] if name in COMPLEX else []
 
     def decorate(function: Callable[..., Any]) -> Any:
-        return compiled(function, signatures)
+        return compiled(function, [REAL[name]], lazy=lazy)
 
     return decorate
 

@@ -252,6 +252,32 @@ def log_info(path: Path, columns: str | None, part: int | None, draft: bool) -> 
     return info(path, columns, part, draft)
 
 
+@cli.group(invoke_without_command=True)
+@click.pass_context
+def cache(context: click.Context) -> None:
+    """Show where compiled code is kept and how much it is."""
+    if context.invoked_subcommand is None:
+        context.exit(context.invoke(cache_show))
+
+
+@cache.command("show")
+@speaks
+def cache_show() -> int:
+    """Show where compiled code is kept and how much it is."""
+    from crossbody.reports.cache_command import show
+
+    return show()
+
+
+@cache.command("clear")
+@speaks
+def cache_clear() -> int:
+    """Remove all compiled code; the next run compiles again."""
+    from crossbody.reports.cache_command import clear
+
+    return clear()
+
+
 def _command() -> str:
     return shlex.join(["crossbody", *sys.argv[1:]])
 

@@ -58,8 +58,8 @@ def _blows_up(t, q, v, u, p, M, f, w):
 
 
 @kernels.dynamics
-def _no_mass(t, q, v, u, p, M, f, w):
-    M[0, 0] = 0.0
+def _loses_mass(t, q, v, u, p, M, f, w):
+    M[0, 0] = 1.0 if t < 0.5 else 0.0
     f[0] = 1.0
 
 
@@ -68,7 +68,7 @@ def _no_mass(t, q, v, u, p, M, f, w):
     [
         (_turns_nan, {Outcome.NOT_FINITE}),
         (_blows_up, {Outcome.DIVERGED, Outcome.NOT_FINITE, Outcome.STEP_TOO_SMALL}),
-        (_no_mass, {Outcome.ILL_POSED, Outcome.NOT_FINITE}),
+        (_loses_mass, {Outcome.ILL_POSED, Outcome.NOT_FINITE}),
     ],
 )
 def test_numerical_failure_is_an_outcome_with_its_place(dynamics, outcomes):
