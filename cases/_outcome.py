@@ -17,6 +17,7 @@ class Outcome(StrEnum):
     ILL_POSED = "ill_posed"
     MODE_CYCLE = "mode_cycle"
     LOST = "lost"
+    INCONSISTENT = "inconsistent"
     INTERRUPTED = "interrupted"
 
     @property
@@ -40,5 +41,6 @@ _ADVICE = {
     Outcome.ILL_POSED: "The active rows or the mass matrix lost rank: the multipliers are not unique here.",
     Outcome.MODE_CYCLE: "The contacts named beside this outcome switch for ever at one instant: their laws contradict.",
     Outcome.LOST: "The motion left the region in which its controller holds: start closer, or change the controller.",
+    Outcome.INCONSISTENT: "What was computed contradicts the model in what is named beside this outcome.",
     Outcome.INTERRUPTED: "The run was interrupted; what was computed until then is kept.",
 }

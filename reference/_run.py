@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
-from crossbody.reference._kinds import Floats
+from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
 from crossbody.reference.core._struct import table
+from crossbody.reference.systems import _none
 
 SLICE, SLICE_S = 200, 0.05  # first steps between two looks at the clock, and the time aimed at, s
 ROWS, EVENTS, HISTORY = 256, 256, 64
@@ -30,7 +31,9 @@ OUTCOMES = {
     layout.MODE_CYCLE: Outcome.MODE_CYCLE,
     layout.DIVERGED: Outcome.DIVERGED,
     layout.LOST: Outcome.LOST,
+    layout.INCONSISTENT: Outcome.INCONSISTENT,
 }
+_ACTIVE = (layout.CONTACT, layout.COLLISION, layout.BILATERAL)
 _COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions", "guards")
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
@@ -81,7 +84,9 @@ class CompiledRun:
             "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
-            "ledger": options.ledger, "keep_events": options.events, "has_control": system.control is not None,
+            "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
+            "loops": system.solve is None and not np.all(system.unilateral),
+            "keep_events": options.events, "has_control": system.control is not None,
             "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
             "tick": system.tick,
         }  # fmt: skip
@@ -191,7 +196,36 @@ class CompiledRun:
             return ""
         q, v = np.split(self.work["y"], 2)
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
+        return f"{outcome.advice} {self._cause(outcome, q, v)}{where}."
+
+    def _cause(self, outcome: Outcome, q: Floats, v: Floats) -> str:
+        """What an outcome's message names before time and state; empty if nothing."""
+        state, marked = self.state[0], np.flatnonzero(self.buffers["history"][-1]).tolist()
         if outcome is Outcome.MODE_CYCLE:
-            rows = np.flatnonzero(self.buffers["history"][-1]).tolist()
-            return f"{outcome.advice} Rows {rows} at {where}."
-        return f"{outcome.advice} {where}."
+            return f"Rows {marked} at "
+        if outcome is Outcome.ILL_POSED:
+            return _dependence(self.system, np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE)), q, v)
+        if outcome is Outcome.INCONSISTENT and abs(state["energy_open"]) > state["energy_allowed"]:
+            return (
+                f"The energy account is open by {state['energy_open']:.3g} J, where the steps taken admit "
+                f"{state['energy_allowed']:.3g} J: energy, power and dynamics contradict each other, at "
+            )
+        if outcome is Outcome.INCONSISTENT:
+            return f"The accelerations do not follow the law of rows {marked}, as `rows` has them, after "
+        return ""
+
+
+def _books_everything(system: System) -> bool:
+    """Whether the system says what its energy is and what changes it; one without inputs may say nothing of power."""
+    return system.energy is not _none.energy and (system.power is not _none.power or system.inputs == 0)
+
+
+def _dependence(system: System, active: Index, q: Floats, v: Floats) -> str:
+    """The condition of the active rows in the metric of M^-1, as a message says it."""
+    M, H = system.mass_matrix(q, v), system.constraint(q, v)[0][active]
+    if not (np.isfinite(M).all() and np.isfinite(H).all()) or np.linalg.eigvalsh(M).min(initial=np.inf) <= 0.0:
+        return "The mass matrix is not positive definite near "
+    if not len(active):
+        return ""
+    condition = np.linalg.cond(np.linalg.solve(np.linalg.cholesky(M), H.T)) ** 2
+    return f"Rows {active.tolist()} have H M^-1 H^T of condition {condition:.3g} and worse near "

@@ -5,7 +5,8 @@ import pytest
 from mechanisms import ball, flyby, oscillator, sliders
 from test_machines import gusty
 
-from crossbody.reference import simulate
+from crossbody.cases import Outcome
+from crossbody.reference import System, kernels, simulate
 
 SCENES = {
     "listing": (ball(), [1.0], [0.0], {}),
@@ -40,3 +41,50 @@ def test_work_of_one_bounce_is_the_law_s():
 def test_input_force_does_no_work_without_a_power_kernel():
     run = simulate(gusty(), [0.5], [0.0], 0.1, ledger=True)
     assert np.all(run.ledger.input == 0.0)
+
+
+@kernels.power
+def _half_the_input(t, q, v, u, p, e):
+    e[0], e[1] = 0.5 * u[0] * v[0], 0.0
+
+
+def _pushed(power):
+    base = gusty()
+    return System(
+        n=1, inputs=1, parameters=base.p, a0=base.a0, a1=base.a1, dynamics=base.dynamics, gaps=base.gaps,
+        rows=base.rows, energy=base.energy, power=power,
+    )  # fmt: skip
+
+
+@kernels.power
+def _all_of_the_input(t, q, v, u, p, e):
+    e[0], e[1] = u[0] * v[0], 0.0
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9, 1e-12])
+def test_an_account_that_stays_open_is_not_finished(rtol):
+    """What the power kernel leaves out is missing, and told; the same run with it closes."""
+    inputs = ([0.0, 0.3, 0.6], [[2.0], [-3.0], [0.0]])
+    wrong, right = (
+        simulate(_pushed(power), [0.5], [0.0], 1.0, rtol=rtol, ledger=True, inputs=inputs)
+        for power in (_half_the_input, _all_of_the_input)
+    )
+    assert wrong.outcome is Outcome.INCONSISTENT
+    assert "energy account is open by" in wrong.message
+    assert right.outcome.ok, right.message
+    assert simulate(_pushed(_half_the_input), [0.5], [0.0], 1.0, rtol=rtol, inputs=inputs).outcome.ok
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(60))
+def test_random_runs_close_their_account_by_far(seed):
+    """What is taken for open lies far above what steps leave, whatever stiffness, tolerance and start."""
+    rng = np.random.default_rng(seed)
+    a0 = 10.0 ** rng.uniform(2, 9)
+    system = ball(
+        a0=a0, a1=rng.uniform(0, 3) * a0**0.5, a2=rng.choice([0.0, 1e6]), mass=10.0 ** rng.uniform(-3, 3),
+        gravity=rng.uniform(1, 20),
+    )  # fmt: skip
+    rtol = 10.0 ** rng.uniform(-11, -3)
+    run = simulate(system, [rng.uniform(-0.01, 2)], [rng.normal()], 2.0, rtol=rtol, ledger=True, shortcuts=False)
+    assert run.outcome.ok, run.message

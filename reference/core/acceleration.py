@@ -18,7 +18,7 @@ from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, so
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 
 # numba compiles a function anew for every literal that it is called with; numpy's integers are values, not literals.
-OWN, GENERAL = np.arange(2)
+OWN, GENERAL, SMOOTH = np.arange(3)
 
 
 @inlined
@@ -28,8 +28,16 @@ def is_active(mode: int) -> bool:
 
 
 @inlined
+def law_of(m: Model, mode: Bytes, i: int) -> tuple[float, float, float]:
+    """a0, a1, a2 of row i: the fast constants in COLLISION if it has any (one that follows may not), else the slow."""
+    if mode[i] == COLLISION and (m.beta[i, 0] > 0.0 or m.beta[i, 1] > 0.0):
+        return m.beta[i, 0], m.beta[i, 1], m.beta[i, 2]
+    return m.alpha[i, 0], m.alpha[i, 1], m.alpha[i, 2]
+
+
+@inlined
 def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """The fast constants for a row in COLLISION that has any (one that follows it may not), else the slow ones.
+    """Write the constants of every row, by its mode. Nothing else may write them.
 
     Frozen collisions take no time, so that the slow ones are in force throughout.
     """
@@ -37,9 +45,7 @@ def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
         return
     s.have_laws = 1
     for i in range(s.nc):
-        fast = mode[i] == COLLISION and (m.beta[i, 0] > 0.0 or m.beta[i, 1] > 0.0)
-        for j in range(3):
-            w.law[i, j] = m.beta[i, j] if fast else m.alpha[i, j]
+        w.law[i, 0], w.law[i, 1], w.law[i, 2] = law_of(m, mode, i)
 
 
 @inlined
@@ -111,7 +117,7 @@ def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Arra
 
 
 @inlined
-def _rate_and_drive(s: Any, m: Model, w: Work, j: int, v: Array) -> None:
+def _rate_and_drive(s: Any, m: Model, w: Work, law: Array, j: int, v: Array) -> None:
     """Rate h' of active row j, and the right-hand side of its multiplier with the size of its terms."""
     i = w.idx[j]
     rate, push = 0.0, 0.0
@@ -119,10 +125,10 @@ def _rate_and_drive(s: Any, m: Model, w: Work, j: int, v: Array) -> None:
         rate += w.H[j, c] * v[c]
         push += w.H[j, c] * w.vd[c]
     h = w.ha[j]
-    spring = (w.law[i, 0] + w.law[i, 2] * h * h) * h
+    spring = (law[i, 0] + law[i, 2] * h * h) * h
     w.hda[j] = rate
-    w.r[j] = -(push + w.Hdv[j] + w.law[i, 1] * rate + spring)
-    w.scale[j] = abs(push) + abs(w.Hdv[j]) + w.law[i, 1] * abs(rate) + abs(spring)
+    w.r[j] = -(push + w.Hdv[j] + law[i, 1] * rate + spring)
+    w.scale[j] = abs(push) + abs(w.Hdv[j]) + law[i, 1] * abs(rate) + abs(spring)
 
 
 @inlined
@@ -140,12 +146,12 @@ def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
 
 
 @compiled
-def assemble(rows: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array) -> int:
-    """Evaluate the active rows and factor their Schur complement G = H M^-1 H^T."""
+def assemble(rows: Any, s: Any, m: Model, w: Work, law: Array, t: float, q: Array, v: Array) -> int:
+    """Evaluate the active rows under a law (nc, 3) and factor their Schur complement G = H M^-1 H^T."""
     na = s.na
     rows(t, q, v, m.p, w.w, w.idx, na, w.H, w.ha, w.Hdv)
     for j in range(na):
-        _rate_and_drive(s, m, w, j, v)
+        _rate_and_drive(s, m, w, law, j, v)
         _schur_row(s, m, w, j)
     return factor_schur(w.G, na, w.reach)
 
@@ -160,7 +166,7 @@ def push_rows(m: Model, w: Work, na: int, x: Array, factor: float, out: Array) -
 
 
 @inlined
-def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, law: Array, t: float, q: Array, v: Array) -> int:
     """One coordinate and at most one active row: everything is scalar."""
     M, f = w.M, w.f
     dynamics(t, q, v, w.u, p, M, f, w.w)
@@ -173,7 +179,7 @@ def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, t: float, q: A
         return 0
     Hs, ha, Hdvs = w.H, w.ha, w.Hdv
     rows(t, q, v, p, w.w, w.idx, 1, Hs, ha, Hdvs)
-    H, h, i, law = Hs[0, 0], ha[0], w.idx[0], w.law
+    H, h, i = Hs[0, 0], ha[0], w.idx[0]
     push, rate = H * free, H * v[0]
     damping, spring = law[i, 1] * rate, (law[i, 0] + law[i, 2] * h * h) * h
     X = H * inverse
@@ -192,19 +198,21 @@ def accelerate(
 ) -> int:
     """Fill w.vd, and w.la, w.hda of the active rows; 1 if ill posed.
 
-    With general = GENERAL it leaves H, X and the factor of G even if the system brings its own algebra (OWN).
+    With general = GENERAL it leaves H, X and the factor of G even if the system brings its own algebra (OWN). With
+    SMOOTH the rows follow h'' = 0, whatever law is in force: what is left when the law's own terms are taken away.
     """
     s.rhs += 1
     na = s.na
+    law = w.no_law if general == SMOOTH else w.law
     if s.has_solve and general == OWN:
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
     if s.n == 1 and na <= 1:
-        return _scalar(dynamics, rows, s, m.p, w, t, q, v)
+        return _scalar(dynamics, rows, s, m.p, w, law, t, q, v)
     if _free(dynamics, s, m.p, w, t, q, v) != 0:
         return 1
     if na == 0:
         return 0
-    if assemble(rows, s, m, w, t, q, v) != 0:
+    if assemble(rows, s, m, w, law, t, q, v) != 0:
         return 1
     solve_schur(w.G, na, w.reach, w.r, w.la)
     push_rows(m, w, na, w.la, 1.0, w.vd)

@@ -8,7 +8,19 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Index
-from crossbody.reference.core import choice, dense, dop853, events, exact, journal, record, settle, stepping
+from crossbody.reference.core import (
+    audit,
+    choice,
+    dense,
+    dop853,
+    events,
+    exact,
+    folds,
+    journal,
+    record,
+    settle,
+    stepping,
+)
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
 from crossbody.reference.core.layout import (
@@ -18,6 +30,7 @@ from crossbody.reference.core.layout import (
     EXPLICIT,
     ILL_POSED,
     IMPLICIT,
+    INCONSISTENT,
     LOST,
     MODE_CYCLE,
     MORE,
@@ -78,9 +91,9 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         return int(code)
     s.unsettled = 0
     s.method = EXPLICIT
-    s.stalled, s.hold, s.full_jacobian = 0, 0, 0
+    s.stalled, s.hold, s.full_jacobian, s.have_slopes = 0, 0, 0, 0
     s.h = s.h_active if s.na > 0 else s.h_free
-    return 0
+    return ILL_POSED if s.loops and folds.begin(K, s, m, w) != 0 else 0
 
 
 @inlined
@@ -101,6 +114,7 @@ def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 def _land(K: Any, s: Any, m: Model, w: Work) -> None:
     """End the step where the first guard fired."""
     dense.state(s, m, w, s.theta, w.y1)
+    dense.put_on_rows(K, s, m, w, s.theta, w.y1)
     if s.ledger and s.method != EXACT:
         dense.ledger(s, w, s.theta, w.z1)
 
@@ -162,7 +176,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     length = exact.plan(s, w, m.unilateral)
     if length > 0.0:
         before = s.method
-        code = stepping.take_arc(K, s, m, w, length)
+        code = stepping.take_arc(K, s, m, w, b, length)
     else:
         if s.method == EXACT or s.method == SHORT:
             s.method = EXPLICIT
@@ -184,10 +198,13 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         _land(K, s, m, w)
         _remember_step(s, before)
         _move(s, w, t)
-        return _switch(K, s, m, w, b)
+        code = _switch(K, s, m, w, b)
+        return INCONSISTENT if code == 0 and s.audited and not audit.closes_account(K, s, m, w) else code
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)
+    if s.audited and not audit.closes_account(K, s, m, w):
+        return INCONSISTENT
     record.here(K, s, m, w, b.mode, b.out, b.modes)
     if s.method == EXPLICIT or s.method == IMPLICIT:
         choice.choose_method(s, w)
@@ -226,6 +243,8 @@ def _begin_run(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.history_t, s.collision_t = np.inf, np.inf
     lost = s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST
     _take_inputs(K, s, m, w, b)
+    if s.audited:
+        audit.begin_account(K, s, m, w)
     code = _restart(K, s, m, w, b)
     if code == 0:
         _first_rows(K, s, m, w, b)
@@ -246,7 +265,7 @@ def _settle_again(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 @inlined
 def _room(s: Any, b: Buffers) -> int:
     """Whether the next step finds room for all that it may write."""
-    if s.natural and s.rows + record.ARC_POINTS + 4 > len(b.out):
+    if s.natural and s.rows + record.ARC_POINTS + s.nc + 4 > len(b.out):
         return ROWS_FULL
     return EVENTS_FULL if journal.full(s, b) else DONE
 

@@ -7,7 +7,12 @@ from typing import Any
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array
 from crossbody.reference.core import dop853, exact
-from crossbody.reference.core.layout import EXACT, EXPLICIT, Model, Work
+from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
+from crossbody.reference.core.algebra import solve_schur
+from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, Model, Work
+
+CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one's residue vanish in rounding
+ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's
 
 
 @compiled
@@ -49,6 +54,36 @@ def state(s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
         dop853.evaluate(w.y, w.F, theta, out)
     else:
         _quintic(s.n, s.end, w, theta, s.hs, out)
+
+
+@compiled
+def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
+    """Move out = (q, v), at the part theta of an implicit step, to where the active rows' law has their gaps.
+
+    A gap under a linear law is known in closed form whatever the masses do. An implicit step knows it to the tolerance
+    only, and the interpolant across curved rows no better: times a0 that drowns the multiplier of a stiff row. The
+    correction is the least one in the metric of M. Rows with a cubic term that counts are left as they are.
+    """
+    if s.method != IMPLICIT or s.na == 0 or not exact.is_linear(s, w):
+        return
+    q, v = out[: s.n], out[s.n :]
+    t = theta * s.hs
+    for _ in range(CORRECTIONS):
+        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t_old + t, q, v, GENERAL) != 0:
+            return
+        missing = 0.0
+        for j in range(s.na):
+            i = w.idx[j]
+            a0, a1 = w.law[i, 0], w.law[i, 1]
+            h, hd = exact.linear_arc(a0, a1, w.gaps[0, i], w.rates[0, i], t)
+            w.r[j], w.hda[j] = h - w.ha[j], hd - w.hda[j]
+            missing = max(missing, (a0 * abs(w.r[j]) + a1 * abs(w.hda[j])) / max(w.scale[j], 1e-300))
+        if missing <= ARRIVED:
+            return
+        solve_schur(w.G, s.na, w.reach, w.r, w.la)
+        push_rows(m, w, s.na, w.la, 1.0, q)
+        solve_schur(w.G, s.na, w.reach, w.hda, w.la)
+        push_rows(m, w, s.na, w.la, 1.0, v)
 
 
 @inlined

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes
-from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, laws_in_force, push_rows
+from crossbody.reference.core.acceleration import GENERAL, OWN, SMOOTH, accelerate, push_rows
 from crossbody.reference.core.algebra import factor_lu, solve_lu, solve_schur
 from crossbody.reference.core.dop853 import begin_watch, powers, watch_gaps, watch_guards, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
@@ -36,15 +35,15 @@ NEWTON_STEPS = 8
 
 
 @compiled
-def jacobian(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> int:
+def jacobian(K: Any, s: Any, m: Model, w: Work, h: float) -> int:
     """Stiff part of da/dq and da/dv from the rows: -M^-1 H^T G^-1 (a0 + 3 a2 h^2, a1) H; the rest by differences."""
     n = s.n
     q, v = w.y[:n], w.y[n:]
     w.Jq[:] = 0.0
     w.Jv[:] = 0.0
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, q, v, GENERAL) != 0:
+    if s.full_jacobian and _smooth_part(K, s, m, w) != 0:
         return 1
-    if s.full_jacobian and _smooth_part(K, s, m, w, mode) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, q, v, GENERAL) != 0:
         return 1
     for j in range(s.na):
         _row_part(s, m, w, j)
@@ -69,27 +68,24 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
 
 
 @inlined
-def _smooth_part(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
-    """Central differences of the acceleration with the law switched off, so that no stiff term is differenced."""
+def _smooth_part(K: Any, s: Any, m: Model, w: Work) -> int:
+    """Central differences of the acceleration without the rows' law, so that no stiff term is differenced."""
     n = s.n
-    w.law[:] = 0.0
     failed = 0
     for c in range(2 * n):
         step = 1e-6 * max(1.0, abs(w.y[c]))
         w.ys[:] = w.y
         w.ys[c] = w.y[c] + step
-        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], GENERAL)
+        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], SMOOTH)
         w.d[:] = w.vd
         w.ys[c] = w.y[c] - step
-        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], GENERAL)
+        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], SMOOTH)
         for a in range(n):
             slope = (w.d[a] - w.vd[a]) / (2.0 * step)
             if c < n:
                 w.Jq[a, c] = slope
             else:
                 w.Jv[a, c - n] = slope
-    laws_in_force(s, m, w, mode)
-    failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:n], w.y[n:], GENERAL)
     return failed
 
 
@@ -193,10 +189,10 @@ def _error(s: Any, w: Work, h: float) -> float:
 
 
 @compiled
-def step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, h: float) -> float:
+def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     """From y and k[0] to y1; the error in units of the tolerance, -1 if ill posed, inf if Newton failed."""
     if not s.have_jacobian:
-        if jacobian(K, s, m, w, mode, h) != 0:
+        if jacobian(K, s, m, w, h) != 0:
             return -1.0
     elif s.jacobian_scale != h and _newton_matrix(s, w, h) != 0:
         return -1.0

@@ -133,6 +133,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     """Gaps and rates, and the multipliers if asked, at the inner nodes."""
     for node in range(1, NODES - 1):
         dense.state(s, m, w, at_node(node), w.ys)
+        dense.put_on_rows(K, s, m, w, at_node(node), w.ys)
         t = s.t_old + at_node(node) * s.hs
         q, v = w.ys[: s.n], w.ys[s.n :]
         K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])

@@ -59,8 +59,8 @@ def _half_contact(a0: float, a1: float) -> float:
     return float(np.arccosh(zeta) / np.sqrt(zeta * zeta - 1.0) / omega)
 
 
-@inlined
-def _is_linear(s: Any, w: Work) -> bool:
+@compiled
+def is_linear(s: Any, w: Work) -> bool:
     """Whether the cubic term of every active row is absent, or below the tolerance from here on."""
     for j in range(s.na):
         i = w.idx[j]
@@ -98,7 +98,7 @@ def _stays(s: Any, w: Work, unilateral: Bytes) -> bool:
 @compiled
 def plan(s: Any, w: Work, unilateral: Bytes) -> float:
     """Longest arc that may be taken in closed form from here; 0 if none."""
-    if not s.affine or (s.na > 0 and (s.ledger or s.has_solve or not _is_linear(s, w))):
+    if not s.affine or (s.na > 0 and (s.ledger or s.has_solve or not is_linear(s, w))):
         return 0.0
     length = np.inf
     if s.na > 0 and not (s.na == s.nc and _stays(s, w, unilateral)):

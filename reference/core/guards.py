@@ -65,6 +65,8 @@ def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, the
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
     q, v = w.ys[: s.n], w.ys[s.n :]
+    if kind in (RELEASE, HANDOVER):
+        dense.put_on_rows(K, s, m, w, theta, w.ys)
     if kind == RELEASE:
         return _multiplier(K, s, m, w, i, t) + dead_band(s, w, i)
     if kind == HANDOVER:

@@ -12,7 +12,7 @@ from crossbody.reference.core.dop853_table import DENSE_STAGES, DENSE_TERMS
 
 # Return codes of `advance`; the Python side turns them into outcomes.
 DONE, MORE, ROWS_FULL, EVENTS_FULL = 0, 1, 2, 3
-STEP_TOO_SMALL, NOT_FINITE, ILL_POSED, MODE_CYCLE, DIVERGED, LOST = -1, -2, -3, -4, -5, -6
+STEP_TOO_SMALL, NOT_FINITE, ILL_POSED, MODE_CYCLE, DIVERGED, LOST, INCONSISTENT = -1, -2, -3, -4, -5, -6, -7
 
 # Machines, rules for several contacts, methods.
 LEVEL, EDGE, MEMORYLESS = 0, 1, 2
@@ -45,6 +45,8 @@ STATE = np.dtype(
         ("implicit", "i8"),
         ("natural", "i8"),
         ("ledger", "i8"),
+        ("audited", "i8"),  # the energy account is judged
+        ("loops", "i8"),  # rows that are always on, by the general algebra: they may lose rank on the way
         ("keep_events", "i8"),
         ("has_control", "i8"),
         ("has_switch", "i8"),
@@ -72,6 +74,8 @@ STATE = np.dtype(
         ("have_mass", "i8"),
         ("have_free", "i8"),
         ("have_laws", "i8"),
+        ("have_slopes", "i8"),  # of the multipliers, at the step's start
+        ("longest_flight", "f8"),
         ("stalled", "i8"),
         ("hold", "i8"),
         ("trial_steps", "i8"),
@@ -95,6 +99,11 @@ STATE = np.dtype(
         ("rows", "i8"),
         ("events", "i8"),
         ("switches", "i8"),
+        ("energy_start", "f8"),
+        ("energy_unit", "f8"),  # kinetic energy of unit velocities
+        ("energy_size", "f8"),
+        ("energy_open", "f8"),  # what the account misses
+        ("energy_allowed", "f8"),
         # counters
         ("steps", "i8"),
         ("rejected", "i8"),
@@ -158,6 +167,9 @@ class Work:
     w: Floats
     H: Floats2  # (nc, n) active rows, compact
     X: Floats2  # (nc, n) M^-1 H^T, transposed
+    X0: Floats2  # (nc, n) M^-1 H^T at the step's start, of the rows that are always on
+    pivot0: Floats  # (nc,) their pivots at the start
+    overlap: Floats2  # (nc, nc) H_1 M_0^-1 H_0^T
     G: Floats2  # (nc, nc)
     Hdv: Floats
     r: Floats
@@ -168,7 +180,8 @@ class Work:
     la: Floats
     vd: Floats
     free: Floats  # (n,) M^-1 f of an affine scene: constant between inputs
-    law: Floats2  # (nc, 3) in force now
+    law: Floats2  # (nc, 3) in force now; written where the modes are, and nowhere else
+    no_law: Floats2  # (nc, 3) zeros: the rows' law taken away
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
     lo: Floats  # least and largest multiplier seen at the stages
@@ -180,6 +193,8 @@ class Work:
     gaps: Floats2  # (5, nc) at the nodes of the step
     rates: Floats2
     lams: Floats2
+    peak: Floats  # (nc,) where in the step each multiplier is largest
+    rising: Floats  # (nc,) above 0 where it rises at the step's start
     hit: Floats  # (nc,) where in the step each contact switches
     J: Floats2  # (n, n)
     Jq: Floats2
@@ -212,7 +227,8 @@ def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: i
         "k": (DENSE_STAGES, 2 * n), "F": (DENSE_TERMS, 2 * n),
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
-        "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "G": (nc, nc), "law": (nc, 3),
+        "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),
+        **dict.fromkeys(("G", "overlap"), (nc, nc)), **dict.fromkeys(("law", "no_law"), (nc, 3)),
         **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes, Floats
-from crossbody.reference.core import dense
+from crossbody.reference.core import dense, peaks
 from crossbody.reference.core.acceleration import OWN, accelerate, scatter
-from crossbody.reference.core.layout import EXACT, Model, Work
+from crossbody.reference.core.layout import EXACT, NEVER, Model, Work
 
 ARC_POINTS = 16  # an arc in closed form is one step, however long: these points show its shape
+LEAST_POINTS = 2  # of a flight that is short against the longest: bounces that accumulate are many
 
 
 @compiled
@@ -47,7 +50,9 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     theta = min(max((t - s.t_old) / s.hs, 0.0), 1.0)
     dense.prepare(K, s, m, w)
     dense.state(s, m, w, theta, w.ys)
-    accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN)
+    if s.na > 0:
+        dense.put_on_rows(K, s, m, w, theta, w.ys)
+        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN)
     scatter(s, w, w.lam)
     z = w.z
     if s.ledger and s.method != EXACT:
@@ -57,14 +62,39 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
 
 
 @inlined
+def _points(s: Any, length: float) -> int:
+    """Intervals into which rows cut an arc in closed form: all while a contact lasts, of a flight by its length."""
+    if s.na > 0:
+        return ARC_POINTS
+    s.longest_flight = max(s.longest_flight, length)
+    return max(LEAST_POINTS, int(np.ceil(ARC_POINTS * length / s.longest_flight)))
+
+
+@inlined
+def _shape(K: Any, s: Any, m: Model, w: Work, mode: Bytes, until: float, out: Floats, modes: Bytes) -> None:
+    """Append the peaks of multipliers in the step, and the shape of an arc, in the order of time."""
+    length = until - s.t_old
+    peaks.find(K, s, m, w, mode, length / s.hs)
+    count = _points(s, length) if s.method == EXACT else 1
+    for j in range(1, count + 1):
+        t = s.t_old + length * j / count
+        place = peaks.first(s, w)
+        while place < NEVER and s.t_old + place * s.hs < t:
+            _inside(K, s, m, w, mode, s.t_old + place * s.hs, out, modes)
+            peaks.drop(s, w, place)
+            place = peaks.first(s, w)
+        if j < count:
+            _inside(K, s, m, w, mode, t, out, modes)
+
+
+@inlined
 def within_step(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, samples: Floats, until: float, out: Floats, modes: Bytes
 ) -> None:  # fmt: skip
     """Append the samples asked for up to `until`, before the step's end is taken over."""
     if s.natural:
-        if s.method == EXACT:
-            for j in range(1, ARC_POINTS):
-                _inside(K, s, m, w, mode, s.t_old + (until - s.t_old) * j / ARC_POINTS, out, modes)
+        if s.na > 0 or s.method == EXACT:
+            _shape(K, s, m, w, mode, until, out, modes)
         return
     while s.next_sample < len(samples) and samples[s.next_sample] <= until:
         _inside(K, s, m, w, mode, samples[s.next_sample], out, modes)

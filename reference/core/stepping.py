@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference._cache import inlined
-from crossbody.reference.core import bogacki, choice, dop853, esdirk, exact
+from crossbody.reference.core import audit, bogacki, choice, dense, dop853, esdirk, exact, folds
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
 from crossbody.reference.core.dop853_table import STAGES
@@ -15,6 +15,7 @@ from crossbody.reference.core.layout import (
     EXPLICIT,
     ILL_POSED,
     IMPLICIT,
+    INCONSISTENT,
     NODES,
     NOT_FINITE,
     SHORT,
@@ -47,12 +48,15 @@ def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
 
 
 @inlined
-def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
-    """Evaluate the end of the step: derivative, multipliers, gaps."""
+def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Evaluate the end of the step, derivative, multipliers, gaps, and check it."""
     n = s.n
     last = NODES - 1
     end = s.end
     t = s.t + s.hs
+    if s.method == IMPLICIT:
+        s.t_old = s.t
+        dense.put_on_rows(K, s, m, w, 1.0, w.y1)
     # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
     if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
@@ -69,6 +73,10 @@ def _finish(K: Any, s: Any, m: Model, w: Work) -> int:
     for i in range(2 * n):
         if abs(y1[i]) > FAR:
             return DIVERGED
+    if s.loops and folds.passed(s, m, w, b) != 0:
+        return ILL_POSED
+    if not audit.follows_law(K, s, m, w, b, end):
+        return INCONSISTENT
     s.t_old = s.t
     return 0
 
@@ -80,7 +88,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if s.h == 0.0:
         s.h = choice.first_step(K, s, m, w)
     if s.has_control and s.method == EXPLICIT and _short_step(K, s, m, w):
-        return _finish(K, s, m, w)
+        return _finish(K, s, m, w, b)
     s.end = esdirk.STAGES - 1 if s.method == IMPLICIT else STAGES
     clipped = False
     rejected = False
@@ -93,12 +101,12 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             h = left
         if h < 4.0 * ULP * abs(s.t):
             break
-        error = dop853.step(K, s, m, w, h) if s.method == EXPLICIT else esdirk.step(K, s, m, w, b.mode, h)
+        error = dop853.step(K, s, m, w, h) if s.method == EXPLICIT else esdirk.step(K, s, m, w, h)
         if 0.0 <= error <= 1.0:
             s.hs = h
             proposal = h * min(choice.grow(s, error), 1.0 if rejected else 6.0)
             s.h = max(s.h, proposal) if clipped and not rejected else proposal
-            return _finish(K, s, m, w)
+            return _finish(K, s, m, w, b)
         s.rejected += 1
         rejected = True
         if error > 1.0 and error < 1e300:
@@ -112,7 +120,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @inlined
-def take_arc(K: Any, s: Any, m: Model, w: Work, length: float) -> int:
+def take_arc(K: Any, s: Any, m: Model, w: Work, b: Buffers, length: float) -> int:
     """One step in closed form."""
     s.method, s.end = EXACT, STAGES
     s.have_dense = 1
@@ -122,4 +130,4 @@ def take_arc(K: Any, s: Any, m: Model, w: Work, length: float) -> int:
     s.exact_steps += 1
     if s.ledger:
         w.z1[:] = w.z
-    return _finish(K, s, m, w)
+    return _finish(K, s, m, w, b)

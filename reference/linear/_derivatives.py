@@ -56,6 +56,7 @@ class Derivatives:
         vd_x (n, 2 n), vd_u (n, nu): of the accelerations.
         lam_x (na, 2 n), lam_u (na, nu): of the multipliers.
         gap_x (nc, 2 n), rate_x (nc, 2 n): of every gap and of its rate.
+        size (n, 2 n + nu): of the terms that make up vd_x and vd_u: rounding is a part of it, however they cancel.
     """
 
     vd: Floats
@@ -66,6 +67,7 @@ class Derivatives:
     lam_u: Floats
     gap_x: Floats
     rate_x: Floats
+    size: Floats
 
 
 def terms(at: Point, q: Array, v: Array, u: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -155,7 +157,9 @@ def derivatives(at: Point) -> Derivatives:
         if k < 2 * n:
             slopes[:, k] = gaps(at, q, v).imag / STEP
     solved = -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
+    size = np.abs(np.linalg.inv(K)) @ np.abs(columns)
     return Derivatives(
         vd=vd, lam=lam, vd_x=solved[:n, : 2 * n], vd_u=solved[:n, 2 * n :], lam_x=solved[n:, : 2 * n],
         lam_u=solved[n:, 2 * n :], gap_x=slopes[:nc], rate_x=slopes[nc:],
+        size=size[:n],
     )  # fmt: skip

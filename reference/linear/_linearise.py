@@ -61,7 +61,10 @@ def linearise(
         A=np.block([[np.zeros((n, n)), np.eye(n)], [found.vd_x]]), B=np.vstack([np.zeros((n, nu)), found.vd_u]),
         C=C, D=D, states=states, inputs=tuple(f"u[{i}]" for i in range(nu)), outputs=read,
     )  # fmt: skip
-    return model.restricted(np.vstack([found.gap_x[at.active], found.rate_x[at.active]])) if reduce else model
+    if not reduce:
+        return model
+    whole = np.block([[np.zeros((n, n)), np.eye(n), np.zeros((n, nu))], [found.size]])
+    return model.restricted(np.vstack([found.gap_x[at.active], found.rate_x[at.active]]), size=whole)
 
 
 def point(

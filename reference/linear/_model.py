@@ -133,14 +133,15 @@ class LinearModel:
             states=tuple(self.states[i] for i in kept),
         )  # fmt: skip
 
-    def restricted(self, conditions: ArrayLike, tolerance: float = 1e-9) -> LinearModel:
+    def restricted(self, conditions: ArrayLike, tolerance: float = 1e-9, size: ArrayLike | None = None) -> LinearModel:
         """The same model on the subspace conditions @ dx = 0, which the dynamics must not leave.
 
         The states that remain are some of the present ones, chosen by pivoting so that they determine the others well.
 
         Args:
             conditions: (nr, nx); dependent ones are recognised.
-            tolerance: part of the norms by which a motion may leave the subspace.
+            tolerance: part of the terms by which a motion may leave the subspace.
+            size: (nx, nx + nu), size of the terms that make up A and B; what they have become in A and B if not given.
 
         Raises:
             SceneError: if the dynamics or the inputs leave the subspace.
@@ -153,23 +154,25 @@ class LinearModel:
         _, R, order = qr(
             given / np.abs(given).max(axis=1, keepdims=True, initial=1e-300), mode="economic", pivoting=True
         )
-        size = np.abs(np.diag(R))
-        rank = int(np.sum(size > 1e-10 * size[0]))
+        pivots = np.abs(np.diag(R))
+        rank = int(np.sum(pivots > 1e-10 * pivots[0]))
         bound, kept = order[:rank], np.sort(order[rank:])
         basis = np.zeros((len(self.states), len(kept)))
         basis[kept, np.arange(len(kept))] = 1.0
         following = np.argsort(order[rank:])
         basis[bound] = -np.linalg.solve(R[:rank, :rank], R[:rank, rank:])[:, following]
-        self._check_invariance(given, basis, tolerance)
+        terms: Floats = np.hstack([self.A, self.B]) if size is None else np.asarray(size, dtype=np.float64)
+        self._check_invariance(given, basis, tolerance, np.abs(terms))
         return replace(
             self, A=(self.A @ basis)[kept], B=self.B[kept], C=self.C @ basis,
             states=tuple(self.states[i] for i in kept),
         )  # fmt: skip
 
-    def _check_invariance(self, conditions: Floats, basis: Floats, tolerance: float) -> None:
-        flow = np.hstack([self.A @ basis, self.B])
+    def _check_invariance(self, conditions: Floats, basis: Floats, tolerance: float, size: Floats) -> None:
+        flow, nx = np.hstack([self.A @ basis, self.B]), len(self.states)
         leaving = np.abs(conditions @ flow).max(initial=0.0)
-        allowed = tolerance * (np.abs(conditions) @ np.abs(flow)).max(initial=0.0)
+        terms = np.hstack([size[:, :nx] @ np.abs(basis), size[:, nx:]])
+        allowed = tolerance * (np.abs(conditions) @ terms).max(initial=0.0)
         if not leaving <= allowed:
             raise SceneError(
                 f"LinearModel.restricted: the motion leaves the subspace at a rate of {leaving:.3g} "

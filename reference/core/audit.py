@@ -1,0 +1,112 @@
+"""What a step must show before it is believed: its rows follow their law, and its energy account closes.
+
+Both are recomputed from the state and from the constants of the system, not from what the step itself used, so that a
+law that was lost on the way, or algebra that a system brings and that contradicts its rows, ends the run.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Bytes
+from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of
+from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.layout import Buffers, Model, Work
+
+CLOSE = 1e-9  # part of the terms behind a row's multiplier: rounding stays far below, and asks no further
+WRONG = 1e-6  # part of all terms of a row's law: more is no rounding, however ill-conditioned the rows are
+SELDOM = 64  # steps between two looks at a system that brings its own algebra: they cost two right-hand sides
+OPEN = 10.0  # times what the tolerance may add to the energy of all steps until now
+
+
+@inlined
+def _residual(s: Any, m: Model, w: Work, mode: Bytes, j: int, stage: int) -> tuple[float, float]:
+    """H v' + H'v + a1 h' + a0 h + a2 h^3 of the active row in place j, and what rounding of the state makes of it."""
+    n, i = s.n, w.idx[j]
+    a0, a1, a2 = law_of(m, mode, i)
+    total, position, speed = w.Hdv[j], 0.0, 0.0
+    for c in range(m.span[i, 0], m.span[i, 1]):
+        total += w.H[j, c] * w.k[stage, n + c]
+        position = max(position, abs(w.H[j, c] * w.y1[c]))
+        speed = max(speed, abs(w.H[j, c] * w.y1[n + c]))
+    h = w.ha[j]
+    total += a1 * w.hda[j] + (a0 + a2 * h * h) * h
+    return abs(total), ULP * (a0 * position + a1 * speed)
+
+
+@inlined
+def _all_terms(s: Any, m: Model, w: Work, j: int) -> float:
+    """Sum of the sizes of all terms of the law of the active row in place j, what each multiplier does included."""
+    first, last = m.span[w.idx[j], 0], m.span[w.idx[j], 1]
+    size = w.scale[j]
+    for b in range(s.na):
+        pushed = 0.0
+        for c in range(first, last):
+            pushed += abs(w.H[j, c] * w.X[b, c]) if m.span[w.idx[b], 0] <= c < m.span[w.idx[b], 1] else 0.0
+        size += pushed * abs(w.la[b])
+    return float(size)
+
+
+@inlined
+def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bool:
+    """Whether the accelerations at the step's end, k[stage], are those of every active row's law.
+
+    The rows stand in the workspace from the evaluation of that end. A row that does not follow is marked in the last
+    line of the history, for the message.
+    """
+    if s.na == 0:
+        return True
+    if s.has_solve:
+        if s.steps % SELDOM != 0:
+            return True
+        q, v = w.y1[: s.n], w.y1[s.n :]
+        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t + s.hs, q, v, GENERAL) != 0:
+            return True  # redundant for the general algebra: nothing to compare with
+    for j in range(s.na):
+        missing, rounding = _residual(s, m, w, b.mode, j, stage)
+        if (
+            not missing <= CLOSE * w.scale[j] + rounding
+            and not missing <= WRONG * _all_terms(s, m, w, j) + 64.0 * rounding
+        ):
+            marks = b.history[len(b.history) - 1]
+            marks[:] = 0
+            marks[w.idx[j]] = 1
+            return False
+    return True
+
+
+@compiled
+def begin_account(K: Any, s: Any, m: Model, w: Work) -> None:
+    """Note the energy of the start, and how much of it the absolute tolerance cannot tell."""
+    n = s.n
+    K.energy(w.y[:n], w.y[n:], m.p, w.e)
+    s.energy_start = w.e[0] + w.e[1]
+    w.ys[:n] = w.y[:n]
+    w.ys[n:] = 1.0
+    K.energy(w.ys[:n], w.ys[n:], m.p, w.e)
+    s.energy_unit = w.e[0]
+    s.energy_size = 0.0
+
+
+@compiled
+def closes_account(K: Any, s: Any, m: Model, w: Work) -> bool:
+    """Whether E(t) - E(0) = input - dissipated + work of all rows, within what the steps taken may have added.
+
+    A step may move every coordinate by its tolerance. That changes the kinetic energy by at most 2 sqrt(T T'), T' that
+    of the tolerances as velocities, and the potential energy by about rtol of its size.
+    """
+    n, nc = s.n, s.nc
+    K.energy(w.y[:n], w.y[n:], m.p, w.e)
+    kinetic, potential = w.e[0], w.e[1]
+    booked, moved = w.z[nc] - w.z[nc + 1], abs(w.z[nc]) + abs(w.z[nc + 1])
+    for i in range(nc):
+        booked += w.z[i]
+        moved += abs(w.z[i])
+    s.energy_size = max(s.energy_size, kinetic + abs(potential) + moved)
+    tolerance = s.rtol * s.energy_size + 2.0 * s.atol * np.sqrt(kinetic * s.energy_unit) + s.atol**2 * s.energy_unit
+    s.energy_allowed += OPEN * np.sqrt(2.0 * n) * tolerance
+    s.energy_open = kinetic + potential - s.energy_start - booked
+    return bool(abs(s.energy_open) <= s.energy_allowed)

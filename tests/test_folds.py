@@ -1,0 +1,57 @@
+"""A loop that folds flat ends ill posed, within a bounded number of steps; one that only comes close runs through."""
+
+import numpy as np
+import pytest
+from four_bar import assembled, four_bar
+
+from crossbody.cases import Outcome
+from crossbody.reference import simulate
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize(
+    ("lengths", "ground", "start", "fold"),
+    [((1.0, 2.0, 1.0), 2.0, (1.0, 0.0, -2.1), 1.0), ((1.0, 2.0, 1.5), 1.5, (2.0, 0.0, -1.0), None)],
+    ids=["parallelogram", "unequal"],
+)
+def test_a_linkage_that_folds_flat_is_ill_posed_there(lengths, ground, start, fold, rtol):
+    system = four_bar(lengths, ground)
+    q, v = assembled(system, start[0], start[1:])
+    run = simulate(system, q, -v, 8.0, rtol=rtol, max_steps=2000)
+    assert run.outcome is Outcome.ILL_POSED
+    assert run.steps < 500
+    assert "Rows [0, 1]" in run.message
+    assert "condition" in run.message
+    assert "t = " in run.message
+    if fold is not None and rtol < 1e-8:  # the crank of a parallelogram turns evenly
+        assert run.t[-1] == pytest.approx(fold, abs=5e-3)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize(("lengths", "ground"), [((1.0, 2.0, 2.0), 2.5), ((1.0, 2.0, 1.0), 2.001)])
+def test_a_linkage_that_cannot_fold_runs_through(lengths, ground, rtol):
+    """The second one comes to 3 % of its largest pivot."""
+    system = four_bar(lengths, ground)
+    q, v = assembled(system, 1.0, (0.2, -1.5) if ground == 2.5 else (0.0, -1.0))
+    run = simulate(system, q, -v, 8.0, rtol=rtol, ledger=True)
+    assert run.outcome.ok, run.message
+    assert np.abs(run.gap).max() < 1e-2 * rtol + 1e3 * rtol * (rtol > 1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(40))
+def test_linkages_fold_where_their_lengths_say(seed):
+    """Crank, coupler and rocker fold flat on the way of a full turn where longest + shortest = the two others."""
+    rng = np.random.default_rng(seed)
+    crank, coupler, rocker = rng.uniform(0.5, 2.0, 3)
+    ground = crank + coupler - rocker if seed % 2 else np.inf
+    slack = 1.0
+    if not np.isfinite(ground) or ground <= 0.05:  # a crank that turns: the shortest, with room to spare
+        crank, (coupler, rocker), ground, slack = 0.5, rng.uniform(1.5, 2.0, 2), 1.2, 0.0
+    system = four_bar((crank, coupler, rocker), ground)
+    q, v = assembled(system, 2.0, (0.3, -1.5))
+    run = simulate(system, q, -v, 2.0 * np.pi, rtol=1e-8, max_steps=5000)
+    if slack and np.abs(system.gap(q)[0]).max() < 1e-9:
+        assert run.outcome is Outcome.ILL_POSED
+    elif np.abs(system.gap(q)[0]).max() < 1e-9:
+        assert run.outcome.ok, run.message

@@ -1,0 +1,81 @@
+"""Rows stand where multipliers are largest, and lift-off of stiff rows is located to the tolerance."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from mechanisms import ball, flyby, oscillator, sliders
+from scipy.integrate import solve_ivp
+
+from crossbody.cases import Mode
+from crossbody.reference import simulate
+
+SCENES = {
+    "cubic": (ball(), [1.0], [0.0], 0.8),
+    "arcs": (ball(a0=1e4, a1=20.0, a2=0.0), [0.3], [0.0], 0.5),
+    "without damping": (oscillator(-0.5, a1=0.0), [1.0], [0.0], 4.0),
+    "passing a circle": (flyby(1.0, a0=1e4, a1=5.0), [-2.0, 0.3], [3.0, 0.0], 1.0),
+    "three in a row": (
+        sliders(4, a0=1e4, a1=5.0, masses=[1.0, 3.0, 2.0, 1.0]),
+        [0.0, 0.1, 0.2, 0.3],
+        [1, 0, 0, 0],
+        0.8,
+    ),
+}
+
+
+@cache
+def largest(name):
+    """Largest multipliers of a scene on a fine grid."""
+    system, q0, v0, t_end = SCENES[name]
+    return simulate(system, q0, v0, t_end, rtol=1e-11, samples=np.linspace(0.0, t_end, 10_001)).lam.max(axis=0)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+@pytest.mark.parametrize("shortcuts", [True, False])
+@pytest.mark.parametrize("name", SCENES)
+def test_the_largest_multiplier_written_is_the_largest_of_the_motion(name, shortcuts, rtol):
+    system, q0, v0, t_end = SCENES[name]
+    run = simulate(system, q0, v0, t_end, rtol=rtol, shortcuts=shortcuts)
+    assert (np.diff(run.t) >= 0.0).all()
+    grid = 1e4 * (t_end / 2e4) ** 2  # the grid itself misses a0 (dt / 2)^2 / 2 of a peak
+    assert run.lam.max(axis=0) == pytest.approx(largest(name), rel=30.0 * rtol + grid)
+
+
+def sliding_off(angle, rate):
+    """Time at which a point that slides on a rigid circle of radius 1 lets go of it."""
+
+    def lets_go(t, y):
+        return 9.81 * np.cos(y[0]) - y[1] ** 2
+
+    lets_go.terminal = True
+    found = solve_ivp(
+        lambda t, y: [y[1], 9.81 * np.sin(y[0])], (0.0, 10.0), [angle, rate], method="DOP853", rtol=1e-12, atol=1e-14,
+        events=lets_go,
+    )  # fmt: skip
+    return found.t_events[0][0]
+
+
+@pytest.mark.parametrize("zeta", [0.3, 1.0])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize(("angle", "rate"), [(0.1, 0.3), (0.3, 0.8)])
+def test_a_stiff_row_lets_go_where_its_multiplier_vanishes(angle, rate, rtol, zeta):
+    """a0 = 1e8: a gap known to 1e-9 is a multiplier known to 0.1, of 10. The law keeps it at 0 all along."""
+    start = [np.sin(angle), np.cos(angle)], [rate * np.cos(angle), -rate * np.sin(angle)]
+    when = sliding_off(angle, rate)
+    run = simulate(flyby(1.0, 9.81, a0=1e8, a1=2e4 * zeta), *start, 1.05 * when, rtol=rtol)
+    assert run.outcome.ok, run.message
+    assert run.counts["implicit_steps"] > 0.5 * run.steps
+    released = next(event.t for event in run.events if event.before is Mode.CONTACT)
+    assert released == pytest.approx(when, abs=max(2e-6, rtol))
+
+
+def test_bounces_that_accumulate_write_no_more_rows_than_their_steps_ask_for():
+    """A flight in closed form is cut by its length: shapes that nobody can see cost nothing."""
+    system = ball(a0=1e4, a1=20.0, a2=0.0, b0=1e6, b1=200.0)
+    arcs, steps = (simulate(system, [0.3], [0.0], 3.0, shortcuts=shortcuts) for shortcuts in (True, False))
+    assert len(arcs.events) == len(steps.events) > 30
+    assert len(arcs.t) < 3 * len(steps.t)
+    assert arcs.counts["rhs"] < 0.5 * steps.counts["rhs"]
+    first = np.searchsorted(arcs.t, arcs.events[0].t)
+    assert first == 16
