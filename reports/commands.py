@@ -42,13 +42,13 @@ def run(
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
-    output.check(out)
+    output.check(out, "run")
     site.check(against, others)
     with progress(len(cases) * (len(picks) + 1)) as tell:
         results = [jobs.run_case(case, picks, rtol, tell, asked) for case in cases]
     rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol, settings) for case in cases})
     told = provenance(command, rtol=rtol, seed=SEED)
-    with output.folder(out) as made:
+    with output.folder(out, "run") as made:
         study.write(made, results, rows, told)
         site.write(made, against=against, others=others)
     if voice.as_json():
@@ -63,11 +63,11 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
     from crossbody.reports.maps import gapmap
 
     picks = jobs.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
-    output.check(out)
+    output.check(out, "gapmap")
     with progress(len(counts) * len(gapmap.lines(picks))) as tell:
         rows = gapmap.gap_map(counts, picks, points, tell)
     told = provenance(command, points=points)
-    with output.folder(out) as made:
+    with output.folder(out, "gapmap") as made:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "gapmap", rows, told)
         site.write(made)
@@ -81,11 +81,11 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     from crossbody.reports.maps import stability
 
     picks = jobs.picks(wanted) if wanted else (stability.DEFAULT,)
-    output.check(out)
+    output.check(out, "stability")
     with progress(len(picks) * len(stability.POINTS)) as tell:
         rows = stability.stability_map(picks, stability.POINTS, tell)
     told = provenance(command, rtol=stability.RTOL)
-    with output.folder(out) as made:
+    with output.folder(out, "stability") as made:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "stability", rows, told)
         site.write(made)

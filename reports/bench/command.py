@@ -42,7 +42,7 @@ def run(
     if base is not None:
         bench_against.check_common(base[0], [case.label for case in cases])
     effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats)
-    output.check(out)
+    output.check(out, "bench")
     with progress(len(cases) * len(picks)) as tell:
         rows, orders = measure.joined([measure.bench(case, picks, effort, tell) for case in cases])
     if not len(rows):
@@ -60,8 +60,8 @@ def _nothing(picks: Sequence[jobs.Pick]) -> str:
 
 
 def write(out: Path, tables: Mapping[str, pd.DataFrame], told: Mapping[str, object]) -> None:
-    """Tables (Parquet, CSV, JSON) and the page, all or nothing."""
-    with output.folder(out) as made:
+    """Tables (Parquet, CSV, JSON) and the page, all or nothing; the first table names the study."""
+    with output.folder(out, next(iter(tables))) as made:
         study.write(made, [], study.judge([], {}), told)
         for name, table in tables.items():
             study.write_table(made / name, table, told)
@@ -105,7 +105,7 @@ def alone(what: str, asked: tuple[object, ...], repeats: int | None, out: Path, 
     """
     if any(asked):
         raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
-    output.check(out)
+    output.check(out, what)
     rows = (skip if what == "skip" else throughput).measure(repeats or 5)
     beyond = rows[~rows["held"].astype(bool)]
     return table(what, rows, out, command, [str(text) for text in beyond["what"]])

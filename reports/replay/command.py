@@ -61,7 +61,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
         CrossbodyError: for wrong use, before anything is written.
     """
     hw.models.load(ask.model)
-    output.check(out)
+    output.check(out, "replay")
     engines = list(wanted or DEFAULT_ENGINES)
     with voice.progress(len(engines)) as tell:
         found = hw.replay(
@@ -69,7 +69,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
             restart=ask.restart, horizon=ask.horizon, delay=ask.delay, tell=tell,
         )  # fmt: skip
     rows = replay.verdicts(found, command)
-    _write(out, found, rows, provenance(command, log=replay.log_about(found)), {})
+    _write(out, found, rows, provenance(command, log=replay.log_about(found)), {}, "replay")
     metrics = _metrics(found)
     if not voice.told_as_json({"metrics": metrics, "findings": replay.findings(found)}):
         if not voice.quiet():
@@ -94,7 +94,7 @@ def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: 
         CrossbodyError: for wrong use, before anything is written.
     """
     model = hw.models.load(ask.model)
-    output.check(out)
+    output.check(out, "identify")
     log, given = ask.log(), jobs.parse_settings(ask.pairs)
     fit = hw.identify(
         log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
@@ -110,7 +110,7 @@ def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: 
         "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message,
     }  # fmt: skip
     rows = replay.verdicts(found, command)
-    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables)
+    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables, "identify")
     if not voice.told_as_json(tables | {"warnings": pd.DataFrame({"text": list(fit.warnings)})}):
         if not voice.quiet():
             for shown in tables.values():
@@ -164,15 +164,20 @@ def _say(found: Comparison, metrics: pd.DataFrame) -> None:
 
 
 def _write(
-    out: Path, found: Comparison, rows: pd.DataFrame, told: Mapping[str, Any], more: Mapping[str, pd.DataFrame]
+    out: Path,
+    found: Comparison,
+    rows: pd.DataFrame,
+    told: Mapping[str, Any],
+    more: Mapping[str, pd.DataFrame],
+    name: str,
 ) -> None:
-    with output.folder(out) as made:
+    with output.folder(out, name) as made:
         study.write(made, [], rows, told)
         tables = {
             "replay": _metrics(found), "findings": replay.findings(found), "residuals": replay.residuals(found),
             "correlations": replay.correlations(found), **more,
         }  # fmt: skip
-        for name, shown in tables.items():
-            study.write_table(made / name, shown, told)
+        for stem, shown in tables.items():
+            study.write_table(made / stem, shown, told)
         replay.save_motions(made / "traces", found)
         page.write(made)

@@ -19,6 +19,7 @@ from crossbody.reports.judging.truth import Truth
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.pages.styles import TRUTH
 from crossbody.reports.pages.thin import keep
+from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, save
 
@@ -119,12 +120,52 @@ def _steps(t: Floats) -> list[list[float]]:
 
 
 def read_json(path: Path) -> Any:
-    """A JSON file of a study.
+    """A JSON file of a study; no link is followed.
+
+    A table (any file but `provenance.json`) is checked: `rows` is a list of objects, `provenance` an object.
 
     Raises:
-        OutputError: if it is not there or not readable.
+        OutputError: if it is not there, not readable, a link, or not of that form; names file and field.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json.loads(files.read_inside(path.parent, path.name))
+    except OutputError:
+        raise
+    except (OSError, ValueError, RecursionError):
         raise OutputError(f"{path.parent} is not a finished report folder: {path.name} cannot be read.") from None
+    if not isinstance(found, dict):
+        raise OutputError(f"{path} holds a {type(found).__name__} where an object is expected.")
+    return found if path.name == "provenance.json" else _checked(path, found)
+
+
+def _checked(path: Path, table: dict[str, Any]) -> dict[str, Any]:
+    rows, told = table.get("rows"), table.get("provenance", {})
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise OutputError(f"{path}: rows is not a list of objects.")
+    if not isinstance(told, dict):
+        raise OutputError(f"{path}: provenance is not an object.")
+    return table
+
+
+def check_fields(path: Path, rows: Sequence[Mapping[str, Any]], kinds: Mapping[str, tuple[type, ...]]) -> None:
+    """Check the types of the fields of a table that was read.
+
+    Args:
+        path: of the table.
+        rows: its rows.
+        kinds: field -> the types that it may have; a field that is not there is None.
+
+    Raises:
+        OutputError: naming file, row and field of the first that has another.
+    """
+    for i, row in enumerate(rows):
+        for name, kind in kinds.items():
+            if not isinstance(row.get(name), kind):
+                raise OutputError(
+                    f"{path}: rows[{i}].{name} is {str(row.get(name))[:60]!r}; it must be {_words(kind)}."
+                )
+
+
+def _words(kinds: tuple[type, ...]) -> str:
+    named = {str: "a text", float: "a number", int: "", bool: "true or false", type(None): "null", dict: "an object"}
+    return " or ".join(dict.fromkeys(named.get(kind, kind.__name__) for kind in kinds if named.get(kind, "x")))

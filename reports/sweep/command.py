@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,14 +16,14 @@ from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports import suites, voice
 from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.pages import site as page
-from crossbody.reports.runs import jobs, study
+from crossbody.reports.runs import jobs, output, study
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.suites._contract import Suite
 from crossbody.reports.sweep import draw, pools
 from crossbody.reports.sweep.map import STABILITY, stability_map, summary
 from crossbody.reports.sweep.minimise import failures, reproducers
 from crossbody.reports.sweep.spec import Spec
-from crossbody.reports.sweep.store import SWEEP, Store, identity
+from crossbody.reports.sweep.store import STRESS, SWEEP, Store, identity
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,22 +132,14 @@ def _executed(left: Sequence[pools.Chunk], pool: Pool) -> Iterable[tuple[int, po
 
 
 def _finish(store: Store, rows: pd.DataFrame, times: pd.DataFrame, small: pd.DataFrame, told: dict[str, Any]) -> None:
-    """Tables and page into the sweep's folder; each file whole or not there."""
+    """Tables and page into the sweep's folder, all or nothing."""
     tables = {"stress": rows, "stress_times": times, "reproducers": small, "stress_map": stability_map(rows)}
     tables["stress_summary"] = summary(rows, times)
-    try:
-        (store.path / "traces").mkdir(exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".", dir=store.path) as name:
-            made = Path(name)
-            study.write(made, [], study.judge([], {}), told)
-            for stem, table in tables.items():
-                study.write_table(made / stem, table, told)
-            for file in made.iterdir():
-                if file.is_file():
-                    os.replace(file, store.path / file.name)
-    except OSError as error:
-        raise OutputError(f"Folder {store.path} cannot be written: {error.strerror or error}.") from error
-    page.write(store.path)
+    with output.folder(store.path, STRESS) as made:
+        study.write(made, [], study.judge([], {}), told)
+        for stem, table in tables.items():
+            study.write_table(made / stem, table, told)
+        page.write(made)
 
 
 @contextmanager
