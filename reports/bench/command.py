@@ -13,10 +13,12 @@ from crossbody.reports import voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
-from crossbody.reports.commands import where
+from crossbody.reports.commands import identity, key, where
 from crossbody.reports.pages import site as page
 from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.runs.watch import LIMIT
 from crossbody.reports.voice import progress
 
 SHOWN = {
@@ -30,7 +32,7 @@ SHOWN = {
 
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    repeats: int | None, full: bool, against: Path | None, command: str,
+    repeats: int | None, full: bool, against: Path | None, command: str, limit: float = LIMIT,
 ) -> int:  # fmt: skip
     """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code.
 
@@ -43,13 +45,19 @@ def run(
         bench_against.check_common(base[0], [case.label for case in cases])
     effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats)
     output.check(out, "bench")
-    with progress(len(cases) * len(picks)) as tell:
-        rows, orders = measure.joined([measure.bench(case, picks, effort, tell) for case in cases])
-    if not len(rows):
-        raise InvalidValue(_nothing(picks))
-    tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
-    losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
-    write(out, tables | losses, provenance(command, repeats=effort.repeats))
+    with Parts(out, command, identity("bench", cases, names, picks=picks, effort=effort)) as parts:
+        with progress(len(cases) * len(picks)) as tell:
+            for i, case in enumerate(cases):
+                if not parts.has(key(i, case)) and len(rows := measure.bench(case, picks, effort, tell, limit)):
+                    with parts.put(key(i, case)) as made:
+                        rows.to_parquet(made / "bench.parquet")
+        done = [parts.part(key(i, case)) for i, case in enumerate(cases) if parts.has(key(i, case))]
+        rows, orders = measure.joined([pd.read_parquet(path / "bench.parquet") for path in done])
+        if not len(rows):
+            raise InvalidValue(_nothing(picks))
+        tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
+        losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
+        write(out, tables | losses, provenance(command, repeats=effort.repeats))
     show(tables | (losses if voice.as_json() else {}), out)
     return tell_losses(losses["lost"], against) if losses else 0
 

@@ -38,13 +38,17 @@ def _replayed(command: _Work) -> _Work:
 @click.command()
 @_replayed
 @click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option(
+    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=3660.0, show_default=True, metavar="S",
+    help="An engine that has not come back by then is ended, s.",
+)  # fmt: skip
 @click.option("--closed-loop", is_flag=True, help="Recorded references through the model's controller.")
 @speaks
-def replay(wanted: tuple[str, ...], closed_loop: bool, out: Path, **log: Any) -> int:
+def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, **log: Any) -> int:
     """Replay LOG on a model and say how well it matches."""
     from crossbody.reports.replay.command import Ask, run_replay
 
-    return run_replay(Ask(**log), "closed_loop" if closed_loop else "forward", wanted, out, _command())
+    return run_replay(Ask(**log), "closed_loop" if closed_loop else "forward", wanted, out, _command(), limit)
 
 
 @click.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,16 @@ from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports.judging.comparison import Entry, table, verdicts
 from crossbody.reports.judging.truth import Truth
+from crossbody.reports.judging.verdict import Verdict
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.pages.styles import TRUTH
 from crossbody.reports.pages.thin import keep
 from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, save
+
+CASE = "case.json"
+AUDIT = ["case", "engine", "profile", "quantity", "reference", "value", "difference", "tolerance", "same"]
 
 
 def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> pd.DataFrame:
@@ -39,8 +44,37 @@ def write(out: Path, results: Sequence[CaseResult], rows: pd.DataFrame, provenan
     write_table(out / "verdicts", rows, provenance)
     write_table(out / "audit", _audit(results), provenance)
     (out / "provenance.json").write_text(json.dumps(provenance, indent=2, default=str), encoding="utf-8")
+    _save_traces(out, [trace for result in results for trace in _traces(result)])
+
+
+def write_case(made: Path, result: CaseResult, command: str) -> None:
+    """Write the verdicts, audit and motions of one case into a folder of their own, to be assembled later."""
+    judged = judge([result], {result.case.label: command})
+    told = {"verdicts": judged.to_dict(orient="records"), "audit": _audit([result]).to_dict(orient="records")}
+    (made / CASE).write_text(json.dumps(told, default=_plain), encoding="utf-8")
+    _save_traces(made, _traces(result))
+
+
+def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) -> pd.DataFrame:
+    """Join the folders of `write_case` into one study, as `write` does of results in memory; its verdicts."""
+    told = [json.loads(files.read_inside(part, CASE)) for part in parts]
+    rows = pd.DataFrame([row for one in told for row in one["verdicts"]], columns=list(Verdict.__dataclass_fields__))
+    write_table(out / "verdicts", rows, provenance)
+    write_table(out / "audit", pd.DataFrame([r for one in told for r in one["audit"]], columns=AUDIT), provenance)
+    (out / "provenance.json").write_text(json.dumps(provenance, indent=2, default=str), encoding="utf-8")
     (out / "traces").mkdir()
-    traces = [trace for result in results for trace in _traces(result)]
+    traces = [part / "traces" / name for part in parts for name in files.listed(part, "traces")]
+    for i, trace in enumerate(traces):
+        shutil.copyfile(trace, out / "traces" / f"{i:04d}.parquet", follow_symlinks=False)
+    return rows
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
+
+
+def _save_traces(out: Path, traces: Sequence[Trace]) -> None:
+    (out / "traces").mkdir()
     for i, trace in enumerate(traces):
         save(out / "traces" / f"{i:04d}.parquet", trace)
 
@@ -65,8 +99,7 @@ def _audit(results: Sequence[CaseResult]) -> pd.DataFrame:
         }
         for result in results for entry in result.entries for row in entry.audit
     ]  # fmt: skip
-    columns = ["case", "engine", "profile", "quantity", "reference", "value", "difference", "tolerance", "same"]
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(rows, columns=AUDIT)
 
 
 def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
