@@ -173,12 +173,15 @@ def stability(wanted: tuple[str, ...], out: Path) -> int:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of every draw.")
 @click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
+@click.option("--tls-ca", default="", metavar="FILE", help="Certificates (PEM) that a scheduler's must come from.")
+@click.option("--tls-cert", default="", metavar="FILE", help="Certificate (PEM) that is shown to a scheduler.")
+@click.option("--tls-key", default="", metavar="FILE", help="Its key, if it is not in the same file.")
 @click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("stress"), show_default=True, metavar="DIR")
 @speaks
 def stress(
     names: tuple[str, ...], wanted: tuple[str, ...], runs: int | None, seed: int, jobs: int, scheduler: str | None,
-    resume: bool, out: Path,
+    tls_ca: str, tls_cert: str, tls_key: str, resume: bool, out: Path,
 ) -> int:  # fmt: skip
     """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
 
@@ -186,8 +189,12 @@ def stress(
     """
     from crossbody.reports.sweep.command import Ask
     from crossbody.reports.sweep.command import stress as work
+    from crossbody.reports.sweep.pools import Tls
 
-    asked = Ask(names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, resume=resume)
+    tls = Tls(ca=tls_ca, cert=tls_cert, key=tls_key)
+    asked = Ask(
+        names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, tls=tls, resume=resume
+    )
     return work(asked, out, _command())
 
 

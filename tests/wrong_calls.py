@@ -253,7 +253,8 @@ def calls(rng: random.Random, count: int, folder: Path, costly: bool = True) -> 
     """So many draws of all kinds; those that compile something large only if `costly`."""
     kinds: list[tuple[int, Callable[[], Call]]] = [
         (30, lambda: _load(rng)), (10, lambda: _prepare(rng)), (20, lambda: _simulate(rng, costly)),
-        (10, lambda: _system(rng)), (4, lambda: _compare(rng)), (10, lambda: _read(rng, folder)), (16, lambda: _command(rng)),
+        (10, lambda: _system(rng)), (4, lambda: _compare(rng)), (10, lambda: _read(rng, folder)),
+        (16, lambda: _command(rng)),
     ]  # fmt: skip
     weights = [weight for weight, _ in kinds]
     for _ in range(count):

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +43,7 @@ class Ask:
     seed: int = 0
     jobs: int = 0
     scheduler: str | None = None
+    tls: pools.Tls = field(default_factory=pools.Tls)
     resume: bool = False
 
 
@@ -56,7 +57,7 @@ def stress(ask: Ask, out: Path, command: str) -> int:
     chunk = min(max(len(specs) // CHUNKS, LEAST), MOST)
     if ask.resume and not (out / SWEEP).is_file():
         raise OutputError(f"{out} holds no sweep to go on with; leave --resume out to begin one.")
-    with _client(ask.scheduler) as client:
+    with _client(ask.scheduler, ask.tls) as client:
         store = Store(out, identity(specs, chunk, {"seed": ask.seed}))
         sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=voice.silent())
     rows, times = store.table()
@@ -96,12 +97,14 @@ class Pool:
 
 
 @contextmanager
-def _client(address: str | None) -> Iterator[Any]:
+def _client(address: str | None, tls: pools.Tls) -> Iterator[Any]:
     """The cluster, asked for before anything is written."""
     if address is None:
+        if tls != pools.Tls():
+            raise InvalidValue("--tls-ca, --tls-cert and --tls-key are for the connection to a --scheduler.")
         yield None
         return
-    client = pools.connect(address)
+    client = pools.connect(address, tls)
     try:
         yield client
     finally:
