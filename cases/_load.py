@@ -14,7 +14,7 @@ from crossbody import cases
 from crossbody.cases import _registry
 from crossbody.cases._arguments import path
 from crossbody.cases._case import Case, Parameter, Value
-from crossbody.cases._errors import SceneError, UnknownName
+from crossbody.cases._errors import CrossbodyError, SceneError, UnknownName
 
 
 def module(name: str) -> ModuleType:
@@ -76,6 +76,8 @@ def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Cas
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             case: Case = source.build(chosen, numbers)
-    except ArithmeticError as error:
-        raise SceneError(f"{label}: these parameters lead out of double precision ({error}).") from error
+    except CrossbodyError:
+        raise
+    except (ArithmeticError, ValueError) as error:  # a root of what is below 0, a number beyond double precision
+        raise SceneError(f"{label}: no scene has these parameters ({error}).") from error
     return case

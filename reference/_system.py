@@ -135,7 +135,8 @@ class System:
         counts = (("n", 1), *((name, 0) for name in ("mass_block", "inputs", "scratch", "memory", "guards", "latched")))
         for name, low in counts:
             value = getattr(self, name)
-            if not isinstance(value, (int, np.integer)) or not low <= value <= LARGEST:
+            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+            if not whole or not low <= value <= LARGEST:
                 raise SceneError(f"System.{name} is {shown(value)}; it must be a whole number from {low} to {LARGEST}.")
         if self.mass_block and self.n % self.mass_block:
             raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")

@@ -120,7 +120,7 @@ def read(
         _arguments.instance("part", part, int, "a whole number")
     if columns is not None and not isinstance(columns, Columns):
         _arguments.path("columns", columns)
-    if not isinstance(repair, Collection):
+    if isinstance(repair, np.ndarray) or not isinstance(repair, Collection):
         raise InvalidValue(f"repair is {_arguments.shown(repair)}; it must be a list of repairs.")
     _repair.check_names(repair)
     stored = _store.about(Path(path)) if columns is None else None
