@@ -105,6 +105,14 @@ def test_a_kill_during_recovery_loses_nothing(tmp_path: Path, stride: int) -> No
     assert kills > 80 / stride
 
 
+def test_what_a_killed_command_left_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put(tmp_path / "out", "old")
+    (tmp_path / "out" / ".crossbody-new.run.x").mkdir()
+    check(tmp_path / "out", "run")
+    assert "half-written tables of an interrupted command are taken away" in capsys.readouterr().err
+    assert content(tmp_path / "out") == dict.fromkeys(FILES["old"], "old")
+
+
 def test_studies_live_side_by_side(tmp_path: Path) -> None:
     put(tmp_path / "out", "old")
     with folder(tmp_path / "out", "bode") as made:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from crossbody.cases import OutputError
+from crossbody.reports import voice
 from crossbody.reports.runs import files, manifest
 from crossbody.reports.runs.manifest import JUDGED, MARKER, Manifest, replace_text
 
@@ -263,7 +264,7 @@ def _unfinished(path: Path) -> list[Path]:
     return [p for p in sorted(path.iterdir()) if p.name.startswith((NEW, READY)) and p.is_dir() and not p.is_symlink()]
 
 
-def recover(path: Path, tell: Callable[[str], None] = lambda _: None) -> None:
+def recover(path: Path, tell: Callable[[str], None] = voice.note) -> None:
     """Finish what a killed process had begun: a study that was whole is put in its place, another is taken away.
 
     Args:

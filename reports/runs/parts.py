@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.cases import OutputError
+from crossbody.reports import voice
 from crossbody.reports.runs import files, manifest, watch
 
 PARTS = ".crossbody-parts."
@@ -66,7 +66,9 @@ class Parts:
     def _tell(self) -> None:
         """Say what is there already, of this command and of others."""
         if self.found:
-            _say(f"{self.found} parts of an interrupted run of this command are in {self.out}: it goes on with them.")
+            voice.note(
+                f"{self.found} parts of an interrupted run of this command are in {self.out}: it goes on with them."
+            )
         for name in files.listed(self.out):
             if name.startswith(PARTS) and name != self.path.name and not (self.out / name).is_symlink():
                 _offer(self.out / name)
@@ -112,11 +114,4 @@ def _offer(left: Path) -> None:
     except (OSError, ValueError, KeyError, TypeError):
         command = "a command"
     count = len([name for name in files.listed(left) if name != ABOUT and not name.startswith(".")])
-    _say(f"{left} holds {count} parts of an interrupted `{command}`: repeat that to go on, or remove the folder.")
-
-
-def _say(text: str) -> None:
-    from crossbody.reports import voice
-
-    if not voice.silent():
-        print(f"crossbody: {' '.join(text.split())}", file=sys.stderr)
+    voice.note(f"{left} holds {count} parts of an interrupted `{command}`: repeat that to go on, or remove the folder.")

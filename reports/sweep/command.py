@@ -16,7 +16,7 @@ from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports import suites, voice
 from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.pages import site as page
-from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs import jobs, output, study, watch
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.suites._contract import Suite
 from crossbody.reports.sweep import draw, pools
@@ -59,6 +59,7 @@ def stress(ask: Ask, out: Path, command: str) -> int:
         raise OutputError(f"{out} holds no sweep to go on with; leave --resume out to begin one.")
     with _client(ask.scheduler, ask.tls) as client:
         store = Store(out, identity(specs, chunk, {"seed": ask.seed}))
+        watch.resumable(f"What is complete is kept in {out}; the same command goes on with it.")
         sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=voice.silent())
     rows, times = store.table()
     with _bar(None, quiet=voice.silent()) as tell:
