@@ -60,11 +60,11 @@ class Parameter:
                 raise InvalidValue(f"{where} is {shown(value)}; valid: {', '.join(self.choices)}.")
             return value
         try:
-            number = float(value) if isinstance(value, (int, float, str, np.number, np.bool_)) else math.nan
+            if not isinstance(value, (int, float, str, np.number, np.bool_)):
+                raise TypeError
+            number = float(value)
         except (TypeError, ValueError, OverflowError):
-            number = math.nan
-        if math.isnan(number) and not isinstance(value, float):
-            raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].")
+            raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].") from None
         if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
             bracket = "(" if self.open_low or math.isinf(self.low) else "["
             close = ")" if math.isinf(self.high) else "]"

@@ -7,15 +7,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
+from pyarrow import ArrowException
 
-from crossbody.cases import CrossbodyError, InvalidValue
+from crossbody.cases import CrossbodyError, InvalidValue, OutputError
 from crossbody.reports import voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
 from crossbody.reports.commands import identity, key, where
 from crossbody.reports.pages import site as page
-from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs import files, jobs, output, study
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -52,7 +53,7 @@ def run(
                     with parts.put(key(i, case)) as made:
                         rows.to_parquet(made / "bench.parquet")
         done = [parts.part(key(i, case)) for i, case in enumerate(cases) if parts.has(key(i, case))]
-        rows, orders = measure.joined([pd.read_parquet(path / "bench.parquet") for path in done])
+        rows, orders = measure.joined([_part(path) for path in done])
         if not len(rows):
             raise InvalidValue(_nothing(picks))
         tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
@@ -60,6 +61,15 @@ def run(
         write(out, tables | losses, provenance(command, repeats=effort.repeats))
     show(tables | (losses if voice.as_json() else {}), out)
     return tell_losses(losses["lost"], against) if losses else 0
+
+
+def _part(path: Path) -> pd.DataFrame:
+    """The rows of one case that is complete."""
+    try:
+        with files.open_inside(path, "bench.parquet") as file:
+            return pd.read_parquet(file)[list(measure.COLUMNS)]
+    except (OSError, ValueError, KeyError, ArrowException):
+        raise OutputError(f"{path} is no part of a benchmark; remove {path.parent}.") from None
 
 
 def _nothing(picks: Sequence[jobs.Pick]) -> str:

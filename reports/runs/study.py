@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -57,7 +56,7 @@ def write_case(made: Path, result: CaseResult, command: str) -> None:
 
 def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) -> pd.DataFrame:
     """Join the folders of `write_case` into one study, as `write` does of results in memory; its verdicts."""
-    told = [json.loads(files.read_inside(part, CASE)) for part in parts]
+    told = [_read_case(part) for part in parts]
     rows = pd.DataFrame([row for one in told for row in one["verdicts"]], columns=list(Verdict.__dataclass_fields__))
     write_table(out / "verdicts", rows, provenance)
     write_table(out / "audit", pd.DataFrame([r for one in told for r in one["audit"]], columns=AUDIT), provenance)
@@ -65,8 +64,17 @@ def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) ->
     (out / "traces").mkdir()
     traces = [part / "traces" / name for part in parts for name in files.listed(part, "traces")]
     for i, trace in enumerate(traces):
-        shutil.copyfile(trace, out / "traces" / f"{i:04d}.parquet", follow_symlinks=False)
+        name = f"{trace.parent.name}/{trace.name}"
+        (out / "traces" / f"{i:04d}.parquet").write_bytes(files.read_inside(trace.parent.parent, name))
     return rows
+
+
+def _read_case(part: Path) -> dict[str, list[dict[str, Any]]]:
+    try:
+        told: Any = json.loads(files.read_inside(part, CASE))
+        return {name: [dict(row) for row in told[name]] for name in ("verdicts", "audit")}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        raise OutputError(f"{part} is no part of a run; remove {part.parent}.") from None
 
 
 def _plain(value: Any) -> Any:
