@@ -20,8 +20,11 @@ def frozen(owner: str, field: str, value: Any, shape: tuple[int | None, ...], dt
         SceneError: naming the owner, the field, the shape found and the shape wanted.
     """
     try:
-        array = np.array(value, dtype=dtype, order="C")
-    except (TypeError, ValueError) as error:
+        if np.iscomplexobj(value):
+            raise TypeError("complex numbers are not admitted")
+        with np.errstate(all="raise"):  # a number that is no integer is not cut to one in silence
+            array = np.array(value, dtype=dtype, order="C")
+    except (TypeError, ValueError, OverflowError, FloatingPointError) as error:
         raise SceneError(f"{owner}.{field} is not an array of {np.dtype(dtype).name}: {error}.") from None
     if array.ndim != len(shape) or any(w is not None and g != w for g, w in zip(array.shape, shape, strict=True)):
         wanted = str(tuple("any" if w is None else w for w in shape)).replace("'", "")

@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import Floats, frozen
 from crossbody.cases._errors import InvalidValue, SceneError
 from crossbody.cases._trajectory import Trajectory
@@ -55,13 +56,15 @@ class Parameter:
             InvalidValue: if it has another type, is not finite or lies outside the bounds.
         """
         if isinstance(self.default, str):
-            if value not in self.choices:
-                raise InvalidValue(f"{where} is {value!r}; valid: {', '.join(self.choices)}.")
+            if not isinstance(value, str) or value not in self.choices:
+                raise InvalidValue(f"{where} is {shown(value)}; valid: {', '.join(self.choices)}.")
             return value
         try:
+            if not isinstance(value, (int, float, str, np.number, np.bool_)):
+                raise TypeError
             number = float(value)
-        except (TypeError, ValueError):
-            raise InvalidValue(f"{where} is {value!r}; it must be a number [{self.unit or '-'}].") from None
+        except (TypeError, ValueError, OverflowError):
+            raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].") from None
         if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
             bracket = "(" if self.open_low or math.isinf(self.low) else "["
             close = ")" if math.isinf(self.high) else "]"

@@ -37,9 +37,9 @@ class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(sorted(known))
-        close = difflib.get_close_matches(name, self.known, n=1)
+        close = difflib.get_close_matches(name, self.known, n=1) if isinstance(name, str) else ()
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        super().__init__(f"There is no {kind} {name!r}.{hint} Known: {', '.join(self.known) or 'none'}.")
+        super().__init__(f"There is no {kind} {repr(name)[:80]}.{hint} Known: {', '.join(self.known) or 'none'}.")
 
 
 class InvalidValue(CrossbodyError, ValueError):  # noqa: N818

@@ -8,10 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from crossbody import cases
 from crossbody.cases import _registry
+from crossbody.cases._arguments import path
 from crossbody.cases._case import Case, Parameter, Value
-from crossbody.cases._errors import SceneError, UnknownName
+from crossbody.cases._errors import CrossbodyError, SceneError, UnknownName
 
 
 def module(name: str) -> ModuleType:
@@ -63,10 +66,18 @@ def resolve(
 
 def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Case:
     """See `crossbody.cases.load`."""
+    name = path("case", name)
     source = module(name)
     chosen = next(iter(source.VARIANTS)) if variant is None else variant
-    if chosen not in source.VARIANTS:
+    if not isinstance(chosen, str) or chosen not in source.VARIANTS:
         raise UnknownName(f"variant of {Path(name).stem}", chosen, source.VARIANTS)
     label = f"{Path(name).stem}:{chosen}"
-    case: Case = source.build(chosen, resolve(label, source.PARAMETERS, source.VARIANTS[chosen], overrides))
+    numbers = resolve(label, source.PARAMETERS, source.VARIANTS[chosen], overrides)
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            case: Case = source.build(chosen, numbers)
+    except CrossbodyError:
+        raise
+    except (ArithmeticError, ValueError) as error:  # a root of what is below 0, a number beyond double precision
+        raise SceneError(f"{label}: no scene has these parameters ({error}).") from error
     return case

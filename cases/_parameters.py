@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Parameter, Value
 from crossbody.cases._errors import InvalidValue
@@ -28,7 +29,10 @@ class Numbers(Parameter):
         """
         if isinstance(value, (int, float)):
             value = str(value)
-        parts = value.split(",") if isinstance(value, str) else [str(part) for part in value]
+        try:
+            parts = value.split(",") if isinstance(value, str) else [str(part) for part in value]
+        except TypeError:
+            raise InvalidValue(f"{where} is {shown(value)}; it must be numbers, with commas between them.") from None
         if not parts:
             raise InvalidValue(f"{where} is empty; it must be one number or several separated by commas.")
         each = Parameter(default=0.0, unit=self.unit, low=self.low, high=self.high, open_low=self.open_low)
@@ -45,7 +49,7 @@ class NumberOrWord(Parameter):
         Raises:
             InvalidValue: if it is neither.
         """
-        if value in self.choices:
+        if isinstance(value, str) and value in self.choices:
             return value
         number = Parameter(default=0.0, unit=self.unit, low=self.low, high=self.high, open_low=self.open_low)
         try:

@@ -41,6 +41,8 @@ def load_plugin(kind: str, package: str, path: list[str], name: str, hidden: Col
     Raises:
         UnknownName: if there is no such plug-in.
     """
+    if not isinstance(name, str):
+        raise UnknownName(kind, name, plugin_names(package, path, hidden))
     if name in own_names(path, hidden):
         return importlib.import_module(f"{package}.{name}")
     module = _installed.modules(package).get(name)

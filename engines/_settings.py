@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from crossbody.cases import Parameter, UnknownName, Value
+from crossbody.cases import Case, Parameter, UnknownName, Value
+from crossbody.cases._arguments import instance
 
 MATCHED = "matched"
 
@@ -30,12 +31,23 @@ def chosen(engine: str, profile: str, known: Mapping[str, Parameter], given: Map
     return {name: p.checked(f"{where}: {name}", given.get(name, p.default)) for name, p in known.items()}
 
 
+def check_case(case: object) -> None:
+    """Refuse what is no case.
+
+    Raises:
+        InvalidValue: saying where one comes from.
+    """
+    instance("case", case, Case, "a Case, as crossbody.cases.load returns it")
+
+
 def profile_of(engine: str, profiles: Mapping[str, str], profile: str) -> str:
     """The profile, if the engine has it; "matched" is the first one of an engine that has no profile of that name.
 
     Raises:
         UnknownName: listing the profiles.
     """
+    if not isinstance(profile, str):
+        raise UnknownName(f"profile of {engine}", profile, profiles)
     if profile == MATCHED:
         return MATCHED if MATCHED in profiles else next(iter(profiles))
     if profile not in profiles:

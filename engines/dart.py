@@ -89,6 +89,7 @@ class Dart:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms that are not on a line, and rows that are always on."""
+        _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         return why_not("DART", case) or no_rigid_contact(case)
 

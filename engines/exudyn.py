@@ -204,6 +204,7 @@ class Exudyn:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms that are not on a line."""
+        _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         return why_not("Exudyn", case)
 

@@ -14,7 +14,7 @@ from crossbody.engines import _settings
 from crossbody.engines._equations import builder, module, system_of
 from crossbody.engines._reference_audit import audit
 from crossbody.reference import Options, System, prepare
-from crossbody.reference._options import COLLISIONS, FSMS, TOLERANCES
+from crossbody.reference._options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
 
 OF_THE_CASE = "case"
 _PADS = (
@@ -78,6 +78,7 @@ class Reference:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without equations here, and collision rules that the reference does not know."""
+        _settings.check_case(case)
         solver = _settings.profile_of(self.name, self.profiles, profile)
         if (case.mechanism, solver) in UNSUITED:
             return UNSUITED[case.mechanism, solver]
@@ -124,7 +125,7 @@ def _known(solver: str) -> dict[str, Parameter]:
     low, high = TOLERANCES
     known = {
         "rtol": Parameter(default=1e-9, doc="relative tolerance", low=low, high=high),
-        "atol": Parameter(default=0.0, doc="absolute tolerance; 0 for rtol/1000", low=0.0),
+        "atol": Parameter(default=0.0, doc="absolute tolerance; 0 for rtol/1000", low=0.0, high=LARGEST_ATOL),
         "ledger": Parameter(default=True, doc="keep the energy account", low=0, high=1),
         "samples": Parameter(default=0, doc="number of equidistant rows; 0 for every step", low=0, high=1e8),
         "fsm": Parameter(default=OF_THE_CASE, doc="state machine", choices=(OF_THE_CASE, *FSMS)),

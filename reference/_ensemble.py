@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from queue import SimpleQueue
@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
+from crossbody.cases._arguments import instance
 from crossbody.cases._arrays import frozen
 from crossbody.reference._kinds import Floats, Index
-from crossbody.reference._options import Options
+from crossbody.reference._options import Options, checked
 from crossbody.reference._program import address
 from crossbody.reference._run import OUTCOMES, CompiledRun
 from crossbody.reference._system import System, initial_modes
@@ -79,8 +80,9 @@ def ensemble(
         UnknownName: for a parameter or constant that the system does not have.
         InvalidValue: for an option or a number of threads outside its range.
     """
+    instance("system", system, System, "a crossbody.reference.System")
+    settings = replace(checked(t_end, options), samples=(), events=False)
     job = _Job(system, q0, v0, parameters or {}, law or {})
-    settings = Options(t_end=t_end, samples=(), events=False, **options)
     count = threads or len(os.sched_getaffinity(0))
     if not 1 <= count <= 1024:
         raise InvalidValue(f"threads is {threads}; valid: 1 to 1024.")

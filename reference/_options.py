@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, UnknownName
+from crossbody.cases._arguments import flag, real, shown
 from crossbody.cases._arrays import frozen
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
@@ -18,6 +20,7 @@ FSMS = ("level", "edge", "memoryless")
 COLLISIONS = ("sequential", "simultaneous", "resolved")
 SOLVERS = ("compiled", "ida", "cvode")
 TOLERANCES = (1e-14, 1e-1)
+LARGEST_ATOL = 1e100  # its square is still a number
 ATOL_PART = 1e-3  # default absolute tolerance in units of rtol: gaps are small against heights
 
 
@@ -42,7 +45,8 @@ class Options:
         index: 1, or 3 for bilateral rows under "ida".
         max_step: longest step, s.
         max_steps: bound on steps.
-        time_limit: bound on wall time, s.
+        time_limit: bound on wall time, s; looked at between slices of steps. It does not end a kernel that never
+            returns: only its process can be ended, as the command line does.
     """
 
     t_end: float
@@ -74,13 +78,21 @@ class Options:
         known("solver", self.solver, SOLVERS)
         within("rtol", self.rtol, *TOLERANCES)
         if self.atol is not None:
-            within("atol", self.atol, 0.0, math.inf, open_low=True)
+            within("atol", self.atol, 0.0, LARGEST_ATOL, open_low=True)
         within("t_end", self.t_end, 0.0, math.inf, open_low=True)
         within("max_step", self.max_step, 0.0, math.inf, open_low=True, infinite=True)
         within("max_steps", self.max_steps, 1, math.inf, infinite=True)
+        if math.isfinite(self.max_steps) and self.max_steps != int(self.max_steps):
+            raise InvalidValue(f"max_steps is {self.max_steps!r}; it must be a whole number, or infinite.")
         within("time_limit", self.time_limit, 0.0, math.inf, open_low=True, infinite=True)
-        if self.index not in (1, 3) or (self.index == 3 and self.solver != "ida"):
-            raise InvalidValue(f"index is {self.index} with solver {self.solver!r}; valid: 1, or 3 with 'ida'.")
+        for name in ("ledger", "events", "shortcuts", "implicit"):
+            flag(name, getattr(self, name))
+        if (
+            not isinstance(self.index, (int, np.integer))
+            or self.index not in (1, 3)
+            or (self.index == 3 and self.solver != "ida")
+        ):
+            raise InvalidValue(f"index is {shown(self.index)} with solver {self.solver!r}; valid: 1, or 3 with 'ida'.")
 
     @property
     def tolerance(self) -> float:
@@ -117,6 +129,8 @@ class Options:
         """Times (m,) and values (m, nu) of the inputs, checked."""
         if self.inputs is None:
             return np.zeros(0), np.zeros((0, system.inputs))
+        if not isinstance(self.inputs, (tuple, list)) or len(self.inputs) != 2:
+            raise InvalidValue(f"inputs is {shown(self.inputs)}; it must be a pair: times (m,) and values (m, nu).")
         times: Floats = frozen("inputs", "times", self.inputs[0], (None,))
         values: Floats = frozen("inputs", "values", self.inputs[1], (len(times), system.inputs))
         if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0) and np.all(np.isfinite(values))):
@@ -126,13 +140,25 @@ class Options:
 
 def known(kind: str, name: str, names: Iterable[str]) -> None:
     """Raise UnknownName unless `name` is among `names`."""
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise UnknownName(kind, name, names)
+
+
+def checked(t_end: float, given: Mapping[str, Any]) -> Options:
+    """Options by their names.
+
+    Raises:
+        UnknownName: for one that does not exist.
+        InvalidValue: as `Options`.
+    """
+    for name in given:
+        known("option", name, [field.name for field in fields(Options) if field.name != "t_end"])
+    return Options(t_end=t_end, **given)
 
 
 def within(name: str, value: float, low: float, high: float, *, open_low: bool = False, infinite: bool = False) -> None:
     """Raise InvalidValue unless low <= value <= high (low itself excluded if open) and value is finite."""
-    good = isinstance(value, (int, float, np.integer, np.floating)) and low <= value <= high
-    good = good and not (open_low and value == low) and (infinite or math.isfinite(value))
+    number = real(name, value)
+    good = low <= number <= high and not (open_low and number == low) and (infinite or math.isfinite(number))
     if not good:
-        raise InvalidValue(f"{name} is {value!r}; valid: {'(' if open_low else '['}{low:g}, {high:g}].")
+        raise InvalidValue(f"{name} is {shown(value)}; valid: {'(' if open_low else '['}{low:g}, {high:g}].")

@@ -38,6 +38,13 @@ _COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
 
+def start_row(system: System, q0: Floats, v0: Floats) -> Floats:
+    """The start as a row of a motion: t, q, v, gap, lam (0: none is known), energy (2,)."""
+    energy = np.zeros(2)
+    system.energy(q0, v0, np.array(system.p), energy)
+    return np.concatenate([[0.0], q0, v0, system.gap(q0, v0)[0], np.zeros(system.nc), energy])
+
+
 class CompiledRun:
     """One prepared run of the compiled loop; `start` and `go` may be repeated, with the same result.
 
@@ -161,6 +168,9 @@ class CompiledRun:
         n, nc = self.system.n, self.system.nc
         state = self.state[0]
         rows = self.buffers["out"][: self._finite_rows()]
+        if not len(rows):  # it ended before its first row, or none was asked for: the start is known at least
+            rows = np.concatenate([start_row(self.system, *np.split(self.start_state, 2)), np.zeros(self.nz)])[None]
+            self.buffers["modes"][0] = self._modes
         cuts = np.cumsum([1, n, n, nc, nc, 2])
         t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
         return Trajectory(

@@ -7,8 +7,9 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from crossbody.cases import Trajectory
+from crossbody.cases._arguments import instance
 from crossbody.reference._check import check_once
-from crossbody.reference._options import Options
+from crossbody.reference._options import Options, checked
 from crossbody.reference._system import System
 
 
@@ -29,13 +30,14 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
         SceneError: if q0 or v0 has another shape or is not finite, or if a kernel is wrong there (`System.check`).
         InvalidValue, UnknownName: for an option outside what it admits.
     """
-    run = prepare(system, q0, v0, Options(t_end=t_end, **options))
+    run = prepare(system, q0, v0, checked(t_end, options))
     motion: Trajectory = run.trajectory(*run.go())
     return motion
 
 
 def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> Any:
     """A run that can be repeated: everything that does not depend on time is decided here."""
+    instance("system", system, System, "a crossbody.reference.System")
     start = system.checked_state("q0", q0), system.checked_state("v0", v0)
     check_once(system, *start, options.t_end)
     if options.solver == "compiled":

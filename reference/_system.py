@@ -10,10 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError
+from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import frozen
 from crossbody.reference import kernels as kernel_types
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
+
+LARGEST = 1_000_000
+"""Of every size of a system."""
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
@@ -108,7 +112,8 @@ class System:
     @property
     def kernels(self) -> dict[str, Any]:
         """The nine functions in the order of `kernels.NAMES`; what is absent is a stand-in."""
-        return {name: getattr(self, name) or getattr(_none, name) for name in kernel_types.NAMES}
+        given = {name: getattr(self, name) for name in kernel_types.NAMES}
+        return {name: getattr(_none, name, None) if kernel is None else kernel for name, kernel in given.items()}
 
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
         value = getattr(self, name)
@@ -118,7 +123,7 @@ class System:
     def _spans(self, nc: int) -> Index:
         """Columns that each row may touch, widened to whole blocks of the mass matrix."""
         whole = [[0, self.n]] * nc if self.span is None else self.span
-        spans: Index = frozen("System", "span", np.reshape(whole, (-1, 2)), (nc, 2), np.int64)
+        spans: Index = frozen("System", "span", whole if nc else np.zeros((0, 2)), (nc, 2), np.int64)
         if np.any(spans[:, 0] < 0) or np.any(spans[:, 1] > self.n) or np.any(spans[:, 0] >= spans[:, 1]):
             raise SceneError(f"System.span is {spans.tolist()}; each row needs 0 <= first < last <= {self.n}.")
         k = self.mass_block or self.n
@@ -130,8 +135,9 @@ class System:
         counts = (("n", 1), *((name, 0) for name in ("mass_block", "inputs", "scratch", "memory", "guards", "latched")))
         for name, low in counts:
             value = getattr(self, name)
-            if not isinstance(value, (int, np.integer)) or value < low:
-                raise SceneError(f"System.{name} is {value!r}; it must be a whole number of at least {low}.")
+            whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+            if not whole or not low <= value <= LARGEST:
+                raise SceneError(f"System.{name} is {shown(value)}; it must be a whole number from {low} to {LARGEST}.")
         if self.mass_block and self.n % self.mass_block:
             raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")
 

@@ -1,14 +1,19 @@
 """The command `crossbody`.
 
 Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2: wrong use, told in one
-sentence on stderr. Whatever is not needed to read the command line is imported by the command that needs it.
+sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130: interrupted. Whatever is not needed to
+read the command line is imported by the command that needs it.
 """
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shlex
 import sys
+import tempfile
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -81,21 +86,28 @@ _WITH = click.option(
 )  # fmt: skip
 
 
+_LIMIT = click.option(
+    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=3660.0, show_default=True, metavar="S",
+    help="An engine that has not come back from a case by then is ended, s; compilation counts.",
+)  # fmt: skip
+
+
 @cli.command()
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@_LIMIT
 @_AGAINST
 @_WITH
 @speaks
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, settings: tuple[str, ...], against: Path | None, others: tuple[Path, ...],
+    rtol: float | None, settings: tuple[str, ...], limit: float, against: Path | None, others: tuple[Path, ...],
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
     from crossbody.reports.commands import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others)
+    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit)
 
 
 @cli.command()
@@ -105,10 +117,11 @@ def run(
 @click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier benchmark.")
 @click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
 @click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
+@_LIMIT
 @speaks
 def bench(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    repeats: int | None, full: bool, against: Path | None, what: str | None,
+    repeats: int | None, full: bool, against: Path | None, what: str | None, limit: float,
 ) -> int:  # fmt: skip
     """Time engines against their error over ladders of tolerances and steps.
 
@@ -118,7 +131,7 @@ def bench(
 
     if what is not None:
         return work.alone(what, (names, wanted, variant, pairs, full, against), repeats, out, _command())
-    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command())
+    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command(), limit)
 
 
 @cli.command()
@@ -160,12 +173,15 @@ def stability(wanted: tuple[str, ...], out: Path) -> int:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of every draw.")
 @click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
+@click.option("--tls-ca", default="", metavar="FILE", help="Certificates (PEM) that a scheduler's must come from.")
+@click.option("--tls-cert", default="", metavar="FILE", help="Certificate (PEM) that is shown to a scheduler.")
+@click.option("--tls-key", default="", metavar="FILE", help="Its key, if it is not in the same file.")
 @click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("stress"), show_default=True, metavar="DIR")
 @speaks
 def stress(
     names: tuple[str, ...], wanted: tuple[str, ...], runs: int | None, seed: int, jobs: int, scheduler: str | None,
-    resume: bool, out: Path,
+    tls_ca: str, tls_cert: str, tls_key: str, resume: bool, out: Path,
 ) -> int:  # fmt: skip
     """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
 
@@ -173,8 +189,12 @@ def stress(
     """
     from crossbody.reports.sweep.command import Ask
     from crossbody.reports.sweep.command import stress as work
+    from crossbody.reports.sweep.pools import Tls
 
-    asked = Ask(names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, resume=resume)
+    tls = Tls(ca=tls_ca, cert=tls_cert, key=tls_key)
+    asked = Ask(
+        names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, tls=tls, resume=resume
+    )
     return work(asked, out, _command())
 
 
@@ -283,20 +303,54 @@ def _command() -> str:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point: every error of use is one sentence and exit code 2."""
+    """Entry point: every error of use is one sentence and exit code 2, every fault of crossbody's own is 3.
+
+    From a shell (no arguments given here) the command runs in a child that this process watches.
+    """
+    if arguments is None and hasattr(os, "fork"):
+        from crossbody.reports.runs.watch import watched
+
+        sys.exit(watched(lambda: _obey(None)))
+    sys.exit(_obey(arguments))
+
+
+def _obey(arguments: list[str] | None) -> int:
     try:
         code = cli.main(args=arguments, prog_name="crossbody", standalone_mode=False)
-    except click.exceptions.Abort:
-        code = 130
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        return 130
     except click.ClickException as error:
-        code = _say(error.format_message())
+        return _say(error.format_message())
     except CrossbodyError as error:
-        code = _say(str(error))
-    except KeyboardInterrupt:
-        code = 130
-    sys.exit(code if isinstance(code, int) else 0)
+        return _say(str(error))
+    except BrokenPipeError:  # whoever read this has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno in REFUSED:
+            return _say(f"The system refuses: {error.strerror}{f' ({error.filename})' if error.filename else ''}.")
+        return _crashed(error)
+    return code if isinstance(code, int) else 0
 
 
-def _say(text: str) -> int:
+REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENOMEM)
+"""What the system may refuse whatever a program does."""
+
+
+def _say(text: str, code: int = 2) -> int:
     click.echo("crossbody: " + " ".join(text.split()), err=True)
-    return 2
+    return code
+
+
+def _crashed(error: Exception) -> int:
+    """A fault of crossbody's own: one sentence, and the traceback in a file."""
+    text = f"{_command()}\n{sys.version}\n{''.join(traceback.format_exception(error))}"
+    try:
+        handle, name = tempfile.mkstemp(prefix="crossbody-crash-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError:
+        click.echo(text, err=True)
+        name = "what stands above"
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return _say(f"This is a fault of crossbody ({what[:300]}). Please report it with {name}.", 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shlex
 import sys
 from collections.abc import Sequence
@@ -15,7 +16,9 @@ from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.pages import site
 from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.runs.watch import LIMIT
 from crossbody.reports.voice import progress
 
 if TYPE_CHECKING:
@@ -30,10 +33,12 @@ COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yello
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
     rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
+    limit: float = LIMIT,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
-    `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one.
+    `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one;
+    `limit` is the time that an engine may take for one case, s.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -42,15 +47,19 @@ def run(
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
-    output.check(out)
+    output.check(out, "run")
     site.check(against, others)
-    with progress(len(cases) * (len(picks) + 1)) as tell:
-        results = [jobs.run_case(case, picks, rtol, tell, asked) for case in cases]
-    rows = study.judge(results, {case.label: repeat(case, names, pairs, rtol, settings) for case in cases})
     told = provenance(command, rtol=rtol, seed=SEED)
-    with output.folder(out) as made:
-        study.write(made, results, rows, told)
-        site.write(made, against=against, others=others)
+    with Parts(out, command, identity("run", cases, names, picks=picks, rtol=rtol, settings=asked)) as parts:
+        with progress(len(cases) * (len(picks) + 1)) as tell:
+            for i, case in enumerate(cases):
+                if not parts.has(key(i, case)):
+                    result = jobs.run_case(case, picks, rtol, tell, asked, limit=limit)
+                    with parts.put(key(i, case)) as made:
+                        study.write_case(made, result, repeat(case, names, pairs, rtol, settings))
+        with output.folder(out, "run") as made:
+            rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
+            site.write(made, against=against, others=others)
     if voice.as_json():
         print(voice.rows_as_json(rows))
     else:
@@ -58,16 +67,30 @@ def run(
     return exit_code(rows["verdict"])
 
 
+def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:
+    """What decides what a command computes: the sources too, and case files of one's own."""
+    from crossbody.reports.sweep.store import code
+
+    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in names if name.endswith(".py")]
+    scenes = [[case.label, dict(case.parameters)] for case in cases]
+    return {"kind": kind, "code": code(), "cases": scenes, "files": own, **more}
+
+
+def key(number: int, case: Case) -> str:
+    """What tells the part of a case from those of the others, which may have its name."""
+    return f"{number} {case.label}"
+
+
 def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
     """Run the sliders over all gaps; writes the table and the page."""
     from crossbody.reports.maps import gapmap
 
     picks = jobs.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
-    output.check(out)
+    output.check(out, "gapmap")
     with progress(len(counts) * len(gapmap.lines(picks))) as tell:
         rows = gapmap.gap_map(counts, picks, points, tell)
     told = provenance(command, points=points)
-    with output.folder(out) as made:
+    with output.folder(out, "gapmap") as made:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "gapmap", rows, told)
         site.write(made)
@@ -81,11 +104,11 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     from crossbody.reports.maps import stability
 
     picks = jobs.picks(wanted) if wanted else (stability.DEFAULT,)
-    output.check(out)
+    output.check(out, "stability")
     with progress(len(picks) * len(stability.POINTS)) as tell:
         rows = stability.stability_map(picks, stability.POINTS, tell)
     told = provenance(command, rtol=stability.RTOL)
-    with output.folder(out) as made:
+    with output.folder(out, "stability") as made:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "stability", rows, told)
         site.write(made)

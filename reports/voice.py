@@ -58,6 +58,12 @@ def silent() -> bool:
     return quiet() or as_json()
 
 
+def note(text: str) -> None:
+    """Say something beside the result, in one line on stderr."""
+    if not silent():
+        print(f"crossbody: {' '.join(text.split())}", file=sys.stderr)
+
+
 def rows_as_json(rows: pd.DataFrame) -> str:
     """A table as a JSON list of its rows."""
     return str(rows.to_json(orient="records", double_precision=15))

@@ -232,3 +232,15 @@ def test_paper_is_light_and_no_plot_is_cut(whole: Path, browser: chromium.Browse
     assert browser.js("[...document.querySelectorAll('details.table')].every((each) => each.open)")
     browser.js("dispatchEvent(new Event('afterprint'))")
     assert browser.js("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+
+
+def test_a_page_runs_no_script_but_its_own(out: Path, browser: chromium.Browser, tmp_path: Path) -> None:
+    """What is put into a page is not run, and nobody is asked for anything; its own plots are drawn."""
+    shutil.copytree(out, tmp_path / "out")
+    site.write(tmp_path / "out", single_file=True)
+    put = "(() => { const made = document.createElement('script'); made.textContent = 'window.put = 1';"
+    for page in (out / CASE, tmp_path / "out" / INDEX):
+        browser.open(page)
+        assert browser.complaints() == []
+        assert browser.js(put + " document.body.append(made); return window.put || 0; })()") == 0
+        assert browser.js("fetch('https://example.org').then(() => 'went').catch(() => 'refused')") == "refused"

@@ -21,6 +21,7 @@ import pytest
 
 from crossbody.cases import OutputError, SchedulerUnavailable
 from crossbody.reports.cli import main
+from crossbody.reports.runs.output import folder
 from crossbody.reports.suites._axis import Log
 from crossbody.reports.suites._contract import Family, Suite
 from crossbody.reports.sweep import draw, pools
@@ -154,8 +155,13 @@ def test_another_version_and_foreign_folders_are_not_touched(whole: Path, tmp_pa
     report.mkdir()
     (report / ".crossbody").write_text("")
     (report / "verdicts.json").write_text("{}")
-    with pytest.raises(OutputError, match="another command's report"):
+    with pytest.raises(OutputError, match="in the way and is not crossbody's own"):
         Store(report, about)
+    (report / "verdicts.json").unlink()
+    with folder(report, "run") as made:
+        (made / "verdicts.json").write_text("theirs")
+    Store(report, about)  # a sweep stands beside the studies of other commands
+    assert (report / "verdicts.json").read_text() == "theirs"
     assert call("stress", "damping", "--resume", "--out", str(tmp_path / "none")) == 2
     assert not (tmp_path / "none").exists()
 

@@ -153,6 +153,7 @@ class Drake:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms that are not on a line; contacts of a plant that never open."""
+        _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         reason = why_not("Drake", case)
         if reason is None and profile != "matched" and not case.law.unilateral.all():

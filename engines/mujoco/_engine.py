@@ -74,6 +74,7 @@ class Mujoco:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without a model here cannot be run."""
+        _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         known = _mechanisms()
         if case.mechanism in known:

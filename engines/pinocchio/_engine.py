@@ -118,6 +118,7 @@ class Pinocchio:
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""
+        _settings.check_case(case)
         profile = _settings.profile_of(self.name, self.profiles, profile)
         known = _registry.plugin_names(PACKAGE, _path())
         if case.mechanism not in known:

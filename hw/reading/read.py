@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crossbody.cases import InvalidValue, LogFormatError
+from crossbody.cases import InvalidValue, LogFormatError, _arguments
 from crossbody.hw import formats
 from crossbody.hw.checks.every import Checks
 from crossbody.hw.checks.finding import Finding
@@ -114,6 +114,14 @@ def read(
         UnknownName: for a repair that does not exist.
         InvalidValue: if the map tells runs apart and none was named, or the reverse; for repairs of a stored log.
     """
+    path = Path(_arguments.path("log", path))
+    _arguments.real("limit", limit)
+    if part is not None:
+        _arguments.instance("part", part, int, "a whole number")
+    if columns is not None and not isinstance(columns, Columns):
+        _arguments.path("columns", columns)
+    if isinstance(repair, np.ndarray) or not isinstance(repair, Collection):
+        raise InvalidValue(f"repair is {_arguments.shown(repair)}; it must be a list of repairs.")
     _repair.check_names(repair)
     stored = _store.about(Path(path)) if columns is None else None
     if stored is not None and repair:

@@ -20,7 +20,7 @@ LONGEST = 1000  # samples that are filled in one place: more is no dropout but a
 def check_names(asked: Collection[str]) -> None:
     """Refuse a repair that does not exist."""
     for name in asked:
-        if name not in REPAIRS:
+        if not isinstance(name, str) or name not in REPAIRS:
             raise UnknownName("repair", name, REPAIRS)
 
 

@@ -248,8 +248,12 @@ class SundialsRun:
 
     def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
         """What was recorded, as a Trajectory."""
+        if not self.rows:  # it ended before its first row, or none was asked for: the start is known at least
+            gap, energy = self.system.gap(self.q0, self.v0)[0], self.equations.energy(self.q0, self.v0)
+            nothing, start = np.zeros(self.system.nc), [int(m) for m in self.machine.modes]
+            self.rows.append((0.0, self.q0, self.v0, gap, nothing, energy, start, np.zeros(self.scene.nz)))
         n, nc, count = self.system.n, self.system.nc, len(self.rows)
-        columns = list(zip(*self.rows, strict=True)) if self.rows else [()] * 8
+        columns = list(zip(*self.rows, strict=True))
         widths = (n, n, nc, nc, 2, nc, self.scene.nz)
         t = np.array(columns[0], dtype=np.float64)
         q, v, gap, lam, energy, mode, z = (

@@ -30,12 +30,12 @@ def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
     parameters = jobs.parse_settings(pairs)
     if "kstar" in parameters:
         raise InvalidValue(f"kstar is what the curves differ in: {', '.join(f'{k:g}' for k in responses.GAINS)}.")
-    output.check(out)
+    output.check(out, "bode")
     curves = [responses.soft_contact(k, mode, **parameters) for mode in responses.MODES for k in responses.GAINS]
     held = [curve for curve in curves if curve.mode == "grasp"]
     rows, poles = responses.table(held, responses.frequencies()), responses.poles(curves)
     told = provenance(command)
-    with output.folder(out) as made:
+    with output.folder(out, "bode") as made:
         study.write(made, [], study.judge([], {}), told)
         study.write_table(made / "bode", rows, told)
         study.write_table(made / "poles", poles, told)

@@ -116,8 +116,8 @@ def analyse(
 def _write(out: Path, tables: Mapping[str, pd.DataFrame], command: str) -> None:
     """Every table, and the page."""
     told = provenance(command)
-    output.check(out)
-    with output.folder(out) as made:
+    output.check(out, "analyse")
+    with output.folder(out, "analyse") as made:
         study.write(made, [], study.judge([], {}), told)
         for key, rows in tables.items():
             study.write_table(made / f"{PREFIX}{key}", rows, told)

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from pyarrow import ArrowException
 
 from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports.bench.order import FLOOR
+from crossbody.reports.runs.files import open_inside
+from crossbody.reports.runs.output import recover
 
 ACCURACY = 3.0
 """An error this many times the earlier one is lost accuracy; errors below rounding count as rounding."""
@@ -26,6 +29,7 @@ def read(base: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     Raises:
         OutputError: if the folder holds none, or one of another version.
     """
+    recover(base)
     if not base.is_dir():
         raise OutputError(f"--against {base} is not a folder; name one that crossbody bench wrote.")
     found = []
@@ -43,8 +47,9 @@ def read(base: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def _table(path: Path) -> pd.DataFrame:
     try:
-        return pd.read_parquet(path)
-    except (OSError, ValueError):  # not there, or not Parquet
+        with open_inside(path.parent, path.name) as file:
+            return pd.read_parquet(file)
+    except (OSError, ValueError, KeyError, ArrowException):  # not there, a link, or not Parquet
         raise OutputError(f"--against: {path} cannot be read; name a folder that crossbody bench wrote.") from None
 
 

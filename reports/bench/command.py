@@ -7,16 +7,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
+from pyarrow import ArrowException
 
-from crossbody.cases import CrossbodyError, InvalidValue
+from crossbody.cases import CrossbodyError, InvalidValue, OutputError
 from crossbody.reports import voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
-from crossbody.reports.commands import where
+from crossbody.reports.commands import identity, key, where
 from crossbody.reports.pages import site as page
-from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs import files, jobs, output, study
+from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.runs.watch import LIMIT
 from crossbody.reports.voice import progress
 
 SHOWN = {
@@ -30,7 +33,7 @@ SHOWN = {
 
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
-    repeats: int | None, full: bool, against: Path | None, command: str,
+    repeats: int | None, full: bool, against: Path | None, command: str, limit: float = LIMIT,
 ) -> int:  # fmt: skip
     """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code.
 
@@ -42,16 +45,31 @@ def run(
     if base is not None:
         bench_against.check_common(base[0], [case.label for case in cases])
     effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats)
-    output.check(out)
-    with progress(len(cases) * len(picks)) as tell:
-        rows, orders = measure.joined([measure.bench(case, picks, effort, tell) for case in cases])
-    if not len(rows):
-        raise InvalidValue(_nothing(picks))
-    tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
-    losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
-    write(out, tables | losses, provenance(command, repeats=effort.repeats))
+    output.check(out, "bench")
+    with Parts(out, command, identity("bench", cases, names, picks=picks, effort=effort)) as parts:
+        with progress(len(cases) * len(picks)) as tell:
+            for i, case in enumerate(cases):
+                if not parts.has(key(i, case)) and len(rows := measure.bench(case, picks, effort, tell, limit)):
+                    with parts.put(key(i, case)) as made:
+                        rows.to_parquet(made / "bench.parquet")
+        done = [parts.part(key(i, case)) for i, case in enumerate(cases) if parts.has(key(i, case))]
+        rows, orders = measure.joined([_part(path) for path in done])
+        if not len(rows):
+            raise InvalidValue(_nothing(picks))
+        tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
+        losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
+        write(out, tables | losses, provenance(command, repeats=effort.repeats))
     show(tables | (losses if voice.as_json() else {}), out)
     return tell_losses(losses["lost"], against) if losses else 0
+
+
+def _part(path: Path) -> pd.DataFrame:
+    """The rows of one case that is complete."""
+    try:
+        with files.open_inside(path, "bench.parquet") as file:
+            return pd.read_parquet(file)[list(measure.COLUMNS)]
+    except (OSError, ValueError, KeyError, ArrowException):
+        raise OutputError(f"{path} is no part of a benchmark; remove {path.parent}.") from None
 
 
 def _nothing(picks: Sequence[jobs.Pick]) -> str:
@@ -60,8 +78,8 @@ def _nothing(picks: Sequence[jobs.Pick]) -> str:
 
 
 def write(out: Path, tables: Mapping[str, pd.DataFrame], told: Mapping[str, object]) -> None:
-    """Tables (Parquet, CSV, JSON) and the page, all or nothing."""
-    with output.folder(out) as made:
+    """Tables (Parquet, CSV, JSON) and the page, all or nothing; the first table names the study."""
+    with output.folder(out, next(iter(tables))) as made:
         study.write(made, [], study.judge([], {}), told)
         for name, table in tables.items():
             study.write_table(made / name, table, told)
@@ -105,7 +123,7 @@ def alone(what: str, asked: tuple[object, ...], repeats: int | None, out: Path, 
     """
     if any(asked):
         raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
-    output.check(out)
+    output.check(out, what)
     rows = (skip if what == "skip" else throughput).measure(repeats or 5)
     beyond = rows[~rows["held"].astype(bool)]
     return table(what, rows, out, command, [str(text) for text in beyond["what"]])

@@ -23,6 +23,7 @@ from crossbody.reports.bench.errors import PARTS, Truths, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
 from crossbody.reports.judging.truth import Truth
+from crossbody.reports.runs import watch
 from crossbody.reports.runs.jobs import Pick
 
 COLUMNS = (
@@ -55,11 +56,15 @@ class Rung:
         self.cpu.append(cores)
 
 
-def _rungs(case: Case, picks: Sequence[Pick], effort: Effort, tell: Callable[[str], None]) -> Iterator[Rung]:
+def _rungs(
+    case: Case, picks: Sequence[Pick], effort: Effort, tell: Callable[[str], None], limit: float
+) -> Iterator[Rung]:
     truths = Truths(case)
     for pick in picks:
-        tell(f"{case.label}: {pick.engine}:{pick.profile}")
-        if not pick.skipped:
+        label = f"{case.label}: {pick.engine}:{pick.profile}"
+        tell(label)
+        watch.limited(label, limit)
+        if not pick.skipped and not watch.lost(label):
             try:
                 yield from _climbed(case, pick, effort, truths)
             except CaseUnsupported:
@@ -106,7 +111,11 @@ def _rounds(rungs: Sequence[Rung], effort: Effort) -> None:
 
 
 def bench(
-    case: Case, picks: Sequence[Pick], effort: Effort | int = 5, tell: Callable[[str], None] = lambda _: None
+    case: Case,
+    picks: Sequence[Pick],
+    effort: Effort | int = 5,
+    tell: Callable[[str], None] = lambda _: None,
+    limit: float = watch.LIMIT,
 ) -> pd.DataFrame:
     """Time every rung of every engine.
 
@@ -115,13 +124,15 @@ def bench(
         picks: engines and profiles; what is not installed or does not know the mechanism has no row.
         effort: how much is measured, or the number of repeats.
         tell: is told what is being done, once an engine.
+        limit: time after which an engine that has not come back is ended with its process, s; from the command line.
 
     Returns:
         One row a rung, columns `COLUMNS`; errors and honesty (error over tolerance) are ratios, event times in s;
         cores is processor time over wall time: 1 for one thread.
     """
     effort = Effort(repeats=effort) if isinstance(effort, int) else effort
-    rungs = list(_rungs(case, picks, effort, tell))
+    rungs = list(_rungs(case, picks, effort, tell, limit))
+    watch.unlimited()  # all have come back once
     _rounds(rungs, effort)
     return pd.DataFrame([_row(case, rung) for rung in rungs], columns=list(COLUMNS))
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from crossbody.cases import Case, Trajectory
+from crossbody.cases import Case, InvalidValue, Trajectory
+from crossbody.cases._arguments import instance, shown
 from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
@@ -60,6 +61,15 @@ def compare(
     Returns:
         One row per run and metric, columns as in `Verdict`.
     """
+    instance("case", case, Case, "a Case, as crossbody.cases.load returns it")
+    if truth is not None:
+        instance("truth", truth, Truth, "a Truth, as crossbody.reports.truth_of returns it")
+    instance("command", command, str, "a text")
+    if not isinstance(runs, Sequence):
+        raise InvalidValue(f"runs is {shown(runs)}; it must be a list of prepared runs.")
+    for run in runs:
+        if not isinstance(run, Entry) and not callable(getattr(run, "run", None)):
+            raise InvalidValue(f"runs holds {shown(run)}; each must be what an engine's prepare returns, or an Entry.")
     truth = truth_of(case) if truth is None else truth
     rows = [row for run in runs for row in verdicts(case, _entry(run), truth, command)]
     return table(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import math
@@ -82,11 +83,36 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
         return inside if single else f"{page}.html{inside if anchor else ''}"
 
     inline = {"style": _text("page.css"), "script": _script(), "plotly": get_plotlyjs()} if single else {}
+    inline = {key: text.replace("</script", "<\\/script") for key, text in inline.items()}
+    scripts = [THEME, *(inline[key] for key in ("script", "plotly") if single)]
     template = environment().get_template("page.html")
     return template.render(
         pages=pages, links=links, footer=footer, href=href, drawn=any(_drawn(page) for page in pages),
-        inline={key: Markup(text.replace("</script", "<\\/script")) for key, text in inline.items()},
+        inline={key: Markup(text) for key, text in inline.items()}, theme=Markup(THEME), policy=policy(scripts, single),
     )  # fmt: skip
+
+
+THEME = (
+    'try { const kept = localStorage.getItem("crossbody-theme"); '
+    "if (kept) document.documentElement.dataset.theme = kept; } catch { /* a browser may refuse storage to a file */ }"
+)
+"""Runs before anything is drawn, so that a page does not flash."""
+
+
+def policy(scripts: Sequence[str], single: bool) -> str:
+    """The page's Content-Security-Policy: it runs the scripts that stand here and asks nobody for anything.
+
+    Args:
+        scripts: what stands in script elements of the page, told by their hashes.
+        single: whether the page has all its scripts in it; if not, those of the files beside it run too.
+    """
+    hashes = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts)
+    allowed = " ".join([*(f"'sha256-{digest}'" for digest in hashes), *([] if single else ["'self'"])])
+    styles = "'unsafe-inline'" if single else "'unsafe-inline' 'self'"
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src {styles}; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
 
 
 def assets(pages_drawn: bool) -> dict[str, str]:

@@ -8,15 +8,21 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pyarrow import ArrowException
 
 from crossbody.cases import OutputError
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.pages.section import records
+from crossbody.reports.runs.files import listed
+from crossbody.reports.runs.output import is_staged, recover
 from crossbody.reports.runs.store import Trace, load, peek
-from crossbody.reports.runs.study import read_json
+from crossbody.reports.runs.study import check_fields, read_json
 
 COLUMNS = tuple(Verdict.__dataclass_fields__)
+NUMBER = (int, float, type(None))
+JUDGED = {name: NUMBER if name in ("value", "expected", "limit") else (str,) for name in COLUMNS}
+AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,8 +85,12 @@ def read(out: Path, against: Path | None = None) -> Results:
         OutputError: if a folder does not hold results that this version can read.
     """
     told = read_json(out / "provenance.json")
+    if not isinstance(told.get("versions", {}), dict):
+        raise OutputError(f"{out / 'provenance.json'}: versions is not an object.")
     verdicts = verdicts_of(out)
-    audits = _by(read_json(out / "audit.json")["rows"], "case")
+    audited = read_json(out / "audit.json")["rows"]
+    check_fields(out / "audit.json", audited, AUDITED)
+    audits = _by(audited, "case")
     cases, walls = _cases(out, verdicts)
     base = None if against is None else verdicts_of(against)
     return Results(
@@ -104,15 +114,19 @@ def verdicts_of(out: Path) -> pd.DataFrame:
     Raises:
         OutputError: if it does not hold verdicts that this version can read.
     """
+    if out.is_dir() and not is_staged(out):
+        recover(out)
     table = read_json(out / "verdicts.json")
-    rows = pd.DataFrame(table.get("rows", []) if isinstance(table, dict) else [])
+    rows = pd.DataFrame(table["rows"])
     if rows.empty:
         return pd.DataFrame(columns=[*COLUMNS, "label", "who"])
     if lacking := [name for name in COLUMNS if name not in rows]:
-        by = table.get("provenance", {}).get("versions", {}).get("crossbody", "another version")
+        versions = table.get("provenance", {}).get("versions", {})
+        by = versions.get("crossbody", "another version") if isinstance(versions, dict) else "another version"
         raise OutputError(
             f"{out} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; run the cases again."
         )
+    check_fields(out / "verdicts.json", table["rows"], JUDGED)
     return rows.assign(label=rows["case"] + ":" + rows["variant"], who=rows["engine"] + ":" + rows["profile"])
 
 
@@ -122,10 +136,12 @@ def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], di
     abouts: dict[str, Mapping[str, Any]] = {}
     walls: dict[tuple[str, str], float] = {}
     broken: list[str] = []
-    for path in sorted((out / "traces").glob("*.parquet")):
+    for path in (out / "traces" / name for name in listed(out, "traces") if name.endswith(".parquet")):
         try:
             told = peek(path)
-        except (OSError, ValueError, KeyError):
+        except OutputError:
+            raise
+        except (OSError, ValueError, KeyError, ArrowException):
             broken.append(path.name)
             continue
         about = told["about"]

@@ -9,21 +9,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from jinja2 import TemplateError
+
 from crossbody.cases import OutputError
 from crossbody.reports import sections as studies
 from crossbody.reports.pages.case_page import case_page, provenance
-from crossbody.reports.pages.html import PLOTLY, Link, Page, assets, render
+from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
 from crossbody.reports.pages.results import Results, read, verdicts_of
 from crossbody.reports.pages.section import Section
-from crossbody.reports.runs import beside
-from crossbody.reports.runs.output import MARKER, replace_text
+from crossbody.reports.runs import beside, output
+from crossbody.reports.runs.output import replace_text
 from crossbody.reports.runs.study import read_json
 
 INDEX = "index"
 PAGE = f"{INDEX}.html"
-MADE = '<meta name="generator" content="crossbody">'
-"""Stands in every page: what carries it may be replaced."""
 
 
 def check(against: Path | None, others: Sequence[Path]) -> None:
@@ -42,7 +42,8 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
     """Make the pages of a folder that holds results.
 
     Args:
-        out: written by a run, a bench or another study.
+        out: written by a run, a bench or another study; or the folder of a study that is being written, which then
+            has the pages of all studies of its output folder.
         single_file: whether one file holds all pages, style and scripts.
         against: folder of an earlier run; the index then says what has changed since.
         others: folders of studies (a bench, a gap map, ...) whose tables are taken into this one.
@@ -53,23 +54,62 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
     Raises:
         OutputError: if a folder does not hold results, or cannot be written.
     """
-    if not (out / MARKER).is_file():
-        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
-    beside.take(out, others)
-    found = read(out, against)
-    links = _links(found)
-    footer = found.footer
-    made: set[str] = set()
-    if single_file:
-        _put(out, {PAGE: render(list(_pages(found)), links, footer, single=True)})
-        made.add(PAGE)
-    else:
-        for page in _pages(found):
-            _put(out, {f"{page.name}.html": render([page], links, footer)})
-            made.add(f"{page.name}.html")
-        _put(out, assets(pages_drawn=True))
-    _sweep(out, made, single_file)
+    if output.is_staged(out):
+        _make(out, single_file, against, others)
+        return out / PAGE
+    _ours(out)
+    with output.folder(out, "report", adds=True) as made:
+        _make(made, single_file, against, others)
     return out / PAGE
+
+
+def _ours(out: Path) -> None:
+    if not output.is_ours(out):
+        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
+
+
+def _make(made: Path, single_file: bool, against: Path | None, others: Sequence[Path]) -> None:
+    """Put the pages beside the tables of a study that is being written."""
+    out = output.gather(made)
+    beside.take(made, [other for other in others if other.resolve() != out.resolve()])
+    try:
+        found = read(made, against)
+        for name, text in _rendered(found, single_file):
+            _put(made, {name: text})
+    except OutputError as error:  # the hidden folder is nobody's business
+        raise OutputError(str(error).replace(str(made), str(out))) from error
+    if not single_file:
+        _put(made, assets(pages_drawn=True))
+
+
+_BROKEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError, TemplateError)
+"""What making a page of tables raises that are not what they should be."""
+
+
+def _rendered(found: Results, single_file: bool) -> Iterator[tuple[str, str]]:
+    """Name and text of every page, made one after another.
+
+    Raises:
+        OutputError: if a table or a motion is not what a page can show.
+    """
+    try:
+        links = _links(found)
+        if single_file:
+            yield PAGE, render(list(_pages(found)), links, found.footer, single=True)
+            return
+        for page in _pages(found):
+            yield f"{page.name}.html", render([page], links, found.footer)
+    except OutputError:
+        raise
+    except _BROKEN as error:
+        raise OutputError(_unreadable(found, error)) from error
+
+
+def _unreadable(found: Results, error: BaseException) -> str:
+    """Which table has a field that no page can show, as far as can be told."""
+    files = ", ".join(name for name in output.tables(found.out))
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"{found.out} cannot be shown: a field of {files} or of a motion is not as expected ({what})."
 
 
 def write_page(out: Path, name: str, title: str, sections: Sequence[Section], lead: str = "") -> Path:
@@ -81,11 +121,11 @@ def write_page(out: Path, name: str, title: str, sections: Sequence[Section], le
     Raises:
         OutputError: if the folder is not ours, or cannot be written.
     """
-    if not (out / MARKER).is_file():
-        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
+    _ours(out)
     page = Page(name=name, title=title, sections=sections, lead=lead)
     links = (Link(page=INDEX, title="Index"), Link(page=name, title=title))
-    _put(out, {f"{name}.html": render([page], links, "")} | assets(pages_drawn=True))
+    with output.folder(out, "report", adds=True) as made:
+        _put(made, {f"{name}.html": render([page], links, "")} | assets(pages_drawn=True))
     return out / f"{name}.html"
 
 
@@ -95,17 +135,6 @@ def _put(out: Path, files: dict[str, str]) -> None:
             replace_text(out / name, text)
         except OSError as error:
             raise OutputError(f"The page {name} in {out} cannot be written: {error.strerror}.") from None
-
-
-def _sweep(out: Path, made: set[str], single_file: bool) -> None:
-    """Take away pages of an earlier time that belong to nothing any more."""
-    for path in out.glob("*.html"):
-        with path.open(encoding="utf-8", errors="replace") as file:
-            ours = MADE in file.read(400)
-        if ours and path.name not in made:
-            path.unlink()
-    if single_file:
-        (out / PLOTLY).unlink(missing_ok=True)
 
 
 def _studies(found: Results) -> Iterator[Page]:

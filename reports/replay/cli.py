@@ -16,7 +16,8 @@ _Work = TypeVar("_Work", bound=Callable[..., int])
 
 
 def _replayed(command: _Work) -> _Work:
-    """Options that say which log is replayed on which model."""
+    """Options that say which log is replayed on which model; results go to a folder of the command's own."""
+    place = Path("out") / command.__name__
     options = (
         click.argument("path", metavar="LOG", type=click.Path(path_type=Path)),
         click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them."),
@@ -27,7 +28,7 @@ def _replayed(command: _Work) -> _Work:
         click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
         click.option("--horizon", type=float, metavar="S", help="Length of a window, s, if not to the next restart."),
         click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of what was measured, s."),
-        click.option("--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True, metavar="DIR"),
+        click.option("--out", type=click.Path(path_type=Path), default=place, show_default=True, metavar="DIR"),
     )
     for option in reversed(options):
         command = option(command)
@@ -37,13 +38,17 @@ def _replayed(command: _Work) -> _Work:
 @click.command()
 @_replayed
 @click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@click.option(
+    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=3660.0, show_default=True, metavar="S",
+    help="An engine that has not come back by then is ended, s.",
+)  # fmt: skip
 @click.option("--closed-loop", is_flag=True, help="Recorded references through the model's controller.")
 @speaks
-def replay(wanted: tuple[str, ...], closed_loop: bool, out: Path, **log: Any) -> int:
+def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, **log: Any) -> int:
     """Replay LOG on a model and say how well it matches."""
     from crossbody.reports.replay.command import Ask, run_replay
 
-    return run_replay(Ask(**log), "closed_loop" if closed_loop else "forward", wanted, out, _command())
+    return run_replay(Ask(**log), "closed_loop" if closed_loop else "forward", wanted, out, _command(), limit)
 
 
 @click.command()

@@ -10,12 +10,13 @@ from typing import Any
 import pandas as pd
 
 from crossbody import hw
+from crossbody.cases import CaseUnsupported
 from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import voice
 from crossbody.reports.commands import where
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison as replay
-from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs import jobs, output, study, watch
 from crossbody.reports.runs.jobs import DEFAULT_ENGINES
 from crossbody.reports.runs.provenance import provenance
 
@@ -47,7 +48,12 @@ class Ask:
         return hw.read(self.path, self.columns, part=self.part, repair=self.repair)
 
 
-def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: str) -> int:
+def _ended(model: str, engine: str) -> bool:
+    """Whether an engine's process was ended, as it was told what it did."""
+    return any(label.startswith((f"{model} on {engine}:", f"{model} on {engine},")) for label in watch.all_lost())
+
+
+def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: str, limit: float = watch.LIMIT) -> int:
     """Replay a log and write the report.
 
     Args:
@@ -56,20 +62,29 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
         wanted: engines, E or E:PROFILE; all usual ones if empty.
         out: folder to write.
         command: what was typed, for provenance.
+        limit: time after which an engine that has not come back is ended with its process, s.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
     """
     hw.models.load(ask.model)
-    output.check(out)
-    engines = list(wanted or DEFAULT_ENGINES)
-    with voice.progress(len(engines)) as tell:
+    output.check(out, "replay")
+    engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
+    if not engines:
+        raise CaseUnsupported(f"No engine that was asked for has come back: {'; '.join(watch.all_lost())}.")
+    with voice.progress(len(engines)) as bar:
+
+        def tell(text: str) -> None:
+            bar(text)
+            watch.limited(text, limit)
+
         found = hw.replay(
             ask.log(), ask.model, kind=kind, wanted=engines, parameters=jobs.parse_settings(ask.pairs),
             restart=ask.restart, horizon=ask.horizon, delay=ask.delay, tell=tell,
         )  # fmt: skip
+    watch.unlimited()
     rows = replay.verdicts(found, command)
-    _write(out, found, rows, provenance(command, log=replay.log_about(found)), {})
+    _write(out, found, rows, provenance(command, log=replay.log_about(found)), {}, "replay")
     metrics = _metrics(found)
     if not voice.told_as_json({"metrics": metrics, "findings": replay.findings(found)}):
         if not voice.quiet():
@@ -94,7 +109,7 @@ def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: 
         CrossbodyError: for wrong use, before anything is written.
     """
     model = hw.models.load(ask.model)
-    output.check(out)
+    output.check(out, "identify")
     log, given = ask.log(), jobs.parse_settings(ask.pairs)
     fit = hw.identify(
         log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
@@ -110,7 +125,7 @@ def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: 
         "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message,
     }  # fmt: skip
     rows = replay.verdicts(found, command)
-    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables)
+    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables, "identify")
     if not voice.told_as_json(tables | {"warnings": pd.DataFrame({"text": list(fit.warnings)})}):
         if not voice.quiet():
             for shown in tables.values():
@@ -164,15 +179,20 @@ def _say(found: Comparison, metrics: pd.DataFrame) -> None:
 
 
 def _write(
-    out: Path, found: Comparison, rows: pd.DataFrame, told: Mapping[str, Any], more: Mapping[str, pd.DataFrame]
+    out: Path,
+    found: Comparison,
+    rows: pd.DataFrame,
+    told: Mapping[str, Any],
+    more: Mapping[str, pd.DataFrame],
+    name: str,
 ) -> None:
-    with output.folder(out) as made:
+    with output.folder(out, name) as made:
         study.write(made, [], rows, told)
         tables = {
             "replay": _metrics(found), "findings": replay.findings(found), "residuals": replay.residuals(found),
             "correlations": replay.correlations(found), **more,
         }  # fmt: skip
-        for name, shown in tables.items():
-            study.write_table(made / name, shown, told)
+        for stem, shown in tables.items():
+            study.write_table(made / stem, shown, told)
         replay.save_motions(made / "traces", found)
         page.write(made)

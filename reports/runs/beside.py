@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
 from crossbody.cases import OutputError
-from crossbody.reports.runs.output import MARKER
+from crossbody.reports.runs import files
+from crossbody.reports.runs.output import is_ours, recover
 
 OWN = ("verdicts", "audit", "provenance")
 """Of every folder; they stay those of the folder that is taken into."""
@@ -20,9 +20,11 @@ def tables(folder: Path) -> list[Path]:
     Raises:
         OutputError: if it is not one of ours, or holds no study.
     """
-    if not (folder / MARKER).is_file():
+    recover(folder)
+    if not is_ours(folder):
         raise OutputError(f"{folder} was not written by crossbody; name the folder of an earlier study.")
-    found = sorted(path for path in folder.iterdir() if path.suffix in TABLES and path.stem not in OWN)
+    paths = (folder / name for name in files.listed(folder))
+    found = [path for path in paths if path.suffix in TABLES and path.stem not in OWN]
     if not found:
         raise OutputError(
             f"{folder} holds no study: name a folder that crossbody bench, stress, gapmap, stability, bode, analyse, "
@@ -31,16 +33,17 @@ def tables(folder: Path) -> list[Path]:
     return found
 
 
-def take(out: Path, others: Sequence[Path]) -> None:
-    """Copy the tables of other folders into `out`; a study that is there already is replaced.
+def take(made: Path, others: Sequence[Path]) -> None:
+    """Copy the tables of other folders into one that is being written; a study that is there already is replaced.
 
     Raises:
-        OutputError: as `tables`, or if the disk refuses.
+        OutputError: as `tables`, if a table is a link, or if the disk refuses.
     """
-    for path in [path for other in others if other.resolve() != out.resolve() for path in tables(other)]:
-        copy = out / f".{path.name}"
+    for path in [path for other in others for path in tables(other)]:
         try:
-            shutil.copyfile(path, copy)
-            copy.replace(out / path.name)
+            (made / path.name).unlink(missing_ok=True)
+            (made / path.name).write_bytes(files.read_inside(path.parent, path.name))
+        except OutputError:
+            raise
         except OSError as error:
-            raise OutputError(f"{path} cannot be taken into {out}: {error.strerror}.") from None
+            raise OutputError(f"{path} cannot be taken into {made.parent}: {error.strerror}.") from None

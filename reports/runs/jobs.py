@@ -7,17 +7,31 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from crossbody import cases, engines
-from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName, Value
+from crossbody.cases import (
+    Case,
+    CaseUnsupported,
+    EngineUnavailable,
+    InvalidValue,
+    Outcome,
+    Trajectory,
+    UnknownName,
+    Value,
+)
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
+from crossbody.reports.runs import watch
 
 DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
 FINER_STEP = 4.0
 FINEST_TOLERANCE = 1e-12
 _EXAMPLES = {"--set": "a1=0", "--setting": "dt=1e-4"}
+TRUTHS = 3.0
+"""A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
 REFINED_S = 20.0
 """Time that a refinement may take, s: an integrator that grinds to a halt at 1e-12 has none."""
 
@@ -102,6 +116,7 @@ def run_case(
     tell: Callable[[str], None] = lambda _: None,
     settings: Mapping[str, Value] | None = None,
     truth: Truth | None = None,
+    limit: float = watch.LIMIT,
 ) -> CaseResult:
     """Run a case on every engine asked for.
 
@@ -112,20 +127,38 @@ def run_case(
         tell: is told what is being done.
         settings: of the engines, by name; each takes those that it knows.
         truth: of the case, where it is known already.
+        limit: time after which an engine that has not come back is ended with its process, s; from the command line.
 
     Raises:
         UnknownName: for a setting that none of them knows.
     """
     asked = dict(settings or {}) | ({} if rtol is None else {"rtol": rtol})
-    tell(f"{case.label}: truth")
+    label = f"{case.label}: truth"
+    tell(label)
+    watch.limited(label, TRUTHS * limit)
+    if why := watch.lost(label):
+        raise CaseUnsupported(f"{label} cannot be had. {why}")
     truth = truth_of(case) if truth is None else truth
     reference = _reference_audit(case)
     entries = []
     for pick in wanted:
-        tell(f"{case.label}: {pick.engine}:{pick.profile}")
-        entries.append(_entry(case, pick, asked, reference))
+        label = f"{case.label}: {pick.engine}:{pick.profile}"
+        tell(label)
+        watch.limited(label, limit)
+        entries.append(ended(case, pick, why) if (why := watch.lost(label)) else _entry(case, pick, asked, reference))
+    watch.unlimited()
     _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def ended(case: Case, pick: Pick, why: str) -> Entry:
+    """The entry of a run that took its process with it: it got no further than its start."""
+    q, v, nothing = case.q0[None], case.v0[None], np.zeros((1, len(case.contacts)))
+    run = Trajectory(
+        t=np.zeros(1), q=q, v=v, gap=nothing, lam=nothing, energy=np.zeros((1, 2)), mode=nothing.astype(np.int8) - 1,
+        outcome=Outcome.TIME_LIMIT, message=why,
+    )  # fmt: skip
+    return Entry(engine=pick.engine, profile=pick.profile, run=run, settings={})
 
 
 def _check_known(settings: Mapping[str, Value], entries: Sequence[Entry]) -> None:

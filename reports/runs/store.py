@@ -6,14 +6,15 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from crossbody.cases import Event, Ledger, Mode, Outcome, Trajectory
+from crossbody.cases import Event, Ledger, Mode, Outcome, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.reports.runs.files import open_inside
 
 _KEY = b"crossbody"
 _ARRAYS = ("q", "v", "gap", "lam", "energy", "mode")
@@ -97,16 +98,71 @@ def peek(path: Path) -> dict[str, Any]:
     """What is told about a motion, without the motion: `about`, outcome, steps, run time, events.
 
     Raises:
-        OSError, ValueError, KeyError: if it is not one of ours.
+        OutputError: if it is a link.
+        OSError, ValueError, KeyError: if it is not one of ours; says which field is not as expected.
     """
-    told: dict[str, Any] = json.loads(pq.read_schema(path).metadata[_KEY])
-    return told
+    with _opened(path) as file:
+        told = json.loads((pq.read_schema(file).metadata or {})[_KEY])
+    _check(told, "", _TOLD)
+    _check(told["about"], "about.", _ABOUT)
+    known: dict[str, Any] = told
+    return known
+
+
+def _opened(path: Path) -> BinaryIO:
+    """A motion below its folder of results."""
+    whole = path.absolute()
+    return open_inside(whole.parent.parent, f"{whole.parent.name}/{whole.name}")
+
+
+_TOLD: dict[str, type | tuple[type, ...]] = {
+    "about": dict, "events": list, "outcome": str, "message": str, "steps": int, "wall_s": (int, float), "counts": dict,
+}  # fmt: skip
+_ABOUT: dict[str, type | tuple[type, ...]] = {
+    "case": str,
+    "variant": str,
+    "engine": str,
+    "profile": str,
+    "coordinates": list,
+    "contacts": list,
+}
+
+
+def _check(told: Any, where: str, kinds: Mapping[str, type | tuple[type, ...]]) -> None:
+    """Whether what stands beside a motion has the fields that pages use.
+
+    Raises:
+        ValueError: naming the first that it has not.
+    """
+    if not isinstance(told, dict):
+        raise ValueError("its metadata is no object")
+    for name, kind in kinds.items():
+        if not isinstance(given := told.get(name), kind):
+            raise ValueError(f"its field {where}{name} is {str(given)[:60]!r}")
 
 
 def load(path: Path) -> Trace:
-    """Read one motion back."""
-    data = pq.read_table(path)
-    about = json.loads(data.schema.metadata[_KEY])
+    """Read one motion back.
+
+    Raises:
+        OutputError: if it is a link, or not a motion of ours; names file and field.
+    """
+    try:
+        return _loaded(path)
+    except OutputError:
+        raise
+    except _BROKEN as error:
+        raise OutputError(f"{path} is not a motion of crossbody: {type(error).__name__}: {error}.") from None
+
+
+_BROKEN = (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, pa.ArrowException)
+
+
+def _loaded(path: Path) -> Trace:
+    with _opened(path) as file:
+        data = pq.read_table(file)
+    about = json.loads((data.schema.metadata or {})[_KEY])
+    _check(about, "", _TOLD)
     run = replace(
         _motion(data, ""),
         ledger=_ledger(data),

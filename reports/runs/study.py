@@ -16,11 +16,16 @@ from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.reports.judging.comparison import Entry, table, verdicts
 from crossbody.reports.judging.truth import Truth
+from crossbody.reports.judging.verdict import Verdict
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.pages.styles import TRUTH
 from crossbody.reports.pages.thin import keep
+from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, save
+
+CASE = "case.json"
+AUDIT = ["case", "engine", "profile", "quantity", "reference", "value", "difference", "tolerance", "same"]
 
 
 def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> pd.DataFrame:
@@ -38,8 +43,46 @@ def write(out: Path, results: Sequence[CaseResult], rows: pd.DataFrame, provenan
     write_table(out / "verdicts", rows, provenance)
     write_table(out / "audit", _audit(results), provenance)
     (out / "provenance.json").write_text(json.dumps(provenance, indent=2, default=str), encoding="utf-8")
+    _save_traces(out, [trace for result in results for trace in _traces(result)])
+
+
+def write_case(made: Path, result: CaseResult, command: str) -> None:
+    """Write the verdicts, audit and motions of one case into a folder of their own, to be assembled later."""
+    judged = judge([result], {result.case.label: command})
+    told = {"verdicts": judged.to_dict(orient="records"), "audit": _audit([result]).to_dict(orient="records")}
+    (made / CASE).write_text(json.dumps(told, default=_plain), encoding="utf-8")
+    _save_traces(made, _traces(result))
+
+
+def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) -> pd.DataFrame:
+    """Join the folders of `write_case` into one study, as `write` does of results in memory; its verdicts."""
+    told = [_read_case(part) for part in parts]
+    rows = pd.DataFrame([row for one in told for row in one["verdicts"]], columns=list(Verdict.__dataclass_fields__))
+    write_table(out / "verdicts", rows, provenance)
+    write_table(out / "audit", pd.DataFrame([r for one in told for r in one["audit"]], columns=AUDIT), provenance)
+    (out / "provenance.json").write_text(json.dumps(provenance, indent=2, default=str), encoding="utf-8")
     (out / "traces").mkdir()
-    traces = [trace for result in results for trace in _traces(result)]
+    traces = [part / "traces" / name for part in parts for name in files.listed(part, "traces")]
+    for i, trace in enumerate(traces):
+        name = f"{trace.parent.name}/{trace.name}"
+        (out / "traces" / f"{i:04d}.parquet").write_bytes(files.read_inside(trace.parent.parent, name))
+    return rows
+
+
+def _read_case(part: Path) -> dict[str, list[dict[str, Any]]]:
+    try:
+        told: Any = json.loads(files.read_inside(part, CASE))
+        return {name: [dict(row) for row in told[name]] for name in ("verdicts", "audit")}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        raise OutputError(f"{part} is no part of a run; remove {part.parent}.") from None
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
+
+
+def _save_traces(out: Path, traces: Sequence[Trace]) -> None:
+    (out / "traces").mkdir()
     for i, trace in enumerate(traces):
         save(out / "traces" / f"{i:04d}.parquet", trace)
 
@@ -64,8 +107,7 @@ def _audit(results: Sequence[CaseResult]) -> pd.DataFrame:
         }
         for result in results for entry in result.entries for row in entry.audit
     ]  # fmt: skip
-    columns = ["case", "engine", "profile", "quantity", "reference", "value", "difference", "tolerance", "same"]
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(rows, columns=AUDIT)
 
 
 def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
@@ -119,12 +161,52 @@ def _steps(t: Floats) -> list[list[float]]:
 
 
 def read_json(path: Path) -> Any:
-    """A JSON file of a study.
+    """A JSON file of a study; no link is followed.
+
+    A table (any file but `provenance.json`) is checked: `rows` is a list of objects, `provenance` an object.
 
     Raises:
-        OutputError: if it is not there or not readable.
+        OutputError: if it is not there, not readable, a link, or not of that form; names file and field.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json.loads(files.read_inside(path.parent, path.name))
+    except OutputError:
+        raise
+    except (OSError, ValueError, RecursionError):
         raise OutputError(f"{path.parent} is not a finished report folder: {path.name} cannot be read.") from None
+    if not isinstance(found, dict):
+        raise OutputError(f"{path} holds a {type(found).__name__} where an object is expected.")
+    return found if path.name == "provenance.json" else _checked(path, found)
+
+
+def _checked(path: Path, table: dict[str, Any]) -> dict[str, Any]:
+    rows, told = table.get("rows"), table.get("provenance", {})
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise OutputError(f"{path}: rows is not a list of objects.")
+    if not isinstance(told, dict):
+        raise OutputError(f"{path}: provenance is not an object.")
+    return table
+
+
+def check_fields(path: Path, rows: Sequence[Mapping[str, Any]], kinds: Mapping[str, tuple[type, ...]]) -> None:
+    """Check the types of the fields of a table that was read.
+
+    Args:
+        path: of the table.
+        rows: its rows.
+        kinds: field -> the types that it may have; a field that is not there is None.
+
+    Raises:
+        OutputError: naming file, row and field of the first that has another.
+    """
+    for i, row in enumerate(rows):
+        for name, kind in kinds.items():
+            if not isinstance(row.get(name), kind):
+                raise OutputError(
+                    f"{path}: rows[{i}].{name} is {str(row.get(name))[:60]!r}; it must be {_words(kind)}."
+                )
+
+
+def _words(kinds: tuple[type, ...]) -> str:
+    named = {str: "a text", float: "a number", int: "", bool: "true or false", type(None): "null", dict: "an object"}
+    return " or ".join(dict.fromkeys(named.get(kind, kind.__name__) for kind in kinds if named.get(kind, "x")))

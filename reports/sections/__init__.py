@@ -49,6 +49,6 @@ def shown(name: str, out: Path) -> tuple[Section, ...]:
     study = load(name)
     try:
         return study.sections(out)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
         told = f"Another version of crossbody wrote these tables ({error} is not as expected): run the study again."
         return (Section(name=name, title=study.TITLE, text=told),)

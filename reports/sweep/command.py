@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,14 +16,14 @@ from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports import suites, voice
 from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.pages import site as page
-from crossbody.reports.runs import jobs, study
+from crossbody.reports.runs import jobs, output, study, watch
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.suites._contract import Suite
 from crossbody.reports.sweep import draw, pools
 from crossbody.reports.sweep.map import STABILITY, stability_map, summary
 from crossbody.reports.sweep.minimise import failures, reproducers
 from crossbody.reports.sweep.spec import Spec
-from crossbody.reports.sweep.store import SWEEP, Store, identity
+from crossbody.reports.sweep.store import STRESS, SWEEP, Store, identity
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,6 +43,7 @@ class Ask:
     seed: int = 0
     jobs: int = 0
     scheduler: str | None = None
+    tls: pools.Tls = field(default_factory=pools.Tls)
     resume: bool = False
 
 
@@ -57,8 +57,9 @@ def stress(ask: Ask, out: Path, command: str) -> int:
     chunk = min(max(len(specs) // CHUNKS, LEAST), MOST)
     if ask.resume and not (out / SWEEP).is_file():
         raise OutputError(f"{out} holds no sweep to go on with; leave --resume out to begin one.")
-    with _client(ask.scheduler) as client:
+    with _client(ask.scheduler, ask.tls) as client:
         store = Store(out, identity(specs, chunk, {"seed": ask.seed}))
+        watch.resumable(f"What is complete is kept in {out}; the same command goes on with it.")
         sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=voice.silent())
     rows, times = store.table()
     with _bar(None, quiet=voice.silent()) as tell:
@@ -97,12 +98,14 @@ class Pool:
 
 
 @contextmanager
-def _client(address: str | None) -> Iterator[Any]:
+def _client(address: str | None, tls: pools.Tls) -> Iterator[Any]:
     """The cluster, asked for before anything is written."""
     if address is None:
+        if tls != pools.Tls():
+            raise InvalidValue("--tls-ca, --tls-cert and --tls-key are for the connection to a --scheduler.")
         yield None
         return
-    client = pools.connect(address)
+    client = pools.connect(address, tls)
     try:
         yield client
     finally:
@@ -133,22 +136,14 @@ def _executed(left: Sequence[pools.Chunk], pool: Pool) -> Iterable[tuple[int, po
 
 
 def _finish(store: Store, rows: pd.DataFrame, times: pd.DataFrame, small: pd.DataFrame, told: dict[str, Any]) -> None:
-    """Tables and page into the sweep's folder; each file whole or not there."""
+    """Tables and page into the sweep's folder, all or nothing."""
     tables = {"stress": rows, "stress_times": times, "reproducers": small, "stress_map": stability_map(rows)}
     tables["stress_summary"] = summary(rows, times)
-    try:
-        (store.path / "traces").mkdir(exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".", dir=store.path) as name:
-            made = Path(name)
-            study.write(made, [], study.judge([], {}), told)
-            for stem, table in tables.items():
-                study.write_table(made / stem, table, told)
-            for file in made.iterdir():
-                if file.is_file():
-                    os.replace(file, store.path / file.name)
-    except OSError as error:
-        raise OutputError(f"Folder {store.path} cannot be written: {error.strerror or error}.") from error
-    page.write(store.path)
+    with output.folder(store.path, STRESS) as made:
+        study.write(made, [], study.judge([], {}), told)
+        for stem, table in tables.items():
+            study.write_table(made / stem, table, told)
+        page.write(made)
 
 
 @contextmanager

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
 
-from crossbody.cases import SchedulerUnavailable
+from crossbody.cases import InvalidValue, SchedulerUnavailable
 from crossbody.reports.sweep.execute import crashed, execute
 from crossbody.reports.sweep.spec import Spec
 
@@ -83,11 +83,53 @@ def warm(chunks: Sequence[Chunk]) -> None:
                 execute(replace(spec, max_steps=1, second=False, ends=False))
 
 
-def connect(address: str) -> Any:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tls:
+    """Files (PEM) by which both ends of a connection to a cluster prove who they are.
+
+    Attributes:
+        ca: certificates that are trusted.
+        cert: this end's own certificate.
+        key: its private key; empty where the certificate's file holds it.
+    """
+
+    ca: str = ""
+    cert: str = ""
+    key: str = ""
+
+    def security(self) -> Any:
+        """What distributed wants of it; None where nothing is given.
+
+        Raises:
+            InvalidValue: if one of `ca` and `cert` is missing, or a file cannot be read as what it should be.
+        """
+        if self == Tls():
+            return None
+        if not (self.ca and self.cert):
+            raise InvalidValue("--tls-ca and --tls-cert belong together: both ends of a connection have to be known.")
+        from distributed import Security
+
+        security = Security(
+            tls_ca_file=self.ca, tls_client_cert=self.cert, tls_client_key=self.key or None, require_encryption=True
+        )
+        try:
+            security.get_connection_args("client")
+        except OSError as error:  # ssl.SSLError is one
+            files = ", ".join(filter(None, (self.ca, self.cert, self.key)))
+            raise InvalidValue(f"--tls-ca, --tls-cert, --tls-key ({files}) cannot be used: {error}.") from None
+        return security
+
+
+def connect(address: str, tls: Tls | None = None) -> Any:
     """A client of a dask.distributed cluster.
+
+    Args:
+        address: tcp://HOST:PORT, or tls://HOST:PORT with `tls`.
+        tls: who both ends are; without it the connection is neither encrypted nor authenticated.
 
     Raises:
         SchedulerUnavailable: if the package is not installed, or nothing answers at the address in time.
+        InvalidValue: if the files of `tls` cannot be used.
     """
     try:
         from distributed import Client
@@ -95,10 +137,18 @@ def connect(address: str) -> Any:
         raise SchedulerUnavailable(
             "--scheduler needs the package 'distributed', which is not installed: pip install 'crossbody[cluster]'."
         ) from None
+    security = (tls or Tls()).security()
     try:
-        asyncio.run(_greet(address))
-        return Client(address, timeout=ANSWER, set_as_default=False)
-    except (TimeoutError, OSError, ValueError, MemoryError) as error:  # words of another protocol read as a huge size
+        asyncio.run(_greet(address, security))
+        return Client(address, timeout=ANSWER, set_as_default=False, security=security)
+    except (
+        TimeoutError,
+        OSError,
+        ValueError,
+        MemoryError,
+        TypeError,
+        RuntimeError,
+    ) as error:  # words of another protocol read as a huge size
         said = " ".join(str(error).split()) or type(error).__name__
         raise SchedulerUnavailable(
             f"No dask scheduler answers at {address!r} within {ANSWER:g} s ({said}); "
@@ -106,11 +156,12 @@ def connect(address: str) -> Any:
         ) from None
 
 
-async def _greet(address: str) -> None:
+async def _greet(address: str, security: Any) -> None:
     """Shake hands once: a client waits for ever for one that listens and says nothing."""
     from distributed.comm import connect as reach
 
-    comm = await asyncio.wait_for(reach(address, timeout=ANSWER), ANSWER)
+    given = {} if security is None else security.get_connection_args("client")
+    comm = await asyncio.wait_for(reach(address, timeout=ANSWER, **given), ANSWER)
     await comm.close()
 
 

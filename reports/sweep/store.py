@@ -13,14 +13,17 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pyarrow import ArrowException
 
 from crossbody import cases, engines, reference
 from crossbody.cases import OutputError
 from crossbody.reports import judging, metrics, sweep
-from crossbody.reports.runs import output
+from crossbody.reports.runs import files, manifest, output
 from crossbody.reports.sweep.execute import COLUMNS, TIMES
 from crossbody.reports.sweep.spec import Spec
 
+STRESS = "stress"
+"""The study's name; its parts and what says which sweep they are of are no tables, and stay when these are replaced."""
 SWEEP, PARTS = "sweep.json", "parts"
 
 
@@ -59,23 +62,34 @@ class Store:
         self._open()
 
     def _open(self) -> None:
-        output.check(self.path)
+        output.check(self.path, STRESS)
         known = self.path / SWEEP
-        if known.is_file():
+        if os.path.lexists(known):
             self._compare(known)
-        elif self.path.is_dir() and any(self.path.iterdir()):
-            raise OutputError(f"{self.path} holds another command's report; name a new folder for the sweep.")
-        (self.path / PARTS).mkdir(parents=True, exist_ok=True)
-        output.replace_text(self.path / output.MARKER, "Written by crossbody; it may be replaced by the next run.\n")
-        if not known.is_file():
-            output.replace_text(known, json.dumps(self.about, indent=1))
-        for stale in (self.path / PARTS).glob(".*"):
-            stale.unlink(missing_ok=True)
+        else:
+            self._begin()
+        for stale in self._names():
+            if stale.startswith("."):
+                (self.path / PARTS / stale).unlink(missing_ok=True)
+
+    def _begin(self) -> None:
+        """Make the folder and its marker, unless it is ours already, then what says which sweep it is."""
+        if os.path.lexists(self.path / PARTS):
+            raise OutputError(f"{self.path / PARTS} is in the way; move it, or name a new folder for the sweep.")
+        self.path.mkdir(parents=True, exist_ok=True)
+        if not output.is_ours(self.path):
+            manifest.write(self.path, manifest.Manifest())
+        output.replace_text(self.path / SWEEP, json.dumps(self.about, indent=1))
+
+    def _names(self) -> list[str]:
+        """Names of the parts; their folder is made where it is not there, and no link to another is followed."""
+        with files.directory(self.path, PARTS, make=True):
+            return files.listed(self.path, PARTS)
 
     def _compare(self, known: Path) -> None:
         try:
-            before = json.loads(known.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            before = dict(json.loads(files.read_inside(known.parent, known.name)))
+        except (OSError, ValueError, TypeError, RecursionError):
             raise OutputError(f"{known} cannot be read; name a new folder for the sweep.") from None
         other = [key for key in {**before, **self.about} if before.get(key) != self.about.get(key)]
         if other:
@@ -107,10 +121,20 @@ class Store:
 
     def table(self) -> tuple[pd.DataFrame, pd.DataFrame]:
         """All rows in the order of the sweep, and apart from them how long each took: that is never the same twice."""
-        parts = [pd.read_parquet(path) for path in sorted((self.path / PARTS).glob("*.parquet"))]
+        names = [name for name in self._names() if name.endswith(".parquet") and not name.startswith(".")]
+        parts = [self._read(name) for name in names]
         joined = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=[*COLUMNS, TIMES[1]])
         joined = joined.sort_values("index", ignore_index=True)
         return joined[list(COLUMNS)], joined[list(TIMES)]
+
+    def _read(self, name: str) -> pd.DataFrame:
+        try:
+            with files.open_inside(self.path, f"{PARTS}/{name}") as file:
+                return pd.read_parquet(file)[[*COLUMNS, TIMES[1]]]
+        except OutputError:
+            raise
+        except (OSError, ValueError, KeyError, ArrowException) as error:
+            raise OutputError(f"{self.path / PARTS / name} is no part of a sweep ({error}); remove it.") from None
 
 
 def _short(value: Any) -> str:

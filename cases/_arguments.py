@@ -1,0 +1,73 @@
+"""Arguments of the entry points: what has the wrong type is told in a sentence, not in a traceback from inside."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Any, TypeVar
+
+import numpy as np
+
+from crossbody.cases._errors import InvalidValue
+
+_Kind = TypeVar("_Kind")
+SHOWN = 80
+
+
+def shown(value: object) -> str:
+    """A value in a message: cut where it is long, and never a fault of its own."""
+    try:
+        text = repr(value)
+    except Exception:
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
+
+
+def instance(where: str, value: object, kind: type[_Kind], wanted: str) -> _Kind:
+    """Return a value of a type.
+
+    Raises:
+        InvalidValue: if it is of another; `wanted` says in words what it must be.
+    """
+    if not isinstance(value, kind):
+        raise InvalidValue(f"{where} is {shown(value)}; it must be {wanted}.")
+    return value
+
+
+def path(where: str, value: object) -> str:
+    """Return a path as text.
+
+    Raises:
+        InvalidValue: if it is none, or no file system can have it.
+    """
+    if not isinstance(value, (str, os.PathLike)) or "\0" in (text := str(value)) or not text:
+        raise InvalidValue(f"{where} is {shown(value)}; it must be a path.")
+    return text
+
+
+def real(where: str, value: object) -> float:
+    """Return a number as a float; infinite ones too.
+
+    Raises:
+        InvalidValue: if it is no real number, or not a number.
+    """
+    if not isinstance(value, (int, float, np.integer, np.floating, np.bool_)):
+        raise InvalidValue(f"{where} is {shown(value)}; it must be a number.")
+    try:
+        found = float(value)
+    except OverflowError:
+        found = math.nan
+    if math.isnan(found):
+        raise InvalidValue(f"{where} is {shown(value)}; it must be a number of double precision.")
+    return found
+
+
+def flag(where: str, value: Any) -> bool:
+    """Return a switch.
+
+    Raises:
+        InvalidValue: if it is neither true nor false (nor 1 nor 0).
+    """
+    if not isinstance(value, (bool, int, float, np.bool_, np.integer, np.floating)) or value not in (0, 1):
+        raise InvalidValue(f"{where} is {shown(value)}; valid: True, False.")
+    return bool(value)

@@ -1,0 +1,149 @@
+"""Which files of a folder are whose: every study lists its own, and nothing else is ever replaced or removed."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from crossbody.cases import OutputError
+from crossbody.reports.runs import files
+
+MARKER = ".crossbody"
+"""Holds the manifest; stands in every folder that crossbody wrote."""
+PAGES, EARLIER = "pages", "earlier"
+"""What is made from the tables of all studies; what a version without manifests wrote."""
+JUDGED = frozenset({"run", "replay", "identify"})
+"""Studies with verdicts: a folder holds those of one of them."""
+ASSETS = frozenset({"plotly.min.js", "crossbody.css", "crossbody.js"})
+_TABLE = re.compile(r"[a-z][a-z_-]*\.(json|csv|parquet)")
+_MOTION = re.compile(r"traces/[0-9]{4,}\.parquet")
+_BASE = re.compile(r"(verdicts|audit|provenance)\.(json|csv|parquet)")
+
+
+def is_page(name: str) -> bool:
+    """Whether a file is made from tables and can be made again."""
+    return name.endswith(".html") or name in ASSETS
+
+
+def is_table(name: str) -> bool:
+    """Whether a file may be a table of a study."""
+    return _TABLE.fullmatch(name) is not None
+
+
+def is_base(name: str) -> bool:
+    """Whether every folder has this file: a study without verdicts writes it only where nobody has."""
+    return _BASE.fullmatch(name) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """What crossbody wrote into a folder.
+
+    Attributes:
+        studies: name of a study -> relative names of its files.
+    """
+
+    studies: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    @property
+    def files(self) -> frozenset[str]:
+        """All files that are crossbody's."""
+        return frozenset().union(*self.studies.values())
+
+    def owner(self, name: str) -> str:
+        """The study that a file belongs to; empty if it is the user's."""
+        return next((study for study, names in self.studies.items() if name in names), "")
+
+    def judged(self) -> str:
+        """The study whose verdicts the folder holds; empty if there is none."""
+        return next((study for study in self.studies if study in JUDGED), "")
+
+    def updated(self, study: str, names: Iterable[str], adds: bool = False) -> Manifest:
+        """The manifest after a study has been written.
+
+        Args:
+            study: its name.
+            names: its files, pages among them.
+            adds: whether the study keeps the files that it had.
+        """
+        given = frozenset(names)
+        pages, own = frozenset(filter(is_page, given)), frozenset(name for name in given if not is_page(name))
+        gone = set() if adds else {study} | ({EARLIER} if study in JUDGED else set())
+        left = {key: value - own for key, value in self.studies.items() if key not in {*gone, PAGES}}
+        kept = self.studies.get(PAGES, frozenset()) if "index.html" not in pages else frozenset()
+        merged = {**left, study: left.get(study, frozenset()) | own, PAGES: kept | pages}
+        return Manifest({key: value for key, value in merged.items() if value})
+
+
+def read(folder: Path) -> Manifest:
+    """Read the manifest of a folder; of one that an earlier version wrote, what is recognised as its own.
+
+    Raises:
+        OutputError: if the manifest is none.
+    """
+    try:
+        text = files.read_inside(folder, MARKER).decode("utf-8", errors="replace")
+    except FileNotFoundError:
+        return Manifest()
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"{folder / MARKER} cannot be read: {error.strerror}.") from None
+    if not text.lstrip().startswith("{"):
+        return Manifest({EARLIER: frozenset(_recognised(folder))})
+    return Manifest(_studies(folder / MARKER, text))
+
+
+def _studies(path: Path, text: str) -> dict[str, frozenset[str]]:
+    """Studies of a manifest, every name looked at: files are removed by it."""
+    try:
+        found: Any = json.loads(text)["studies"]
+        told = {str(study): frozenset(names) for study, names in found.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise OutputError(f"{path} is not a manifest of crossbody: it has no table `studies` of lists.") from None
+    for study, names in told.items():
+        if wrong := [name for name in names if not files.is_plain(name)]:
+            raise OutputError(f"{path}: studies.{study} names {wrong[0]!r}, which is no file of this folder.")
+    return told
+
+
+def _recognised(folder: Path) -> list[str]:
+    found = files.walked(folder)
+    tables = set(filter(is_table, found))
+    whole = {n for n in tables if n == "provenance.json" or {Path(n).with_suffix(s).name for s in SUFFIXES} <= tables}
+    return [n for n in found if n in whole or _MOTION.fullmatch(n) or n in ASSETS or _is_generated(folder, n)]
+
+
+SUFFIXES = (".json", ".csv", ".parquet")
+
+
+def _is_generated(folder: Path, name: str) -> bool:
+    if not name.endswith(".html") or "/" in name:
+        return False
+    with files.open_inside(folder, name) as file:
+        return b'<meta name="generator" content="crossbody">' in file.read(400)
+
+
+def write(folder: Path, manifest: Manifest) -> None:
+    """Write the manifest of a folder, whole or not at all."""
+    told = {"written by": "crossbody", "studies": {key: sorted(value) for key, value in manifest.studies.items()}}
+    replace_text(folder / MARKER, json.dumps(told, indent=1) + "\n")
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write one file of a folder that is ours already, whole or not at all; a link there is replaced, not followed."""
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+            os.fchmod(file.fileno(), 0o644)
+        os.replace(name, path)
+    except BaseException:
+        os.unlink(name)
+        raise

@@ -1,0 +1,117 @@
+"""What is complete of a command that is still running: each part is on disk as soon as it is there.
+
+The same command goes on with them if it was interrupted or killed; when it comes to its end they are taken away.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from crossbody.cases import OutputError
+from crossbody.reports import voice
+from crossbody.reports.runs import files, manifest, watch
+
+PARTS = ".crossbody-parts."
+ABOUT = "command.json"
+
+
+class Parts:
+    """The parts of one command in its output folder; the folder is made for them.
+
+    Args:
+        out: the output folder, as `output.check` lets it pass.
+        command: what was typed.
+        identity: what decides what comes out: two commands with the same identity share their parts.
+
+    Raises:
+        OutputError: if the disk refuses, or another process is running the same command here.
+    """
+
+    def __init__(self, out: Path, command: str, identity: Mapping[str, Any]) -> None:
+        digest = hashlib.sha256(json.dumps(identity, sort_keys=True, default=repr).encode()).hexdigest()[:16]
+        self.out, self.path = out.absolute(), out.absolute() / f"{PARTS}{digest}"
+        self.command, self.found = command, 0
+        try:
+            self._open()
+        except OutputError:
+            raise
+        except OSError as error:
+            raise OutputError(f"Output folder {out} cannot be written: {error.strerror or error}.") from None
+
+    def _open(self) -> None:
+        self.out.mkdir(parents=True, exist_ok=True)
+        with files.directory(self.out, self.path.name, make=True) as handle:
+            self.lock = os.dup(handle)
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise OutputError(f"The same command is running in {self.out} already; name another folder.") from None
+        for name in files.listed(self.path):
+            if name.startswith("."):
+                shutil.rmtree(self.path / name, ignore_errors=True)
+        self.found = len([name for name in files.listed(self.path) if name != ABOUT])
+        manifest.replace_text(self.path / ABOUT, json.dumps({"command": self.command}))
+        watch.resumable(f"Nothing was replaced; what is complete is kept in {self.out}, and the same command goes on.")
+        self._tell()
+
+    def _tell(self) -> None:
+        """Say what is there already, of this command and of others."""
+        if self.found:
+            voice.note(
+                f"{self.found} parts of an interrupted run of this command are in {self.out}: it goes on with them."
+            )
+        for name in files.listed(self.out):
+            if name.startswith(PARTS) and name != self.path.name and not (self.out / name).is_symlink():
+                _offer(self.out / name)
+
+    def part(self, key: str) -> Path:
+        """Folder of a part, which is there if the part is complete."""
+        return self.path / hashlib.sha256(key.encode()).hexdigest()[:16]
+
+    def has(self, key: str) -> bool:
+        """Whether a part is complete."""
+        part = self.part(key)
+        return part.is_dir() and not part.is_symlink()
+
+    @contextmanager
+    def put(self, key: str) -> Iterator[Path]:
+        """Write a part into a folder that counts when all is written."""
+        made = Path(tempfile.mkdtemp(prefix=".", dir=self.path))
+        try:
+            yield made
+            os.rename(made, self.part(key))
+        except OSError as error:
+            raise OutputError(f"{made} cannot be written: {error.strerror or error}.") from error
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+        self.found += 1
+
+    def __enter__(self) -> Parts:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Take the parts away when what they were for is written, and where there are none."""
+        if kind is None or not self.found:
+            shutil.rmtree(self.path, ignore_errors=True)
+            with suppress(OSError):
+                self.out.rmdir()  # if it is empty
+        os.close(self.lock)
+
+
+def _offer(left: Path) -> None:
+    try:
+        told = json.loads(files.read_inside(left, ABOUT))
+        command = str(told["command"])
+    except (OSError, ValueError, KeyError, TypeError):
+        command = "a command"
+    count = len([name for name in files.listed(left) if name != ABOUT and not name.startswith(".")])
+    voice.note(f"{left} holds {count} parts of an interrupted `{command}`: repeat that to go on, or remove the folder.")

@@ -1,0 +1,238 @@
+"""A command in a process of its own: Ctrl-C stops it within a second, and what hangs or crashes in there is told.
+
+Compiled code does not come back to the interpreter until it is done, and a kernel may never be: no signal handler and
+no thread of the same process reaches it. The command therefore runs in a child, and its parent does nothing but watch:
+it forwards an interrupt and ends the child if that does not help, and it ends the child when a run takes longer than it
+may. The command is then begun again without that run; what was complete is on disk and is not done twice.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import mmap
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+GRACE = 0.6
+"""Time that an interrupted command has to put its things in order, s."""
+LIMIT = 3660.0
+"""Time that one engine may take for one scene, s: what the reference allows itself, and a minute."""
+TICK = 0.2
+_ROOM = 1 << 16
+_PARENT_DEATH = 1  # PR_SET_PDEATHSIG
+
+
+class Stopped(BaseException):
+    """The user interrupts the command. Not a KeyboardInterrupt, which a run takes as the end of itself alone."""
+
+
+class _Diary:
+    """What the child is doing, where the parent can read it even when the child is gone."""
+
+    def __init__(self) -> None:
+        self.pages = mmap.mmap(-1, _ROOM)
+
+    def write(self, **told: object) -> None:
+        text = json.dumps(self.read() | told).encode()[: _ROOM - 8]
+        self.pages[8 : 8 + len(text)] = text
+        self.pages[:8] = len(text).to_bytes(8, "little")
+
+    def read(self) -> dict[str, object]:
+        size = int.from_bytes(self.pages[:8], "little")
+        try:
+            return dict(json.loads(bytes(self.pages[8 : 8 + size]))) if size else {}
+        except ValueError:  # it was killed while it wrote
+            return {}
+
+
+_diary: _Diary | None = None
+_lost: dict[str, str] = {}
+
+
+def limited(label: str, seconds: float = LIMIT) -> None:
+    """Say what is run from now on and how long it may take, s; nothing but that is lost if it hangs or crashes."""
+    if _diary is not None:
+        _diary.write(label=label, until=time.monotonic() + seconds, seconds=seconds)
+
+
+def unlimited() -> None:
+    """Say that what is done from now on may take as long as it likes."""
+    if _diary is not None:
+        _diary.write(label="", until=0.0)
+
+
+def resumable(how: str) -> None:
+    """Say in one sentence what an interrupt leaves, and how to go on."""
+    if _diary is not None:
+        _diary.write(how=how)
+
+
+def lost(label: str) -> str:
+    """Why something was ended that is not to be tried again; empty if it was not."""
+    return _lost.get(label, "")
+
+
+def all_lost() -> tuple[str, ...]:
+    """Everything that was ended."""
+    return tuple(_lost)
+
+
+def watched(command: Callable[[], int]) -> int:
+    """Run a command in a child and watch it; its exit code.
+
+    Returns:
+        What the command returns; 130 if it was interrupted, 143 if it was told to end, 3 if it crashed outside the
+        runs that it had named, at least 1 if one of these had to be ended.
+    """
+    global _diary
+    _diary = _Diary()
+    _lost.clear()
+    while True:
+        status, signalled = _Watch(command, _diary).wait()
+        if signalled:
+            return _say_stopped(signalled, _diary.read())
+        if os.WIFEXITED(status):
+            return max(os.WEXITSTATUS(status), 1 if _lost else 0)
+        label = str(_diary.read().get("label", ""))
+        if not label or label in _lost:
+            return _say(f"the command was ended by {_name(os.WTERMSIG(status))}; please report it.", 3)
+        _lost[label] = _why(os.WTERMSIG(status), _diary.read())
+        _say(f"{label}: {_lost[label]} The rest goes on without it.", 1)
+
+
+def _why(number: int, told: dict[str, object]) -> str:
+    if number == signal.SIGKILL and time.monotonic() >= float(str(told.get("until", "inf"))):
+        return f"It did not come back within {float(str(told['seconds'])):g} s and was ended; see --time-limit."
+    return f"Its process was ended by {_name(number)}."
+
+
+def _name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
+
+
+def _say(text: str, code: int) -> int:
+    sys.stderr.write(f"crossbody: {text}\n")
+    sys.stderr.flush()
+    return code
+
+
+def _say_stopped(number: int, told: dict[str, object]) -> int:
+    how = str(told.get("how") or "Nothing was replaced.")
+    if sys.stderr.isatty():  # a bar may have hidden the cursor
+        sys.stderr.write("\r\x1b[K\x1b[?25h")
+    return _say(f"interrupted. {how}", 128 + number)
+
+
+class _Watch:
+    """One child and its parent."""
+
+    def __init__(self, command: Callable[[], int], diary: _Diary) -> None:
+        self.command, self.diary = command, diary
+        self.child, self.signalled, self.deadline = 0, 0, 0.0
+
+    def wait(self) -> tuple[int, int]:
+        """The child's status when it is gone, and the signal by which the user stopped it (0: none)."""
+        stopping = (signal.SIGINT, signal.SIGTERM)
+        signal.pthread_sigmask(signal.SIG_BLOCK, stopping)  # none is lost between fork and handler
+        self.diary.write(label="", until=0.0)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self.child = os.fork()
+        if not self.child:
+            _obey(self.command)
+        before = [signal.signal(number, self._stop) for number in stopping]
+        alarm = signal.signal(signal.SIGALRM, self._look)
+        signal.setitimer(signal.ITIMER_REAL, TICK, TICK)
+        try:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, stopping)
+            return os.waitpid(self.child, 0)[1], self.signalled
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            for number, handler in zip((*stopping, signal.SIGALRM), (*before, alarm), strict=True):
+                signal.signal(number, handler)
+
+    def _stop(self, number: int, _frame: FrameType | None) -> None:
+        """Forward the first interrupt; end the child at the second."""
+        if self.signalled:
+            _end(self.child)
+            return
+        self.signalled, self.deadline = number, time.monotonic() + GRACE
+        os.kill(self.child, signal.SIGINT)
+
+    def _look(self, _number: int, _frame: FrameType | None) -> None:
+        now = time.monotonic()
+        until = float(str(self.diary.read().get("until", 0.0)))
+        if (self.signalled and now >= self.deadline) or (until and now >= until):
+            _end(self.child)
+
+
+def _end(process: int) -> None:
+    """Kill a process and all that it has begun."""
+    for child in _children(process):
+        _end(child)
+    try:
+        os.kill(process, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+
+
+def _children(process: int) -> list[int]:
+    try:
+        tasks = list(Path(f"/proc/{process}/task").iterdir())
+        return [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    except OSError:
+        return []
+
+
+def _obey(command: Callable[[], int]) -> None:
+    """Be the child: run the command, and leave without the parent's last words."""
+    code = 3
+    try:
+        _die_with_parent()
+        signal.signal(signal.SIGINT, _stop_once)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
+        code = command()
+    except Stopped:
+        code = 130
+    except BaseException:  # none is expected; it must not go unseen
+        traceback.print_exc()
+    finally:
+        _leave(code)
+
+
+def _leave(code: int) -> None:
+    """End as an interpreter does that comes to its end: threads joined, exit functions called, streams flushed."""
+    import atexit
+    import threading
+
+    try:
+        getattr(threading, "_shutdown", lambda: None)()
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        os._exit(code)
+
+
+def _stop_once(_number: int, _frame: FrameType | None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal tells parent and child, and users are impatient
+    raise Stopped
+
+
+def _die_with_parent() -> None:
+    """Have the system end this process with its parent, where it can."""
+    try:
+        ctypes.CDLL(None).prctl(_PARENT_DEATH, signal.SIGKILL)
+    except (OSError, AttributeError):
+        return

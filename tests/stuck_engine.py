@@ -1,0 +1,47 @@
+"""The command `crossbody` with engines that take their time, never come back, or take their process with them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reports import cli
+
+
+def patched(arguments: list[str] | None) -> int:
+    """Obey with the engine `fake` beside the others; what is heavy is imported here, as by the command itself."""
+    import ctypes
+    import os
+    import signal
+    import time
+    from types import SimpleNamespace
+
+    from crossbody import engines
+    from crossbody.reports.judging.truth import truth_of
+
+    def act(case: Any, profile: str) -> Any:
+        if profile == "stuck":
+            ctypes.PyDLL(None).sleep(1000)  # as compiled code does: the interpreter is not let go
+        if profile == "slow":
+            time.sleep(1.0)
+        if profile == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if profile == "fault":
+            raise LookupError("a fault of its own")
+        return truth_of(case).trajectory
+
+    def prepare(case: Any, profile: str = "exact", **_: Any) -> Any:
+        return SimpleNamespace(
+            case=case, profile=profile, engine="fake", settings={"dt": 1e-3}, audit=dict,
+            run=lambda: act(case, profile),
+        )  # fmt: skip
+
+    profiles = dict.fromkeys(("exact", "slow", "stuck", "crash", "fault"), "")
+    fake, real = SimpleNamespace(name="fake", profiles=profiles, versions={}, prepare=prepare), engines.load
+    engines.names = lambda: ("fake",)
+    engines.load = lambda name: fake if name == "fake" else real(name)
+    return obey(arguments)
+
+
+if __name__ == "__main__":
+    obey, cli._obey = cli._obey, patched
+    cli.main()

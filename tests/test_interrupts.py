@@ -1,0 +1,143 @@
+"""Ctrl-C stops a command within a second, keeps what is complete and says how to go on; what hangs is ended."""
+
+from __future__ import annotations
+
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+STUCK = Path(__file__).parent / "stuck_engine.py"
+SECOND = 1.0
+"""Within this a command has stopped, s; start-up of the interpreter is no part of it."""
+
+
+BALLS = """from crossbody.cases.bouncing_ball import PARAMETERS, build
+
+VARIANTS = {"linear": {"a0": 1e4, "a1": 20.0, "a2": 0.0}, "resting": {"a2": 0.0}}
+"""
+
+
+def begun(*words: str, cwd: Path) -> subprocess.Popen[str]:
+    (cwd / "balls.py").write_text(BALLS)
+    command = [sys.executable, str(STUCK), *words]
+    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def finished(process: subprocess.Popen[str]) -> tuple[int, str]:
+    """Exit code and what was said on stderr, of a command that comes to its end."""
+    _, said = process.communicate(timeout=180)
+    return process.returncode, said
+
+
+def interrupted(process: subprocess.Popen[str]) -> tuple[int, str]:
+    """Exit code and what was said on stderr."""
+    process.send_signal(signal.SIGINT)
+    began = time.monotonic()
+    _, said = process.communicate(timeout=20)
+    assert time.monotonic() - began < SECOND + 0.5 * load()
+    return process.returncode, said
+
+
+def load() -> float:
+    """Of a machine that is shared, processes a processor."""
+    return max(0.0, float(Path("/proc/loadavg").read_text().split()[0]) / 2.0 - 1.0)
+
+
+def wait_for(path: Path, pattern: str, process: subprocess.Popen[str], count: int = 1) -> None:
+    while len(list(path.glob(pattern))) < count:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+
+
+def content(out: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file() and p.name[0] != "."}
+
+
+PARTS = ".crossbody-parts.*/" + 16 * "[0-9a-f]"
+
+
+def test_what_is_complete_is_kept_and_the_same_command_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    code, said = finished(begun("run", "balls.py", "--variant", "linear", "-e", "fake:exact", cwd=tmp_path))
+    assert code == 0, said
+    (out / "notes.md").write_text("mine")
+    before = {name: text for name, text in content(out).items()}
+    words = ("run", "balls.py", "-e", "fake:slow")
+    process = begun(*words, cwd=tmp_path)
+    wait_for(out, PARTS, process)
+    code, said = interrupted(process)
+    assert code == 130
+    assert "what is complete is kept in" in said
+    assert "the same command goes on" in said
+    assert content(out).items() >= before.items()
+    kept = len(list(out.glob(PARTS)))
+    code, said = finished(begun(*words, cwd=tmp_path))
+    assert code in (0, 1)
+    assert f"{kept} parts of an interrupted run" in said
+    assert set(pd.read_parquet(out / "verdicts.parquet")["variant"]) > {"linear"}
+    assert (out / "notes.md").read_text() == "mine"
+    assert not list(out.glob(".crossbody-*"))
+
+
+def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:
+    process = begun("run", "balls.py", "--variant", "linear", "-e", "fake:stuck", cwd=tmp_path)
+    wait_for(tmp_path, "out/.crossbody-parts.*", process)
+    time.sleep(1.0)
+    code, said = interrupted(process)
+    assert code == 130
+    assert "interrupted" in said
+    assert not (tmp_path / "out" / "index.html").exists()
+
+
+def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_path: Path) -> None:
+    words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", "4")
+    code, said = finished(begun("run", "balls.py", "--variant", "linear", *words, cwd=tmp_path))
+    assert code == 1, said
+    assert "fake:stuck: It did not come back within 4 s and was ended" in said
+    assert "fake:crash: Its process was ended by SIGSEGV" in said
+    rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet").set_index("profile")
+    for profile, why in (("stuck", "did not come back"), ("crash", "SIGSEGV")):
+        mine = rows.loc[[profile]]
+        assert (mine["verdict"] == "outside").any()
+        assert mine["why"].str.contains(why).any()
+    assert not (rows.loc[["exact"], "verdict"] == "outside").any()
+
+
+def test_a_fault_of_ours_has_a_code_and_a_file_of_its_own(tmp_path: Path) -> None:
+    code, said = finished(begun("run", "balls.py", "--variant", "linear", "-e", "fake:fault", cwd=tmp_path))
+    assert code == 3
+    found = re.fullmatch(
+        r"crossbody: This is a fault of crossbody \(LookupError: .*\)\. Please report it with (.*)\.\n", said
+    )
+    assert found, said
+    told = Path(found[1])
+    assert "Traceback" in told.read_text()
+    told.unlink()
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("count", [2, pytest.param(40, marks=pytest.mark.slow)])
+def test_an_interrupt_at_any_instant_stops_and_loses_nothing(tmp_path: Path, count: int) -> None:
+    rng, out = random.Random(11), tmp_path / "out"
+    (tmp_path / "keep").mkdir()
+    codes = []
+    for i in range(count):
+        process = begun("run", "balls.py", "-e", "fake:exact", "--quiet", cwd=tmp_path)
+        time.sleep(0.2 + rng.random() * 6.0)
+        code, said = interrupted(process) if process.poll() is None else finished(process)
+        codes.append(code)
+        assert code in (0, 1, 130, -signal.SIGINT), (i, said)  # the last: before the interpreter had begun
+        assert "Traceback" not in said or code == -signal.SIGINT, said
+        if out.is_dir():
+            (out / "notes.md").touch() if (out / ".crossbody").exists() else None
+    code, said = finished(begun("run", "balls.py", "-e", "fake:exact", "--quiet", cwd=tmp_path))
+    assert code in (0, 1), said
+    assert len(pd.read_parquet(out / "verdicts.parquet"))
+    assert not list(out.glob(".crossbody-*"))

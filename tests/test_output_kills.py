@@ -1,0 +1,180 @@
+"""A study that is killed at any system call leaves the old one or the new one, whole, and all that is the user's."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from swap_kills import everywhere
+
+from crossbody.cases import OutputError
+from crossbody.reports.runs import manifest
+from crossbody.reports.runs.output import MARKER, check, folder, recover
+
+MINE = {"notes.md": "mine", "bench/own.csv": "mine too", "traces/sketch.txt": "and mine"}
+STUDIES = ("old", "new")
+FILES = {
+    "old": ("verdicts.json", "a.json", "traces/0000.parquet", "traces/0001.parquet", "index.html"),
+    "new": ("verdicts.json", "b.json", "traces/0000.parquet", "index.html", "case.html"),
+}
+
+
+def put(place: Path, which: str, study: str = "run") -> None:
+    """Write one of two studies, each with files that the other does not have."""
+    with folder(place, study) as made:
+        for name in FILES[which]:
+            (made / name).parent.mkdir(exist_ok=True)
+            (made / name).write_text(which)
+
+
+def fresh(place: Path) -> Path:
+    """A folder with an old study, one of another command, and files of the user's."""
+    put(place, "old")
+    with folder(place, "bode") as made:
+        (made / "bode.json").write_text("beside")
+    for name, text in MINE.items():
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text(text)
+    return place
+
+
+def copied(made: Callable[[Path], Path], root: Path) -> Callable[[Path], Path]:
+    """Copies of one folder, which take less time than making it again."""
+    one = made(root / "one")
+    return lambda place: Path(shutil.copytree(one, place))
+
+
+def content(place: Path) -> dict[str, str]:
+    """Every file but those whose names begin with a dot."""
+    found = (path for path in place.rglob("*") if path.is_file())
+    inside = ((path.relative_to(place), path) for path in found)
+    return {str(name): path.read_text() for name, path in inside if not any(p.startswith(".") for p in name.parts)}
+
+
+def expected(which: str) -> dict[str, str]:
+    return dict.fromkeys(FILES[which], which) | MINE | {"bode.json": "beside"}
+
+
+@pytest.mark.parametrize("stride", [29, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_kill_at_any_call_loses_nothing(tmp_path: Path, stride: int) -> None:
+    kills, ends = 0, set()
+    for place in everywhere(copied(fresh, tmp_path), lambda at: put(at, "new"), tmp_path, stride):
+        kills += 1
+        found = content(place)
+        assert found.items() >= (MINE | {"bode.json": "beside"}).items()
+        recover(place)
+        found = content(place)
+        assert found in (expected("old"), expected("new")), kills
+        ends.add(found["verdicts.json"])
+        assert sorted(p.name for p in place.iterdir() if p.name.startswith(".")) == [MARKER]
+        put(place, "new")
+        assert content(place) == expected("new")
+        shutil.rmtree(place)
+    assert ends == set(STUDIES)
+    assert kills > 200 / stride
+
+
+@pytest.mark.parametrize("stride", [17, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_kill_during_recovery_loses_nothing(tmp_path: Path, stride: int) -> None:
+    """The study was whole: wherever putting it in its place is killed, the next who looks finishes it."""
+
+    def unfinished(place: Path) -> Path:
+        fresh(place)
+        with folder(place, "run") as made:
+            for name in FILES["new"]:
+                (made / name).parent.mkdir(exist_ok=True)
+                (made / name).write_text("new")
+            (made / ".plan.json").write_text(PLAN)
+            shutil.copytree(made, place / ".crossbody-ready.run.x")
+            raise StopIteration
+
+    def half(place: Path) -> Path:
+        with pytest.raises(StopIteration):
+            unfinished(place)
+        return place
+
+    PLAN = json.dumps({"study": "run", "files": sorted(FILES["new"]), "adds": False})
+    kills = 0
+    for place in everywhere(copied(half, tmp_path), recover, tmp_path, stride):
+        kills += 1
+        recover(place)
+        assert content(place) == expected("new")
+    assert kills > 80 / stride
+
+
+def test_what_a_killed_command_left_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put(tmp_path / "out", "old")
+    (tmp_path / "out" / ".crossbody-new.run.x").mkdir()
+    check(tmp_path / "out", "run")
+    assert "half-written tables of an interrupted command are taken away" in capsys.readouterr().err
+    assert content(tmp_path / "out") == dict.fromkeys(FILES["old"], "old")
+
+
+def test_studies_live_side_by_side(tmp_path: Path) -> None:
+    put(tmp_path / "out", "old")
+    with folder(tmp_path / "out", "bode") as made:
+        for name in ("verdicts.json", "bode.json"):
+            (made / name).write_text("bode")
+    assert content(tmp_path / "out") == dict.fromkeys(FILES["old"], "old") | {"bode.json": "bode"}
+    put(tmp_path / "out", "new")
+    assert content(tmp_path / "out") == dict.fromkeys(FILES["new"], "new") | {"bode.json": "bode"}
+
+
+def test_verdicts_of_another_command_are_not_replaced(tmp_path: Path) -> None:
+    put(tmp_path / "out", "old")
+    with pytest.raises(OutputError, match=r"holds the verdicts of `crossbody run`.*--out"):
+        check(tmp_path / "out", "replay")
+    check(tmp_path / "out", "run")
+
+
+def test_a_file_of_the_users_is_not_written_over(tmp_path: Path) -> None:
+    put(tmp_path / "out", "old")
+    (tmp_path / "out" / "b.json").write_text("by hand")
+    with pytest.raises(OutputError, match="not crossbody's own; the results are in"):
+        put(tmp_path / "out", "new")
+    left = content(tmp_path / "out")
+    assert left["b.json"] == "by hand"
+    assert left["a.json"] == "old"
+    assert left["run-1/b.json"] == "new"  # what was computed is not lost either
+
+
+def test_the_folder_of_an_earlier_version_is_taken_over(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / "traces").mkdir(parents=True)
+    (out / MARKER).write_text("Written by crossbody; it may be replaced by the next run.\n")
+    for name in ("verdicts.json", "verdicts.csv", "verdicts.parquet", "traces/0007.parquet"):
+        (out / name).write_text("old")
+    (out / "index.html").write_text('<!doctype html><meta name="generator" content="crossbody">')
+    for name in ("mine.html", "data.csv"):
+        (out / name).write_text("mine")
+    put(out, "new")
+    assert content(out) == dict.fromkeys(FILES["new"], "new") | {"mine.html": "mine", "data.csv": "mine"}
+
+
+@pytest.mark.parametrize(
+    "name", ["../notes.md", "/etc/passwd", "a/b/c", ".ssh", "traces/../x", "", 7, None, ["x"], "a\nb"]
+)
+def test_a_manifest_cannot_name_what_is_not_in_its_folder(tmp_path: Path, name: object) -> None:
+    put(tmp_path / "out", "old")
+    (tmp_path / "out" / MARKER).write_text(json.dumps({"studies": {"run": [name]}}))
+    with pytest.raises(OutputError, match=r"manifest|no file of this folder"):
+        manifest.read(tmp_path / "out")
+
+
+def test_no_link_in_a_folder_is_followed_on_writing(tmp_path: Path) -> None:
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "0000.parquet").write_text("precious")
+    (outside / "verdicts.json").write_text("precious")
+    out = tmp_path / "out"
+    put(out, "old")
+    shutil.rmtree(out / "traces")
+    (out / "traces").symlink_to(outside)
+    (out / "verdicts.json").unlink()
+    (out / "verdicts.json").symlink_to(outside / "verdicts.json")
+    with pytest.raises(OutputError, match="follows no link"):
+        put(out, "new")
+    assert {path.read_text() for path in outside.iterdir()} == {"precious"}
