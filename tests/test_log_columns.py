@@ -126,8 +126,10 @@ def test_any_text_of_unit_signs_is_a_unit_or_a_sentence(text: str) -> None:
         assert 0.0 < to_si(text).factor < np.inf
 
 
-BOMBS = ["m^9^9^9", "m**9**9**9", "(((m^9)^9)^9)^9", "((Gm^9)^9)", "a" * 26 + "!", "a" * 39 + "!", "m" * 10**6, "m^99999999",
-         " " * 10**6 + "!", "(" * 40, "(" * 20 + "m" + ")" * 20, "m" + "^ " * 19, "m^1e9", "m^(9^9^9)", "m//m", "1" * 40]  # fmt: skip
+BOMBS = [
+    "m^9^9^9", "m**9**9**9", "(((m^9)^9)^9)^9", "((Gm^9)^9)", "a" * 26 + "!", "a" * 39 + "!", "m" * 10**6, "m^99999999",
+    " " * 10**6 + "!", "(" * 40, "(" * 20 + "m" + ")" * 20, "m" + "^ " * 19, "m^1e9", "m^(9^9^9)", "m//m", "1" * 40,
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("text", BOMBS, ids=range(len(BOMBS)))

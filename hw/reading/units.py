@@ -89,7 +89,9 @@ def _check_grammar(text: str) -> None:
         after_operand = before in ("operand", "power", "close")
         if token is None or not 0 <= depth <= DEEPEST:
             raise ValueError(text)
-        if (kind in ("sign", "close") and not after_operand) or (kind == "power" and before not in ("operand", "close")):
+        if (kind in ("sign", "close") and not after_operand) or (
+            kind == "power" and before in ("sign", "open", "power")
+        ):
             raise ValueError(text)
         at, before = token.end(), before if kind == "space" else str(kind)
     if depth or before in ("sign", "open"):
