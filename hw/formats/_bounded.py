@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import Budget
+from crossbody.hw.formats._budget import MOST_COLUMNS, Budget
 from crossbody.hw.formats._contract import Block, Group, Reader
 
-MOST_COLUMNS = 20_000  # of a file: each costs a few kilobytes of checks
+WIDTH = 8  # bytes that every number takes once it is a float64, whatever the file stores
 
 
 class Bounded:
@@ -43,7 +43,7 @@ class Bounded:
                 block = next(blocks, None)
             if block is None:
                 return
-            self.budget.spend(sum(values.nbytes for values in block.values()))
+            self.budget.spend(WIDTH * sum(values.size for values in block.values()))
             yield block
 
     def close(self) -> None:

@@ -18,9 +18,11 @@ from pathlib import Path
 
 from crossbody.cases import InvalidValue, LogFormatError
 
+MOST_COLUMNS = 20_000  # of a file: each costs a few kilobytes of checks
 MEMORY = 1 << 30  # bytes over the file's own size
 PATIENCE = 8.0  # s of processor time for a file of no size
 SLOWEST = 250e3  # bytes of a file that are read in a second at least: JSON of a resting rig, compressed, reaches 1e6
+PART = 4  # of the memory, what a file of no size may unfold to: 3e7 numbers, which take seconds to check
 RATIO = 100  # numbers to file: a log of changing numbers reaches 10, zeros in deflate 1000
 BLOCK = 512  # bytes of `st_blocks`, whatever the file system
 FIELD = 5  # of /proc/self/statm: pages of private writable memory, which RLIMIT_DATA bounds
@@ -48,7 +50,7 @@ class Budget:
             raise InvalidValue(f"memory is {memory}; it must be above 0 bytes.")
         self._path = path
         self.size = _occupied(path)
-        self.memory, self.most = memory + self.size, memory + RATIO * self.size
+        self.memory, self.most = memory + self.size, memory // PART + RATIO * self.size
         self.seconds = PATIENCE + self.size / SLOWEST
         self._spent, self._taken, self._entered = 0, 0.0, math.nan
         self._ceiling = _private() + self.memory

@@ -19,7 +19,7 @@ FORMULA = ("=", "+", "-", "@")
 
 
 def find_fault(
-    path: Path, options: Options, delimiter: str, columns: Sequence[str], cause: Exception
+    path: Path, options: Options, delimiter: str, columns: Sequence[str], cause: Exception, start: int = 0
 ) -> LogFormatError:
     """Read the text again, line by line, up to the first cell that is no number or the first line of a wrong width.
 
@@ -29,6 +29,7 @@ def find_fault(
         delimiter: between cells.
         columns: columns whose cells must be numbers.
         cause: what the parser said, for a fault that only it sees.
+        start: rows that are known to be good.
 
     Returns:
         The error to raise.
@@ -40,6 +41,9 @@ def find_fault(
             names = next(csv.reader([file.readline(LINE)], delimiter=delimiter)) if options.header else None
             row = 0
             while line := file.readline(LINE):
+                if row < start and not line.isspace():
+                    row += 1
+                    continue
                 if len(line) >= LINE or "\0" in line:
                     return LogFormatError(path, "the line is no text table (binary, or without an end).", row)
                 if line.strip():

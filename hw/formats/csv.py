@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import MOST_COLUMNS
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._csv_fault import find_fault
 from crossbody.hw.formats._guard import library, parsing
@@ -57,6 +58,9 @@ class CsvReader:
     def __init__(self, path: Path, options: Options) -> None:
         self._path, self._options = path, options
         self._delimiter = options.delimiter or _delimiter(path, options)
+        width = _width(path, options, self._delimiter)
+        if width > MOST_COLUMNS:  # before anything is made for each of them
+            raise LogFormatError(path, f"has {width} columns; a log of more than {MOST_COLUMNS} is not read.")
         self.library = library("pyarrow")
         self.refused: dict[str, str] = {}
         batch, schema = self._first()
@@ -85,12 +89,14 @@ class CsvReader:
         """See `Reader`."""
         import pyarrow as pa
 
+        rows = 0
         try:
             with self._stream(columns) as stream:
                 for batch in stream:
                     yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in columns}
+                    rows += batch.num_rows
         except pa.ArrowException as error:  # it does not tell the place of every fault
-            raise find_fault(self._path, self._options, self._delimiter, columns, error) from error
+            raise find_fault(self._path, self._options, self._delimiter, columns, error, rows) from error
 
     def _stream(self, columns: Sequence[str] | None = None) -> Any:
         import pyarrow as pa

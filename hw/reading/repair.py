@@ -7,13 +7,14 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import UnknownName
+from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw.checks.clock import GAP
 from crossbody.hw.reading.columns import Role
 from crossbody.hw.reading.log import Repair
 from crossbody.hw.reading.rows import Floats, Rows
 
 REPAIRS = ("drop_duplicates", "fill_dropped")
+MOST = 10  # samples that are filled for each that is there
 LONGEST = 1000  # samples that are filled in one place: more is no dropout but a pause
 
 
@@ -55,6 +56,9 @@ def fill_dropped(
     missing[missing > LONGEST] = 0
     if not missing.any():
         return block, (), np.zeros(0, np.int64)
+    if missing.sum() > MOST * len(steps):
+        text = f"lacks {missing.sum()} samples beside {len(steps) + 1} that are there: no dropouts, but another rate."
+        raise InvalidValue(f"fill_dropped: the log {text}")
     before = np.repeat(np.arange(len(steps)), missing)  # the row before each new one
     inside = np.arange(len(before)) - np.repeat(np.cumsum(missing) - missing, missing) + 1
     share = inside / (missing[before] + 1.0)
