@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 import sqlite3
 import struct
 import zlib
@@ -411,7 +409,9 @@ def bag(folder: Path, definition: str, compression: str, whole: bytes, body: byt
     magic = b"#ROSBAG V2.0\n"
     start = len(magic) + 4096
     chunks = chunk_ + text(whole if body is None else body) + index
-    head = _header(op=b"\x03", index_pos=struct.pack("<Q", start + len(chunks)), conn_count=word(1), chunk_count=word(1))
+    head = _header(
+        op=b"\x03", index_pos=struct.pack("<Q", start + len(chunks)), conn_count=word(1), chunk_count=word(1)
+    )
     info = _header(op=b"\x06", ver=word(1), chunk_pos=struct.pack("<Q", start), start_time=stamp, end_time=stamp,
                    count=word(1)) + text(word(0) + word(1))  # fmt: skip
     padding = 4096 - len(head) - 4
@@ -487,7 +487,9 @@ def _mdf_zipped(folder: Path) -> Path:
     raw = bytearray(kept.read_bytes())
     at = raw.index(b"##DZ")
     squeezed = deflated(GIGA)
-    block = struct.pack("<4sIQQ2sBBIQQ", b"##DZ", 0, 48 + len(squeezed), 0, b"DT", 0, 0, 0, GIGA, len(squeezed)) + squeezed
+    block = (
+        struct.pack("<4sIQQ2sBBIQQ", b"##DZ", 0, 48 + len(squeezed), 0, b"DT", 0, 0, 0, GIGA, len(squeezed)) + squeezed
+    )
     while len(raw) % 8:
         raw += b"\0"
     old, new = struct.pack("<Q", at), struct.pack("<Q", len(raw))

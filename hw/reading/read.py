@@ -17,11 +17,11 @@ from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading import repair as _repair
 from crossbody.hw.reading import store as _store
 from crossbody.hw.reading.collect import collect
-from crossbody.hw.reading.columns import Columns, dump_columns, load_columns
+from crossbody.hw.reading.columns import Columns, Role, dump_columns, load_columns
 from crossbody.hw.reading.hash import file_hash
 from crossbody.hw.reading.join import join
 from crossbody.hw.reading.log import Channel, Log, Provenance, Repair
-from crossbody.hw.reading.plan import Plan, Source, make_plan
+from crossbody.hw.reading.plan import ROTATES, Plan, Source, make_plan
 from crossbody.hw.reading.rows import Floats, Rows
 from crossbody.hw.reading.stream import Stream
 
@@ -107,8 +107,9 @@ def read(
         path: file of any format of `formats.names()`, or the folder of a ROS 2 bag.
         columns: the column map: its file, a name of `maps()`, or itself; not needed for a log that `store` wrote.
         part: number of the run, where the map names a column that tells several apart.
-        repair: any of "drop_duplicates" (rows with the time of the row before) and "fill_dropped" (samples that are
-            missing: measured signals linearly, commanded ones held); what was done is in the provenance.
+        repair: any of "drop_duplicates" (rows with the time of the row before), "fill_dropped" (samples that are
+            missing: measured signals linearly, commanded ones held) and "unwrap" (coordinates in rad that jump by whole
+            turns); what was done is in the provenance.
         limit: largest size of all its numbers in memory, bytes; what `memory` admits if not given.
         memory: bytes over the file's own size that reading may take; a file that unfolds to more is refused.
 
@@ -156,12 +157,23 @@ def _gather(found: Scan, repair: Collection[str], limit: int) -> tuple[Rows, tup
     repairs: tuple[Repair, ...] = ()
     if "drop_duplicates" in repair:
         block, repairs = _repair.drop_duplicates(block)
+    if "unwrap" in repair:
+        block, unwrapped = _repair.unwrap(block, _angles(plan.own))
+        repairs += unwrapped
     checks = _checked(plan, plan.own, block)
     if plan.joined:
         block, trimmed = _joined(found, block, limit)
         repairs += trimmed
+        if "unwrap" in repair:
+            block, unwrapped = _repair.unwrap(block, _angles(plan.sources))
+            repairs += unwrapped
         checks = _checked(plan, plan.sources, block)
     return block, repairs, checks
+
+
+def _angles(sources: Sequence[Source]) -> list[int]:
+    """Indices of the coordinates in rad."""
+    return [i for i, s in enumerate(sources) if s.role is Role.COORDINATES and s.conversion.si == ROTATES]
 
 
 def _checked(plan: Plan, sources: Sequence[Source], block: Rows) -> Checks:
