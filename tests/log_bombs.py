@@ -93,8 +93,9 @@ def _parquet_page(folder: Path) -> Path:
     import pyarrow.parquet as pq
 
     column = pa.array(np.zeros(200_000_000))
-    pq.write_table(pa.table({"t": column}), folder / "log.parquet", compression="zstd", use_dictionary=False,
-                   data_page_size=1 << 31, row_group_size=1 << 31, write_batch_size=1 << 28, write_statistics=False)  # fmt: skip
+    large = {"data_page_size": 1 << 31, "row_group_size": 1 << 31, "write_batch_size": 1 << 28}
+    path = folder / "log.parquet"
+    pq.write_table(pa.table({"t": column}), path, compression="zstd", use_dictionary=False, **large)
     return folder / "log.parquet"
 
 
@@ -154,7 +155,7 @@ def _hdf_cycle(file: object) -> None:
 
 def _hdf_attribute(file: object) -> None:
     item = file.create_dataset("t", data=np.zeros(10))  # type: ignore[attr-defined]
-    item.attrs.create("unit", np.zeros(2_000_000, "S100"))
+    item.attrs.create("unit", np.zeros(200_000, "S100"))
     file["a"] = np.zeros((3, 3, 3))  # type: ignore[index]
     del file["t"]  # type: ignore[attr-defined]
 
@@ -402,7 +403,7 @@ def bag(folder: Path, definition: str, compression: str, whole: bytes, body: byt
     """A ROS 1 bag of one chunk of one connection with one message."""
     word = struct.Struct("<I").pack
     stamp = bytes(8)
-    about = _header(topic=b"/rig", type=b"rig/T", md5sum=b"*", message_definition=definition.encode())
+    about = _header(topic=b"/rig", type=b"rig/T", md5sum=b"", message_definition=definition.encode())
     connection = _header(op=b"\x07", conn=word(0), topic=b"/rig") + about
     chunk_ = _header(op=b"\x05", compression=compression.encode(), size=word(len(whole) & 0xFFFFFFFF))
     index = _header(op=b"\x04", ver=word(1), conn=word(0), count=word(1)) + text(stamp + word(0))
@@ -562,7 +563,8 @@ def bombs() -> Iterator[Bomb]:
             "mcap-itself": _mcap_itself, "mcap-topics": _mcap_topics, "mcap-json": _mcap_json,
         },
         "rosbags": {
-            "ros2-view": partial(_ros2, partial(_sql, VIEW)), "ros2-generated": partial(_ros2, partial(_sql, GENERATED)),
+            "ros2-view": partial(_ros2, partial(_sql, VIEW)),
+            "ros2-generated": partial(_ros2, partial(_sql, GENERATED)),
             "ros2-yaml": partial(_ros2, _yaml), "ros2-zstd": partial(_ros2, _zstd_file), "ros2-mcap": _ros2_mcap,
             "ros1-bz2": _bag_bz2, "ros1-nested": _bag_nested, "ros1-empties": _bag_empties, "ros1-array": _bag_array,
         },

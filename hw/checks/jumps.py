@@ -17,6 +17,7 @@ EDGE = 2  # steps at the beginning and the end that are not judged: there are no
 REST = 0.3  # rad that a step may differ from its neighbours after whole turns are taken off
 OUT = 8.0  # times the neighbours' own differences, and the noise, that a step must stand out
 STEPS = 4.0  # of the encoder's grid
+COARSEST = TURN / 100.0  # rad: no encoder's grid, where a single step tells nothing about it
 NOISE = 0.9  # quantile of the second differences of steps that is taken for their noise
 FEWEST = 256  # samples that tell the noise
 LATE = 1.5  # times the usual time of a step: there, samples are missing
@@ -64,7 +65,7 @@ def find_jumps(times: Floats, values: Floats, rotates: bool, noise: float | None
     second = np.abs(middle - 0.5 * (around[:, 1] + around[:, 2]))
     noise = float(np.quantile(second, NOISE)) if noise is None else noise
     moved = np.abs(steps[steps != 0.0])
-    grid = float(moved.min()) if len(moved) else np.inf
+    grid = min(float(moved.min(initial=np.inf)), COARSEST if rotates else np.inf)
     least = np.maximum(OUT * np.maximum(high - low, noise), STEPS * grid)
     turns = np.zeros(len(middle), np.int64)
     if rotates and usual > 0.0:

@@ -14,7 +14,8 @@ STUCK = 100  # samples without any change
 SATURATED = 10  # samples at the largest or smallest value of all
 NEAR, FAR = 10, 50  # samples before a run
 CUT = 0.15  # of the way of the last 50 samples, in the last 10: 0.04 where a motion comes to rest, 0.2 where it is cut
-STEPS = 4  # of the encoder's grid: at the turning point of a parabola on a grid the last 10 samples cover less
+STEPS = 6  # of the encoder's grid: where a slow parabola turns on a grid, the last 10 samples cover less
+HALF = 0.5  # of the largest step: a channel that froze while it moved goes on with a jump
 MOST = 8  # runs of a block that are looked at
 
 
@@ -72,10 +73,9 @@ class ValueCheck:
             text = f"the value does not change for {longest.count} samples."
             found.append(longest.told("stuck", self._channel, text, fault=False))
         for end, run in (("largest", runs.top), ("smallest", runs.bottom)):
-            if run.count >= SATURATED and runs.low < runs.high and run.value != 0.0 and not runs.switch:
-                if runs.cut_off(run):
-                    text = f"the value stays at its {end}, {run.value:.6g} {self._unit}, for {run.count} samples."
-                    found.append(run.told("saturated", self._channel, text, fault=False))
+            if run.count >= SATURATED and run.value != 0.0 and runs.cut_off(run) and not runs.switch:
+                text = f"the value stays at its {end}, {run.value:.6g} {self._unit}, for {run.count} samples."
+                found.append(run.told("saturated", self._channel, text, fault=False))
         return found
 
 
@@ -85,14 +85,13 @@ class Run(First):
 
     Attributes:
         value: what they are.
-        far: how far the channel was from that value in the 50 samples before.
-        sharp: how far in the 10 samples before, or by the first step after, where that is no part of a smooth motion
-            that came to rest; 0 if it is.
+        sharp: how far in the 10 samples before, if that is no part of a smooth motion that came to rest; 0 if it is.
+        left: by how much the first step after leaves that value.
     """
 
     value: float = np.nan
-    far: float = 0.0
     sharp: float = 0.0
+    left: float = 0.0
 
 
 class Runs:
@@ -107,7 +106,8 @@ class Runs:
         self.low, self.high = np.inf, -np.inf
         self.longest, self.top, self.bottom = Run(), Run(), Run()
         self.seen = 0
-        self._grid = np.inf
+        self._cut = False
+        self._grid, self._largest = np.inf, 0.0  # steps
         self._open = Run()
         self._value = np.nan
         self._tail: Floats = np.zeros(0)
@@ -119,7 +119,7 @@ class Runs:
 
     def cut_off(self, run: Run) -> bool:
         """Whether the motion did not come to rest by itself when the run began, or not by itself go on."""
-        return run.sharp >= STEPS * self._grid
+        return max(run.sharp, run.left if run.left > HALF * self._largest else 0.0) >= STEPS * self._grid
 
     def see(self, rows: Rows, times: Floats, values: Floats) -> None:
         """Take in the next block."""
@@ -132,11 +132,12 @@ class Runs:
         starts = np.flatnonzero(steps != 0.0)  # NaN differs from everything
         moved = steps[starts]
         moved = moved[np.isfinite(moved)]
-        self._grid = min(self._grid, float(moved.min()) if len(moved) else np.inf)
+        self._grid = min(self._grid, float(moved.min(initial=np.inf)))
+        self._largest = max(self._largest, float(moved.max(initial=0.0)))
         head = int(starts[0]) if len(starts) else len(values)
         self._open.count += head
         if len(starts) and self.seen > len(values):
-            self._leave(self._open, float(values[starts[0]]))
+            self._open.left = abs(float(values[starts[0]]) - self._open.value)
         if self._open.count:
             self._note(self._open)
         whole = np.concatenate((self._tail, values))
@@ -146,7 +147,7 @@ class Runs:
                 run = self._entered(whole, len(self._tail) + int(starts[i]))
                 run.row, run.t, run.count = int(rows[starts[i]]), float(times[starts[i]]), int(lengths[i])
                 if i + 1 < len(starts):
-                    self._leave(run, float(values[starts[i + 1]]))
+                    run.left = abs(float(values[starts[i + 1]]) - run.value)
                 self._note(run)
                 self._open = run
             self._value = float(values[-1])
@@ -158,13 +159,7 @@ class Runs:
         away = np.abs(whole[max(at - FAR, 0) : at] - whole[at])
         far = float(away.max(initial=0.0))
         near = float(away[-NEAR:].max(initial=0.0))
-        return Run(value=float(whole[at]), far=far, sharp=near if near > CUT * far else 0.0)
-
-    @staticmethod
-    def _leave(run: Run, value: float) -> None:
-        step = abs(value - run.value)
-        if step > CUT * run.far:
-            run.sharp = max(run.sharp, step)
+        return Run(value=float(whole[at]), sharp=near if near > CUT * far else 0.0)
 
     @staticmethod
     def _worth_noting(values: Floats, lengths: NDArray[np.int64]) -> list[int]:
@@ -176,13 +171,14 @@ class Runs:
         return [int(i) for i in np.concatenate(found)]
 
     def _note(self, run: Run) -> None:
-        if (run.sharp > 0.0, run.count) > (self.longest.sharp > 0.0, self.longest.count):
-            self.longest = replace(run)
+        cut = run.sharp > 0.0 or run.left > HALF * self._largest
+        if (cut, run.count) > (self._cut, self.longest.count):
+            self.longest, self._cut = replace(run), cut
         if run.value > self.high:
             self.high, self.top = run.value, Run(value=run.value)
         if run.value < self.low:
             self.low, self.bottom = run.value, Run(value=run.value)
-        if run.value == self.high and run.sharp > 0.0 and run.count > self.top.count:
+        if run.value == self.high and cut and run.count > self.top.count:
             self.top = replace(run)
-        if run.value == self.low and run.sharp > 0.0 and run.count > self.bottom.count:
+        if run.value == self.low and cut and run.count > self.bottom.count:
             self.bottom = replace(run)

@@ -8,7 +8,7 @@ from pathlib import Path
 from crossbody.cases import LogFormatError
 
 ROUNDS = 8  # times the file's size that its structure may cost to read: parsers do look at a block more than once
-FREE = 1 << 24  # bytes that are never counted against it
+FREE = 1 << 22  # bytes that are never counted against it
 
 
 class MeteredFile(io.BufferedReader):
