@@ -67,9 +67,9 @@ class ValueCheck:
 
     def _about_runs(self) -> list[Finding]:
         runs, found = self.runs, []
-        longest = runs.longest
-        rests = longest.value == 0.0 and longest.count < runs.seen  # at rest a sensor reads 0
-        if longest.count >= STUCK and not rests and runs.cut_off(longest):
+        stuck = [r for r in (runs.longest, runs.jumped) if r.count >= STUCK and r.value != 0.0 and runs.cut_off(r)]
+        if stuck:  # at rest a sensor reads 0
+            longest = max(stuck, key=lambda run: run.count)
             text = f"the value does not change for {longest.count} samples."
             found.append(longest.told("stuck", self._channel, text, fault=False))
         for end, run in (("largest", runs.top), ("smallest", runs.bottom)):
@@ -95,7 +95,9 @@ class Run(First):
 
 
 class Runs:
-    """Runs of equal values across blocks: the longest, and the longest at either end of the values so far.
+    """Runs of equal values across blocks that no rest explains.
+
+    Kept are the longest, the one that ended with the largest jump, and the longest at either end of the values so far.
 
     Rests and turning points are runs too, on the grid of an encoder. They are told from a channel that froze or hit
     its limit by how the run begins: a motion that comes to rest covers 1/25 of its last 50 samples' way in the last 10,
@@ -104,9 +106,8 @@ class Runs:
 
     def __init__(self) -> None:
         self.low, self.high = np.inf, -np.inf
-        self.longest, self.top, self.bottom = Run(), Run(), Run()
+        self.longest, self.jumped, self.top, self.bottom = Run(), Run(), Run(), Run()
         self.seen = 0
-        self._cut = False
         self._grid, self._largest = np.inf, 0.0  # steps
         self._open = Run()
         self._value = np.nan
@@ -171,9 +172,11 @@ class Runs:
         return [int(i) for i in np.concatenate(found)]
 
     def _note(self, run: Run) -> None:
-        cut = run.sharp > 0.0 or run.left > HALF * self._largest
-        if (cut, run.count) > (self._cut, self.longest.count):
-            self.longest, self._cut = replace(run), cut
+        cut = run.sharp > 0.0
+        if cut and run.count > self.longest.count:
+            self.longest = replace(run)
+        if run.count >= STUCK and run.left > self.jumped.left:
+            self.jumped = replace(run)
         if run.value > self.high:
             self.high, self.top = run.value, Run(value=run.value)
         if run.value < self.low:

@@ -20,7 +20,7 @@ from crossbody.cases import InvalidValue, LogFormatError
 
 MOST_COLUMNS = 20_000  # of a file: each costs a few kilobytes of checks
 MEMORY = 1 << 30  # bytes over the file's own size
-PATIENCE = 8.0  # s of processor time for a file of no size
+PATIENCE = 5.0  # s of processor time for a file of no size
 SLOWEST = 250e3  # bytes of a file that are read in a second at least: JSON of a resting rig, compressed, reaches 1e6
 PART = 4  # of the memory, what a file of no size may unfold to: 3e7 numbers, which take seconds to check
 RATIO = 100  # numbers to file: a log of changing numbers reaches 10, zeros in deflate 1000
@@ -40,6 +40,7 @@ class Budget:
         memory: bytes that may be in memory at once.
         most: bytes that may be decoded in all.
         seconds: of processor time that parsing may take in all.
+        taken: of it so far.
 
     Raises:
         InvalidValue: if `memory` is not positive.
@@ -52,7 +53,7 @@ class Budget:
         self.size = _occupied(path)
         self.memory, self.most = memory + self.size, memory // PART + RATIO * self.size
         self.seconds = PATIENCE + self.size / SLOWEST
-        self._spent, self._taken, self._entered = 0, 0.0, math.nan
+        self._spent, self.taken, self._entered = 0, 0.0, math.nan
         self._ceiling = _private() + self.memory
 
     def hold(self, declared: int, what: str) -> None:
@@ -71,7 +72,7 @@ class Budget:
         Raises:
             LogFormatError: if the file unfolds to more than it may in all, or takes longer than any log of its size.
         """
-        taken = self._taken + (0.0 if math.isnan(self._entered) else time.thread_time() - self._entered)
+        taken = self.taken + (0.0 if math.isnan(self._entered) else time.thread_time() - self._entered)
         if taken > self.seconds:
             text = f"takes more than {self.seconds:.3g} s to unfold, as no log of {_shown(self.size)} does."
             raise LogFormatError(self._path, text)
@@ -98,7 +99,7 @@ class Budget:
             text = f"cannot be read within {_shown(self.memory)}; {self._hint(self.memory)}"
             raise LogFormatError(self._path, text) from error
         finally:
-            self._taken += time.thread_time() - self._entered
+            self.taken += time.thread_time() - self._entered
             self._entered = math.nan
             if before is not None:
                 _set(before)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 LINE = 1 << 20  # characters; a longer line is no table
 CELL = 40  # characters of an offending cell that are shown
+COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 FORMULA = ("=", "+", "-", "@")
 
 
@@ -39,6 +41,8 @@ def find_fault(
             for _ in range(options.skip):
                 file.readline(LINE)
             names = next(csv.reader([file.readline(LINE)], delimiter=delimiter)) if options.header else None
+            if options.units:
+                file.readline(LINE)
             row = 0
             while line := file.readline(LINE):
                 if row < start and not line.isspace():
@@ -67,8 +71,16 @@ def _check(
         if name in columns and not _is_number(cell, decimal):
             kind = "a formula" if cell.lstrip().startswith(FORMULA) else "text"
             shown = cell if len(cell) <= CELL else cell[:CELL] + "..."
-            return LogFormatError(path, f"{shown!r} is {kind}, not a number; it was not evaluated.", row, name)
+            text = f"{shown!r} is {kind}, not a number; it was not evaluated.{_hint(row, cell, decimal)}"
+            return LogFormatError(path, text, row, name)
     return None
+
+
+def _hint(row: int, cell: str, decimal: str) -> str:
+    """What the map could say about a cell that is no number as it stands."""
+    if decimal == "." and COMMA.fullmatch(cell.strip()):
+        return ' With a decimal comma, say `options.decimal = ","`.'
+    return "" if row else " Below a header of two lines, say `options.units = true`, or `options.skip`."
 
 
 def _is_number(cell: str, decimal: str) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 MOST = 100_000  # values that a message of a type holds whatever its bytes say
 DEEPEST = 32  # types inside one another
+FILLER = "structure_needs_at_least_one_member"  # what stands for nothing in ROS 2, and is not there in ROS 1
 
 
 def fault_of(types: Mapping[str, Any], name: str) -> str:
@@ -48,7 +49,7 @@ def _values(types: Mapping[str, Any], field: Any, depth: int, known: dict[str, i
     if kind == Nodetype.NAME:
         return _least(types, about, depth + 1, known)
     one = _values(types, about[0], depth, known)
-    if not one and about[0][0] == Nodetype.NAME and _empty(types, about[0][1]):
+    if about[0][0] == Nodetype.NAME and _empty(types, about[0][1]):
         raise ValueError("has messages with lists of empty messages")
     return one * about[1] if kind == Nodetype.ARRAY else 0
 
@@ -58,4 +59,4 @@ def _empty(types: Mapping[str, Any], name: Any) -> bool:
     from rosbags.interfaces import Nodetype
 
     fields = types[name][1] if name in types else [("", (Nodetype.BASE, None))]
-    return all(kind == Nodetype.NAME and _empty(types, about) for _, (kind, about) in fields)
+    return all(field == FILLER or (kind == Nodetype.NAME and _empty(types, about)) for field, (kind, about) in fields)

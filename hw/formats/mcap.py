@@ -59,7 +59,7 @@ class McapReader:
         self.library = library("mcap")
         self.refused: dict[str, str] = {}
         self._leaves: dict[str, Mapping[str, Leaf]] = {}
-        self._file = MeteredFile(path)
+        self._file = MeteredFile(path, self._budget)
         try:
             with parsing(path, "MCAP file (cut off? `mcap recover` saves what is whole)"):
                 self.groups = tuple(self._topics())

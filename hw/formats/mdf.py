@@ -52,7 +52,7 @@ class MdfReader:
         self.library = library("asammdf")
         self.refused: dict[str, str] = {}
         self._place: dict[str, tuple[int, int]] = {}
-        self._raw = MeteredFile(path)  # a file of our own is closed whatever happens in there
+        self._raw = MeteredFile(path, self._budget)  # a file of our own is closed whatever happens in there
         try:
             with parsing(path, WHAT):
                 self._file = _opened(self._raw)

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._grouping import spans
 from crossbody.hw.formats._guard import library, parsing
@@ -43,7 +44,7 @@ class TdmsReader:
         self.library = library("npTDMS")
         self.refused: dict[str, str] = {}
         self._channels: dict[str, Any] = {}
-        self._raw = MeteredFile(path)  # a file of our own is closed whatever happens in there
+        self._raw = MeteredFile(path, current(path))  # a file of our own is closed whatever happens in there
         try:
             with parsing(path, WHAT):
                 self._file = TdmsFile.open(self._raw)

@@ -124,7 +124,8 @@ def survey(path: str | Path, columns: Columns | str | Path | None = None, *, mem
         refused, findings = dict(reader.refused), list[Finding]()
         groups = tuple(_group(reader, group, refused, findings) for group in reader.groups)
         if not any(group.rows for group in groups):
-            raise LogFormatError(path, "holds no samples.")
+            why = next((f" ({column}: {text})" for column, text in refused.items()), "")
+            raise LogFormatError(path, f"holds no samples{why}.")
     finally:
         reader.close()
     found = tuple(sorted(findings, key=lambda f: (not f.fault, f.row)))
@@ -174,6 +175,8 @@ def _numeric(reader: Reader, group: Group, column: Column, refused: dict[str, st
             pass
     except LogFormatError as error:
         refused[column.name] = "holds text, not numbers"
+        if error.row == 0:
+            refused[column.name] = str(error).rpartition("row 0: ")[2].rstrip(".")
         if error.row:
             text = str(error).rpartition(f"row {error.row}: ")[2]
             findings.append(
