@@ -21,7 +21,7 @@ from typing import TypeVar
 import click
 
 from crossbody.cases import CrossbodyError
-from crossbody.reports.replay.cli import identify, replay
+from crossbody.reports.replay.cli import identify, memory_option, replay
 from crossbody.reports.voice import as_json, quiet, speaks
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
@@ -264,12 +264,13 @@ def log() -> None:
 @click.option("--columns", metavar="MAP", help="Column map (TOML) to check it by.")
 @click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart.")
 @click.option("--draft", is_flag=True, help="Print a draft of a column map and nothing else.")
+@memory_option
 @speaks
-def log_info(path: Path, columns: str | None, part: int | None, draft: bool) -> int:
+def log_info(path: Path, columns: str | None, part: int | None, draft: bool, memory: int) -> int:
     """Show channels, rates, gaps and ranges of LOG, what is wrong with it, and a draft of a column map."""
     from crossbody.reports.replay.log import info
 
-    return info(path, columns, part, draft)
+    return info(path, columns, part, draft, memory)
 
 
 @cli.group(invoke_without_command=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,31 @@ def test_what_is_written_is_what_is_read(found: dict[str, hw.Signal], about: str
 def test_any_text_is_a_unit_or_a_sentence(text: str) -> None:
     with contextlib.suppress(InvalidValue):
         assert np.isfinite(to_si(text).factor)
+
+
+ALPHABET = ["m", "s", "rad", "kg", "N", "q", "1", "9", "^", "**", "*", "/", "·", "(", ")", " ", "²", "-", "!", "%"]
+
+
+@STEADY
+@given(st.lists(st.sampled_from(ALPHABET), max_size=45).map("".join))
+def test_any_text_of_unit_signs_is_a_unit_or_a_sentence(text: str) -> None:
+    with contextlib.suppress(InvalidValue):
+        assert 0.0 < to_si(text).factor < np.inf
+
+
+BOMBS = [
+    "m^9^9^9", "m**9**9**9", "(((m^9)^9)^9)^9", "((Gm^9)^9)", "a" * 26 + "!", "a" * 39 + "!", "m" * 10**6, "m^99999999",
+    " " * 10**6 + "!", "(" * 40, "(" * 20 + "m" + ")" * 20, "m" + "^ " * 19, "m^1e9", "m^(9^9^9)", "m//m", "1" * 40,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", BOMBS, ids=range(len(BOMBS)))
+def test_a_unit_that_would_never_end_is_refused_at_once(text: str) -> None:
+    to_si("m")  # pint's registry is there before the clock runs
+    before = time.process_time()
+    with pytest.raises(InvalidValue, match="is no unit"):
+        to_si(text)
+    assert time.process_time() - before < 1.0
 
 
 @pytest.mark.parametrize(

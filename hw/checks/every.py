@@ -9,10 +9,11 @@ import numpy as np
 
 from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.checks.finding import Finding
+from crossbody.hw.checks.jumps import JumpCheck
 from crossbody.hw.checks.rates import RateCheck
 from crossbody.hw.checks.values import ValueCheck
 from crossbody.hw.reading.columns import Role
-from crossbody.hw.reading.plan import Source
+from crossbody.hw.reading.plan import PURE, ROTATES, Source
 from crossbody.hw.reading.rows import Rows
 
 FEWEST = 2  # rows
@@ -30,8 +31,20 @@ class Checks:
         self.clock = ClockCheck(sample_time)
         self._values = [ValueCheck(s.label, s.conversion.si, s.range, s.role.measured) for s in sources]
         at = {(s.role, s.name): i for i, s in enumerate(sources)}
+        self._jumps = [
+            (JumpCheck(s.name, s.conversion.si), i)
+            for i, s in enumerate(sources)
+            if s.role is Role.COORDINATES and s.conversion.si != PURE
+        ]
         names = [s.name for s in sources if s.role is Role.COORDINATES and (Role.VELOCITIES, s.name) in at]
-        self._rates = [(RateCheck(n), at[Role.COORDINATES, n], at[Role.VELOCITIES, n]) for n in names]
+        self._rates = [
+            (
+                RateCheck(n, sources[at[Role.COORDINATES, n]].conversion.si == ROTATES),
+                at[Role.COORDINATES, n],
+                at[Role.VELOCITIES, n],
+            )
+            for n in names
+        ]
 
     def see(self, block: Rows) -> None:
         """Take in the next block of the log."""
@@ -39,6 +52,8 @@ class Checks:
             self.clock.see(block.rows, block.time)
             for check, values in zip(self._values, block.values, strict=True):
                 check.see(block.rows, block.time, values)
+            for jumps, i in self._jumps:
+                jumps.see(block.rows, block.time, block.values[i])
             for rate, q, v in self._rates:
                 rate.see(block.rows, block.time, block.values[q], block.values[v])
 
@@ -62,6 +77,9 @@ class Checks:
     def findings(self) -> tuple[Finding, ...]:
         """Everything found, faults first, in the order of their rows."""
         found = self._about_length() + self.clock.findings() + [f for check in self._values for f in check.findings()]
-        if not any(f.fault for f in found):  # with a broken clock or holes, rates tell nothing new
+        found += [f for check, _ in self._jumps for f in check.findings()]
+        if not any(
+            f.fault and f.check != "wraps" for f in found
+        ):  # with a broken clock or holes, rates tell nothing new
             found += [f for check, _, _ in self._rates for f in check.findings()]
         return tuple(sorted(found, key=lambda f: (not f.fault, f.row)))

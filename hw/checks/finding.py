@@ -15,7 +15,7 @@ class Finding:
 
     Attributes:
         check: name of the check: "samples", "time", "finite", "range", "rates", "sample_time", "dropped", "jitter",
-            "drift", "stuck", "saturated".
+            "drift", "stuck", "saturated", "wraps", "slips".
         fault: True if the log cannot be used so; False for what one should know.
         channel: `role.name` of the channel, or "time".
         row: row of the file, counted from 0.

@@ -6,6 +6,7 @@ import numpy as np
 
 from crossbody.hw.checks.clock import Floats, Rows
 from crossbody.hw.checks.finding import Finding
+from crossbody.hw.checks.jumps import TURN
 
 SPAN = 16  # samples of one comparison: long enough to outweigh the noise of one sample
 GAIN = (0.5, 2.0)
@@ -23,10 +24,11 @@ class RateCheck:
 
     Args:
         name: the coordinate's name.
+        rotates: whether it is an angle, rad.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, rotates: bool = True) -> None:
+        self._name, self._rotates = name, rotates
         self._n = 0
         self._dq2 = self._iv2 = self._both = 0.0
         self._quantum = np.inf
@@ -44,6 +46,7 @@ class RateCheck:
         moved = steps[steps > 0.0]
         self._quantum = min(self._quantum, float(moved.min()) if len(moved) else np.inf)
         path = np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(times))))
+        q = q - self._turns(q)
         at = np.arange(spans + 1) * SPAN
         dq, iv = np.diff(q[at]), np.diff(path[at])
         self._n += spans
@@ -52,6 +55,14 @@ class RateCheck:
         self._both += float((dq * iv).sum())
         self._next += float((dq[1:] * dq[:-1]).sum())
         self._remember(dq, iv, rows[at[:-1]], times[at[:-1]])
+
+    def _turns(self, q: Floats) -> Floats | float:
+        """Whole turns that a wrapped angle has jumped by up to each sample: they are no motion."""
+        if not self._rotates:
+            return 0.0
+        steps = np.diff(q, prepend=q[0])
+        wraps = np.where(np.abs(steps) > 0.5 * TURN, TURN * np.rint(steps / TURN), 0.0)
+        return np.cumsum(wraps)
 
     def _remember(self, dq: Floats, iv: Floats, rows: Rows, times: Floats) -> None:
         """Keep the first span of a block that disagrees by more than the mean size of both."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,11 @@ from crossbody.hw.checks.finding import Finding
 
 STUCK = 100  # samples without any change
 SATURATED = 10  # samples at the largest or smallest value of all
+NEAR, FAR = 10, 50  # samples before a run
+CUT = 0.15  # of the way of the last 50 samples, in the last 10: 0.04 where a motion comes to rest, 0.2 where it is cut
+STEPS = 6  # of the encoder's grid: where a slow parabola turns on a grid, the last 10 samples cover less
+HALF = 0.5  # of the largest step: a channel that froze while it moved goes on with a jump
+MOST = 8  # runs of a block that are looked at
 
 
 class ValueCheck:
@@ -60,35 +67,60 @@ class ValueCheck:
 
     def _about_runs(self) -> list[Finding]:
         runs, found = self.runs, []
-        rests = runs.longest_value == 0.0 and runs.longest.count < runs.seen  # at rest a sensor reads 0
-        if runs.longest.count >= STUCK and not rests:
-            text = f"the value does not change for {runs.longest.count} samples."
-            found.append(runs.longest.told("stuck", self._channel, text, fault=False))
-        for end, first in (("largest", runs.top), ("smallest", runs.bottom)):
-            value = runs.high if end == "largest" else runs.low
-            if first.count >= SATURATED and runs.low < runs.high and value != 0.0 and not runs.switch:
-                text = f"the value stays at its {end}, {value:.6g} {self._unit}, for {first.count} samples."
-                found.append(first.told("saturated", self._channel, text, fault=False))
+        stuck = [r for r in (runs.longest, runs.jumped) if r.count >= STUCK and r.value != 0.0 and runs.cut_off(r)]
+        if stuck:  # at rest a sensor reads 0
+            longest = max(stuck, key=lambda run: run.count)
+            text = f"the value does not change for {longest.count} samples."
+            found.append(longest.told("stuck", self._channel, text, fault=False))
+        for end, run in (("largest", runs.top), ("smallest", runs.bottom)):
+            if run.count >= SATURATED and run.value != 0.0 and runs.cut_off(run) and not runs.switch:
+                text = f"the value stays at its {end}, {run.value:.6g} {self._unit}, for {run.count} samples."
+                found.append(run.told("saturated", self._channel, text, fault=False))
         return found
 
 
-class Runs:
-    """Runs of equal values across blocks: the longest, and the longest at either end of the values so far.
+@dataclass(slots=True)
+class Run(First):
+    """Equal values; `count` is how many.
 
-    `count` of a run is its length here.
+    Attributes:
+        value: what they are.
+        sharp: how far in the 10 samples before, if that is no part of a smooth motion that came to rest; 0 if it is.
+        left: by how much the first step after leaves that value.
+    """
+
+    value: float = np.nan
+    sharp: float = 0.0
+    left: float = 0.0
+
+
+class Runs:
+    """Runs of equal values across blocks that no rest explains.
+
+    Kept are the longest, the one that ended with the largest jump, and the longest at either end of the values so far.
+
+    Rests and turning points are runs too, on the grid of an encoder. They are told from a channel that froze or hit
+    its limit by how the run begins: a motion that comes to rest covers 1/25 of its last 50 samples' way in the last 10,
+    one that is cut off a fifth. It must be more than the grid explains, so that a run is judged at the end alone.
     """
 
     def __init__(self) -> None:
         self.low, self.high = np.inf, -np.inf
-        self.longest, self.top, self.bottom = First(), First(), First()
-        self.longest_value, self.seen = np.nan, 0
-        self._open = First()
+        self.longest, self.jumped, self.top, self.bottom = Run(), Run(), Run(), Run()
+        self.seen = 0
+        self._grid, self._largest = np.inf, 0.0  # steps
+        self._open = Run()
         self._value = np.nan
+        self._tail: Floats = np.zeros(0)
 
     @property
     def switch(self) -> bool:
         """Whether the values seem to be those of a switch."""
         return (self.low, self.high) == (0.0, 1.0)
+
+    def cut_off(self, run: Run) -> bool:
+        """Whether the motion did not come to rest by itself when the run began, or not by itself go on."""
+        return max(run.sharp, run.left if run.left > HALF * self._largest else 0.0) >= STEPS * self._grid
 
     def see(self, rows: Rows, times: Floats, values: Floats) -> None:
         """Take in the next block."""
@@ -97,31 +129,59 @@ class Runs:
         if not len(values):
             return
         self.seen += len(values)
-        starts = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # NaN differs from everything
-        lengths = np.diff(starts, append=len(values))
+        steps = np.abs(np.diff(values, prepend=self._value))
+        starts = np.flatnonzero(steps != 0.0)  # NaN differs from everything
+        moved = steps[starts]
+        moved = moved[np.isfinite(moved)]
+        self._grid = min(self._grid, float(moved.min(initial=np.inf)))
+        self._largest = max(self._largest, float(moved.max(initial=0.0)))
         head = int(starts[0]) if len(starts) else len(values)
-        if head:
-            self._open.count += head
-            self._note(self._open, self._value)
-        if not len(starts):
-            return
-        for run in self._worth_noting(values[starts], lengths):
-            i = int(starts[run])
-            self._note(First(int(rows[i]), float(times[i]), int(lengths[run])), float(values[i]))
-        last = int(starts[-1])
-        self._open = First(int(rows[last]), float(times[last]), int(lengths[-1]))
-        self._value = float(values[last])
+        self._open.count += head
+        if len(starts) and self.seen > len(values):
+            self._open.left = abs(float(values[starts[0]]) - self._open.value)
+        if self._open.count:
+            self._note(self._open)
+        whole = np.concatenate((self._tail, values))
+        if len(starts):
+            lengths = np.diff(starts, append=len(values))
+            for i in sorted({*self._worth_noting(values[starts], lengths), len(starts) - 1}):
+                run = self._entered(whole, len(self._tail) + int(starts[i]))
+                run.row, run.t, run.count = int(rows[starts[i]]), float(times[starts[i]]), int(lengths[i])
+                if i + 1 < len(starts):
+                    run.left = abs(float(values[starts[i + 1]]) - run.value)
+                self._note(run)
+                self._open = run
+            self._value = float(values[-1])
+        self._tail = whole[-FAR:]
 
     @staticmethod
-    def _worth_noting(values: Floats, lengths: NDArray[np.int64]) -> set[int]:
-        """Indices of the runs of a block that can be the longest, or the longest at its ends."""
-        ends = (np.flatnonzero(values == values.max()), np.flatnonzero(values == values.min()))
-        return {int(np.argmax(lengths)), *(int(at[np.argmax(lengths[at])]) for at in ends)}
+    def _entered(whole: Floats, at: int) -> Run:
+        """The run that begins at an index, and how the channel came there."""
+        away = np.abs(whole[max(at - FAR, 0) : at] - whole[at])
+        far = float(away.max(initial=0.0))
+        near = float(away[-NEAR:].max(initial=0.0))
+        return Run(value=float(whole[at]), sharp=near if near > CUT * far else 0.0)
 
-    def _note(self, run: First, value: float) -> None:
-        if run.count > self.longest.count:
-            self.longest, self.longest_value = First(run.row, run.t, run.count), value
-        if value > self.high or (value == self.high and run.count > self.top.count):
-            self.high, self.top = value, First(run.row, run.t, run.count)
-        if value < self.low or (value == self.low and run.count > self.bottom.count):
-            self.low, self.bottom = value, First(run.row, run.t, run.count)
+    @staticmethod
+    def _worth_noting(values: Floats, lengths: NDArray[np.int64]) -> list[int]:
+        """Indices of the longest runs of a block, in all and at its ends."""
+        found = [np.argsort(lengths, kind="stable")[-MOST:]]
+        for end in (values.max(), values.min()):
+            at = np.flatnonzero(values == end)
+            found.append(at[np.argsort(lengths[at], kind="stable")[-MOST:]])
+        return [int(i) for i in np.concatenate(found)]
+
+    def _note(self, run: Run) -> None:
+        cut = run.sharp > 0.0
+        if cut and run.count > self.longest.count:
+            self.longest = replace(run)
+        if run.count >= STUCK and run.left > self.jumped.left:
+            self.jumped = replace(run)
+        if run.value > self.high:
+            self.high, self.top = run.value, Run(value=run.value)
+        if run.value < self.low:
+            self.low, self.bottom = run.value, Run(value=run.value)
+        if run.value == self.high and cut and run.count > self.top.count:
+            self.top = replace(run)
+        if run.value == self.low and cut and run.count > self.bottom.count:
+            self.bottom = replace(run)

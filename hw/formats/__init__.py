@@ -17,10 +17,13 @@ from types import ModuleType
 from typing import Any
 
 from crossbody.cases import ColumnMapError, FormatUnavailable, LogFormatError, _registry
+from crossbody.hw.formats._bounded import Bounded
+from crossbody.hw.formats._budget import MEMORY, Budget, opening
 from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group, Reader
 
 __all__ = [
     "BLOCK_ROWS",
+    "MEMORY",
     "Block",
     "Column",
     "Group",
@@ -129,24 +132,27 @@ def options(name: str, given: Mapping[str, Any]) -> Any:
         raise ColumnMapError("column map", "$.options" + where.rstrip("`"), f"{told}; {name} has: {known}.") from None
 
 
-def open_log(path: Path, name: str | None = None, options: Any = None) -> Reader:
+def open_log(path: Path, name: str | None = None, options: Any = None, memory: int = MEMORY) -> Bounded:
     """Open a log for reading.
 
     Args:
         path: file, or folder for formats that are one.
         name: the format; recognised by the file's beginning if not given.
         options: the format's own `Options`; its defaults if not given.
+        memory: bytes over the file's own size that reading it may take.
 
     Raises:
-        LogFormatError: if it cannot be read as that format.
+        LogFormatError: if it cannot be read as that format, or not within that memory.
         FormatUnavailable: if the format's package is not installed.
         UnknownName: for a format that does not exist.
     """
     module = load(name or recognise(path))
     if name is not None and not module.recognises(path, _head(path)):
         raise LogFormatError(path, f"does not begin as {name} files do: damaged, or in another format.")
+    budget = Budget(path, memory)
     try:
-        reader: Reader = module.open_log(path, module.Options() if options is None else options)
+        with opening(budget):
+            reader = Bounded(path, module.open_log(path, module.Options() if options is None else options), budget)
     except ModuleNotFoundError as error:
         raise unavailable(f"Log format {module.__name__.rpartition('.')[2]!r}", error) from None
     if not reader.groups:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group
 from crossbody.hw.formats._names import WIDEST, elements
 
+HINT = "save plain arrays or structs instead (a timetable: its columns; an object: struct(object))"  # of MATLAB
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:

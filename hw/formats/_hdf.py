@@ -9,11 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._grouping import Table, grouped, layout, place, spans
 from crossbody.hw.formats._guard import library, parsing
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
+MOST_OBJECTS = 20_000  # groups and datasets of a file
+DEEPEST = 32  # groups inside one another; the library itself recurses without an end
+LONGEST = 4096  # bytes of an attribute that is read
+CACHE = 1 << 20  # bytes of chunks that HDF5 keeps of its own accord
+SLOTS = 521  # places of its table of chunks; a prime, as it asks for
 
 
 class HdfReader:
@@ -29,19 +36,43 @@ class HdfReader:
         import h5py
 
         self._path, self._what, self._joint = path, what, joint
+        self._budget = current(path)
         self.library = library("h5py")
         self.refused: dict[str, str] = {}
         self._tables: list[Table] = []
+        self._visited: set[int] = set()
         with parsing(path, what):
             self._file = h5py.File(path, "r")
-            self._file.visititems(self._visit)
+        try:
+            with parsing(path, what):
+                self._walk("", self._file, 0)
+        except BaseException:
+            self._file.close()
+            raise
         self.groups = grouped(self._tables)
 
-    def _visit(self, key: str, item: Any) -> None:
+    def _walk(self, prefix: str, group: Any, depth: int) -> None:
+        """List the datasets below a group, each object once, whatever links lead to it."""
         import h5py
 
-        if not isinstance(item, h5py.Dataset) or key.startswith("#"):
-            return
+        if depth > DEEPEST:
+            raise LogFormatError(self._path, f"has groups inside groups beyond {DEEPEST} levels.")
+        for name in group:
+            if (not prefix and name.startswith("#")) or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                continue
+            item = group[name]
+            place_in_file = h5py.h5o.get_info(item.id).addr
+            if place_in_file in self._visited:
+                continue
+            self._visited.add(place_in_file)
+            if len(self._visited) > MOST_OBJECTS:
+                raise LogFormatError(self._path, f"holds more than {MOST_OBJECTS} groups and datasets.")
+            if isinstance(item, h5py.Group):
+                self._walk(f"{prefix}{name}/", item, depth + 1)
+            elif isinstance(item, h5py.Dataset):
+                self._list(prefix + name, item)
+
+    def _list(self, key: str, item: Any) -> None:
         name = key.replace("/", self._joint)
         why = self.why_not(item) or _missing(item)
         if why:
@@ -53,12 +84,14 @@ class HdfReader:
         """Why a dataset is no column of numbers; empty if it may be one."""
         plain = [item.dtype[n] for n in item.dtype.names] if item.dtype.names else [item.dtype]
         if any(dtype.kind not in "fiub" for dtype in plain):
-            return f"holds {item.dtype}, not numbers"
-        return "" if layout(item.shape) else f"has shape {item.shape}, which is no table"
+            return f"holds {str(item.dtype)[:LONGEST]}, not numbers"
+        if item.shape is None or not layout(item.shape):
+            return f"has shape {item.shape}, which is no table"
+        return ""
 
     def _add(self, key: str, name: str, item: Any) -> None:
         rows, width, axis = layout(item.shape) or (0, None, 0)
-        unit = _text(item.attrs.get("unit", item.attrs.get("units", "")))
+        unit = text_of(item, "unit") or text_of(item, "units")
         for field in item.dtype.names or ("",):
             dtype = item.dtype[field] if field else item.dtype
             self._tables.append(
@@ -69,26 +102,50 @@ class HdfReader:
             )  # fmt: skip
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
-        """See `Reader`."""
+        """See `Reader`. Every chunk is decoded once: those that a block of rows cuts through are kept."""
         wanted = {name: place(self._tables, name) for name in columns}
+        with parsing(self._path, self._what):
+            items = self._items({table.key for table, _ in wanted.values()})
         for start, stop in spans(group.rows or 0):
             block: Block = {}
             for name, (table, element) in wanted.items():
                 with parsing(self._path, self._what, start, name):
-                    block[name] = self._slice(table, element, start, stop)
+                    block[name] = _slice(items[table.key], table, element, start, stop)
             yield block
 
-    def _slice(self, table: Table, element: int | None, start: int, stop: int) -> Any:
-        item = self._file[table.key]
-        where: Any = slice(start, stop)
-        if item.ndim == 2:
-            where = (where, element or 0) if table.axis == 0 else (element or 0, where)
-        found = np.asarray(item[where])
-        return found[table.field] if table.field else found
+    def _items(self, keys: set[str]) -> dict[str, Any]:
+        """Open datasets that keep as many chunks as one block of rows touches."""
+        import h5py
+
+        sizes = {key: _chunk_bytes(self._file[key]) for key in keys}
+        self._budget.hold(sum(sizes.values()), "one chunk of every column")
+        found = {}
+        for key, size in sizes.items():
+            access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
+            access.set_chunk_cache(SLOTS, max(CACHE, size), 1.0)
+            found[key] = h5py.Dataset(h5py.h5d.open(self._file.id, key.encode(), access))
+        return found
 
     def close(self) -> None:
         """See `Reader`."""
         self._file.close()
+
+
+def _slice(item: Any, table: Table, element: int | None, start: int, stop: int) -> Any:
+    where: Any = slice(start, stop)
+    if item.ndim == 2:
+        where = (where, element or 0) if table.axis == 0 else (element or 0, where)
+    found = np.asarray(item[where])
+    return found[table.field] if table.field else found
+
+
+def _chunk_bytes(item: Any) -> int:
+    """Bytes of the chunks that lie beside one another across the samples; 0 for what is not chunked."""
+    if not item.chunks:
+        return 0
+    other = 1 if item.ndim == 2 and item.shape[0] >= item.shape[1] else 0
+    across = -(-item.shape[other] // item.chunks[other]) if item.ndim == 2 else 1
+    return int(math.prod(item.chunks) * item.dtype.itemsize * across)
 
 
 def _missing(item: Any) -> str:
@@ -103,7 +160,17 @@ def _missing(item: Any) -> str:
     return ""
 
 
-def _text(value: Any) -> str:
+def text_of(item: Any, name: str) -> str:
+    """A short text attribute; empty if there is none: nothing is allocated for what a file only declares."""
+    import h5py
+
+    if not h5py.h5a.exists(item.id, name.encode()):
+        return ""
+    found = h5py.h5a.open(item.id, name.encode())
+    if found.get_space().get_simple_extent_npoints() != 1 or found.get_storage_size() > LONGEST:
+        return ""
+    value = item.attrs[name]
+    value = value.flat[0] if isinstance(value, np.ndarray) and value.size == 1 else value
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     return value if isinstance(value, str) else ""

@@ -17,6 +17,7 @@ from crossbody.hw.formats._names import WIDEST
 
 BLOCK_MESSAGES = 8192
 DEEPEST = 12  # levels of nesting
+LARGEST = 1 << 20  # bytes of a message that is decoded
 STAMP = ({"sec", "nanosec"}, {"sec", "nsec"}, {"secs", "nsecs"})
 Way = tuple[str | int, ...]
 
@@ -58,6 +59,24 @@ def topic_group(topic: str, rows: int, message: Any, clocks: Sequence[str]) -> t
     leaves = {leaf.name: leaf for leaf in _leaves(message, topic, ())}
     times = tuple(Column(name=f"{topic}.{clock}", type="int64", unit="ns") for clock in clocks)
     return Group(name=topic, rows=rows, columns=(*times, *(leaf.column for leaf in leaves.values()))), leaves
+
+
+def too_large(data: bytes) -> str:
+    """Why a message is not decoded; empty if it is: every byte of it may become an object of hundreds."""
+    if len(data) <= LARGEST:
+        return ""
+    return f"has messages of {len(data)} bytes; pictures and clouds (more than {LARGEST}) are not read"
+
+
+def refuse_large(path: Path, topic: str, data: bytes) -> None:
+    """Refuse a message that is not decoded among ones that are.
+
+    Raises:
+        LogFormatError: if it is too large.
+    """
+    why = too_large(data)
+    if why:
+        raise LogFormatError(path, f"{topic!r} {why}.")
 
 
 def _members(value: Any) -> Mapping[str, Any] | None:

@@ -6,9 +6,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
+from crossbody.hw.formats._definitions import fault_of
 from crossbody.hw.formats._guard import library, parsing, words
-from crossbody.hw.formats._messages import Leaf, rows_of, topic_group
+from crossbody.hw.formats._messages import Leaf, refuse_large, rows_of, too_large, topic_group
+from crossbody.hw.formats._unfold import Chunks
 
 CLOCKS = ("log_time",)
 
@@ -29,6 +32,7 @@ class RosbagReader:
         from rosbags.typesys import Stores, get_typestore
 
         self._path, self._what = path, what
+        self._budget = current(path)
         self.library = library("rosbags")
         self.refused: dict[str, str] = {}
         self._leaves: dict[str, Mapping[str, Leaf]] = {}
@@ -37,16 +41,36 @@ class RosbagReader:
             self._bag.open()
         try:
             with parsing(path, what):
+                self._bound_chunks()
                 self.groups = tuple(self._topics())
         except BaseException:
             self.close()
             raise
+
+    def _bound_chunks(self) -> None:
+        """Let the chunks of a ROS 1 bag be unfolded by us: rosbags does so again wherever two overlap in time."""
+        from rosbags.rosbag1.reader import decompressors
+
+        names = {function: name for name, function in decompressors.items()}
+        chunks = Chunks(self._path, self._budget)
+        for reader in self._bag.readers:
+            for at, chunk in getattr(reader, "chunks", {}).items():
+                name = names[chunk.decompressor]
+
+                def unfold(raw: bytes, at: int = at, name: str = name) -> bytes:
+                    return chunks.unfold(at, name, raw)
+
+                reader.chunks[at] = chunk._replace(decompressor=unfold)
 
     def _topics(self) -> Iterator[Group]:
         for topic, about in sorted(self._bag.topics.items()):
             if not about.msgcount:
                 continue
             connection, _, data = next(self._bag.messages(self._of(topic)))
+            why = too_large(data) or fault_of(self._bag.typestore.fielddefs, connection.msgtype)
+            if why:
+                self.refused[topic] = why
+                continue
             try:
                 message = self._bag.deserialize(data, connection.msgtype)
             except KeyError as error:
@@ -69,8 +93,14 @@ class RosbagReader:
             yield block
 
     def _rows(self, topic: str) -> Iterator[tuple[Mapping[str, int], Callable[[], Any]]]:
-        for connection, time, data in self._bag.messages(self._of(topic)):
+        connections = self._of(topic)
+        faults = {one.msgtype: fault_of(self._bag.typestore.fielddefs, one.msgtype) for one in connections}
+        for connection, time, data in self._bag.messages(connections):
             kind = connection.msgtype
+            self._budget.spend(len(data))
+            refuse_large(self._path, topic, data)
+            if faults[kind]:
+                raise ValueError(faults[kind])
             yield (
                 {f"{topic}.log_time": time},
                 lambda data=data, kind=kind: self._bag.deserialize(data, kind),  # type: ignore[misc]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import MOST_COLUMNS
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._csv_fault import find_fault
 from crossbody.hw.formats._guard import library, parsing
@@ -19,6 +21,8 @@ from crossbody.hw.formats._names import header_unit
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
 DELIMITERS = ",;\t|"
 BLOCK_BYTES = 1 << 20
+WIDE = 0.4  # of the letters' second bytes that are zero in UTF-16
+HEAD = 4096  # bytes that tell the encoding
 EXACT = 2**53  # beyond, an integer is no float64
 MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "NA", "N/A"]
 
@@ -29,8 +33,9 @@ class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     Attributes:
         delimiter: between cells; found from the header if not given.
         decimal: decimal mark.
-        encoding: of the text.
+        encoding: of the text; UTF-16 is noticed.
         skip: lines before the header.
+        units: whether the line below the header holds the units of the columns.
         header: whether the first line names the columns; they are c0, c1, ... if not.
     """
 
@@ -39,11 +44,26 @@ class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     encoding: str = "utf-8"
     skip: int = 0
     header: bool = True
+    units: bool = False
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the file is text."""
-    return bool(head) and not re.search(rb"[\x00-\x08\x0e-\x1f\x7f]", head)
+    """Whether the file is text, of one byte a letter or two."""
+    return bool(head) and not re.search(r"[\x00-\x08\x0e-\x1f\x7f]", _text(head))
+
+
+def _text(head: bytes) -> str:
+    wide = wide_encoding(head)
+    return head[: len(head) & ~1].decode(wide, "replace") if wide else head.decode("latin-1")
+
+
+def wide_encoding(head: bytes) -> str:
+    """The UTF-16 that a file begins in, by its mark or by where its zeros are; empty if it is another encoding."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    pairs = max(len(head) // 2, 1)
+    odd, even = head[1::2].count(0) / pairs, head[0::2].count(0) / pairs
+    return "utf-16-le" if odd > WIDE and not even else "utf-16-be" if even > WIDE and not odd else ""
 
 
 def open_log(path: Path, options: Options) -> CsvReader:
@@ -55,8 +75,14 @@ class CsvReader:
     """A table of text, a megabyte at a time. Cells are numbers or an error: nothing in them is ever evaluated."""
 
     def __init__(self, path: Path, options: Options) -> None:
+        if options.encoding == "utf-8":
+            with path.open("rb") as file:
+                options = msgspec.structs.replace(options, encoding=wide_encoding(file.read(HEAD)) or "utf-8")
         self._path, self._options = path, options
         self._delimiter = options.delimiter or _delimiter(path, options)
+        width = _width(path, options, self._delimiter)
+        if width > MOST_COLUMNS:  # before anything is made for each of them
+            raise LogFormatError(path, f"has {width} columns; a log of more than {MOST_COLUMNS} is not read.")
         self.library = library("pyarrow")
         self.refused: dict[str, str] = {}
         batch, schema = self._first()
@@ -66,7 +92,8 @@ class CsvReader:
         if options.header and schema.names and all(map(_is_number, schema.names)):
             raise LogFormatError(path, "has numbers where names are expected; say `options.header = false`.")
         self._types = {f.name: _type(f, batch) for f in schema}
-        columns = tuple(Column(name=n, type=t, unit=header_unit(n)) for n, t in self._types.items())
+        units = dict(zip(schema.names, _units(path, options, self._delimiter), strict=False))
+        columns = tuple(Column(name=n, type=t, unit=units.get(n) or header_unit(n)) for n, t in self._types.items())
         self.groups = (Group(name="", rows=None, columns=columns),)
 
     def _first(self) -> tuple[Any, Any]:
@@ -85,31 +112,34 @@ class CsvReader:
         """See `Reader`."""
         import pyarrow as pa
 
+        rows = 0
         try:
             with self._stream(columns) as stream:
                 for batch in stream:
                     yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in columns}
+                    rows += batch.num_rows
         except pa.ArrowException as error:  # it does not tell the place of every fault
-            raise find_fault(self._path, self._options, self._delimiter, columns, error) from error
+            raise find_fault(self._path, self._options, self._delimiter, columns, error, rows) from error
 
     def _stream(self, columns: Sequence[str] | None = None) -> Any:
         import pyarrow as pa
-        from pyarrow import csv
+        from pyarrow import csv as text
 
         chosen = self._options
         types = {n: pa.int64() if self._types[n] == "int64" else pa.float64() for n in columns or ()}
         width = None if chosen.header else _width(self._path, chosen, self._delimiter)
-        return csv.open_csv(
+        return text.open_csv(
             self._path,
-            csv.ReadOptions(
+            text.ReadOptions(
                 use_threads=False,
                 block_size=BLOCK_BYTES,
                 skip_rows=chosen.skip,
+                skip_rows_after_names=int(chosen.units),
                 encoding=chosen.encoding,
                 column_names=[f"c{i}" for i in range(width)] if width is not None else None,
             ),
-            csv.ParseOptions(delimiter=self._delimiter),
-            csv.ConvertOptions(
+            text.ParseOptions(delimiter=self._delimiter),
+            text.ConvertOptions(
                 include_columns=list(columns) if columns is not None else None,
                 column_types=types,
                 null_values=MISSING,
@@ -137,6 +167,17 @@ def _first_line(path: Path, options: Options) -> str:
         for _ in range(options.skip):
             file.readline(BLOCK_BYTES)
         return file.readline(BLOCK_BYTES)
+
+
+def _units(path: Path, options: Options, delimiter: str) -> list[str]:
+    """The units in the line below the header, without their brackets."""
+    if not options.units:
+        return []
+    with parsing(path, "CSV file"), path.open(encoding=options.encoding, newline="") as file:
+        for _ in range(options.skip + int(options.header)):
+            file.readline(BLOCK_BYTES)
+        cells = next(csv.reader([file.readline(BLOCK_BYTES)], delimiter=delimiter), [])
+    return [cell.strip().strip("[]()") for cell in cells]
 
 
 def _delimiter(path: Path, options: Options) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +10,14 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
-from crossbody.hw.formats._grouping import Table, cut, grouped, layout, place
+from crossbody.hw.formats._grouping import HINT, Table, cut, grouped, layout, place
 from crossbody.hw.formats._guard import library, parsing
+from crossbody.hw.formats._mat_elements import whole_variable
 
 SUFFIXES = (".mat",)
 NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
-HINT = "save plain arrays or structs instead (a timetable: its columns; an object: struct(object))"
-LARGEST = 1 << 31  # bytes of one variable, the format's own limit
 
 
 class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -41,18 +41,21 @@ class MatReader:
         from scipy.io import whosmat
 
         self._path = path
+        self._budget = current(path)
         self.library = library("scipy")
         self.refused: dict[str, str] = {}
         self._tables: list[Table] = []
+        self._structs: dict[str, Any] = {}
         with parsing(path, "MAT file"):
             listed = whosmat(path)
-        for name, shape, kind in listed:
-            self._list(str(name), tuple(map(int, shape)), str(kind))
+        for i, (name, shape, kind) in enumerate(listed):
+            self._list(i, str(name), tuple(map(int, shape)), str(kind))
         self.groups = grouped(self._tables)
 
-    def _list(self, name: str, shape: tuple[int, ...], kind: str) -> None:
+    def _list(self, index: int, name: str, shape: tuple[int, ...], kind: str) -> None:
         if kind == "struct":
-            self._walk(name, name, self._load([name])[name])
+            self._structs[name] = self._struct(index, name)
+            self._walk(name, name, self._structs[name])
         elif kind not in NUMBERS:
             self.refused[name] = f"is a MATLAB {kind}: {HINT}"
         else:
@@ -76,17 +79,31 @@ class MatReader:
         else:
             self.refused[name] = f"is a MATLAB {_kind(value)}: {HINT}"
 
-    def _load(self, variables: Sequence[str]) -> dict[str, Any]:
+    def _struct(self, index: int, name: str) -> Any:
+        """A struct, decoded once: what it holds is only known when it has been."""
         from scipy.io import loadmat
 
         with parsing(self._path, "MAT file"):
-            found: dict[str, Any] = loadmat(self._path, variable_names=list(variables), mat_dtype=False)
-        return found
+            whole: Any = whole_variable(self._path, index, self._budget)
+            return loadmat(whole, mat_dtype=False)[name]
+
+    def _load(self, tables: Iterable[Table]) -> dict[str, Any]:
+        """The variables of some columns, whole."""
+        from scipy.io import loadmat
+
+        plain = {table.key: table for table in tables if table.key not in self._structs}
+        size = sum(table.rows * (table.width or 1) * np.dtype(table.type).itemsize for table in plain.values())
+        self._budget.hold(size, "what the columns announce")
+        if not plain:
+            return self._structs
+        with parsing(self._path, "MAT file"):
+            found: dict[str, Any] = loadmat(self._path, variable_names=list(plain), mat_dtype=False)
+        return {**self._structs, **found}
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`. A MAT variable can only be read whole, so the wanted ones are in memory together."""
         wanted = {name: place(self._tables, name) for name in columns}
-        loaded = self._load(sorted({table.key for table, _ in wanted.values()}))
+        loaded = self._load(table for table, _ in wanted.values())
         arrays = {name: (self._inside(loaded, table), table, i) for name, (table, i) in wanted.items()}
         yield from cut(arrays, group.rows or 0)
 

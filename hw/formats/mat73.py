@@ -7,10 +7,11 @@ from typing import Any
 
 import msgspec
 
-from crossbody.hw.formats._hdf import SIGNATURE, HdfReader
+from crossbody.hw.formats._grouping import HINT
+from crossbody.hw.formats._hdf import SIGNATURE, HdfReader, text_of
 
 SUFFIXES = (".mat",)
-NUMBERS = {b"double", b"single", b"logical", *(f"{s}int{n}".encode() for s in ("", "u") for n in (8, 16, 32, 64))}
+NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
 
 
 class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -32,7 +33,7 @@ class MatReader(HdfReader):
 
     def why_not(self, item: Any) -> str:
         """Why a variable is no column of numbers; empty if it may be one."""
-        kind = item.attrs.get("MATLAB_class", b"double")
+        kind = text_of(item, "MATLAB_class") or "double"
         if kind not in NUMBERS or "MATLAB_object_decode" in item.attrs:
-            return f"is a MATLAB {bytes(kind).decode('utf-8', 'replace')}: save plain arrays or structs instead"
+            return f"is a MATLAB {kind}: {HINT}"
         return "holds nothing" if "MATLAB_empty" in item.attrs else super().why_not(item)

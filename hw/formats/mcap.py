@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import Budget, current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._guard import library, parsing
-from crossbody.hw.formats._messages import Leaf, rows_of, topic_group
+from crossbody.hw.formats._messages import Leaf, refuse_large, rows_of, too_large, topic_group
+from crossbody.hw.formats._metered import MeteredFile
+from crossbody.hw.formats._unfold import Chunks
 
 SUFFIXES = (".mcap",)
 MAGIC = b"\x89MCAP0\r\n"
 WHAT = "MCAP file"
 CLOCKS = ("log_time", "publish_time")
+SCHEMA, CHANNEL, MESSAGE, CHUNK = 3, 4, 5, 6  # opcodes
+RECORD = struct.Struct("<BQ")  # opcode and length of every record
+STAMPED = struct.Struct("<HIQQ")  # channel, sequence number, log time and publish time of a message
+SIZES = struct.Struct("<QQQ")  # first and last time of a chunk, and its size when unfolded
 
 
 class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -33,58 +44,109 @@ def open_log(path: Path, options: Options) -> McapReader:
 
 
 class McapReader:
-    """Numbers in the messages of every topic, chunk by chunk, with their checksums checked."""
+    """Numbers in the messages of every topic, chunk by chunk, with their checksums checked.
+
+    Chunks are read in the order of the file, whatever its indices say, and unfolded to the size that they tell.
+    """
 
     def __init__(self, path: Path) -> None:
         from mcap_ros2.decoder import DecoderFactory
 
         self._path = path
+        self._budget = current(path)
+        self._chunks = Chunks(path, self._budget)
         self._ros2 = DecoderFactory()
         self.library = library("mcap")
         self.refused: dict[str, str] = {}
         self._leaves: dict[str, Mapping[str, Leaf]] = {}
-        self._file = path.open("rb")
+        self._file = MeteredFile(path, self._budget)
         try:
             with parsing(path, "MCAP file (cut off? `mcap recover` saves what is whole)"):
                 self.groups = tuple(self._topics())
         except BaseException:
             self._file.close()
             raise
+        self._file.metered = False
 
     def _topics(self) -> Iterator[Group]:
-        for topic, count in sorted(self._counts().items()):
-            schema, channel, message = next(self._messages(topic))
-            decode = self._decoder(schema, channel)
+        counts, first = self._counts()
+        for topic, count in sorted(counts.items()):
+            schema, channel, data = first[topic]
+            why = too_large(data)
+            decode = None if why else self._decoder(schema, channel)
             if decode is None:
-                kind = channel.message_encoding or "nothing"
-                self.refused[topic] = f"is encoded as {kind}; what can be read is cdr (ROS 2) and json"
+                kind = (
+                    f"is encoded as {channel.message_encoding or 'nothing'}; what can be read is cdr (ROS 2) and json"
+                )
+                self.refused[topic] = why or kind
                 continue
-            group, leaves = topic_group(topic, count, decode(message.data), CLOCKS)
+            group, leaves = topic_group(topic, count, decode(data), CLOCKS)
             self._leaves[topic] = leaves
             yield group
 
-    def _counts(self) -> dict[str, int]:
-        """Messages of every topic: from the summary, or by going through the file where it has none."""
+    def _counts(self) -> tuple[dict[str, int], dict[str, tuple[Any, Any, bytes]]]:
+        """Messages of every topic, from the summary or by going through the file, and the first message of each."""
+        told = self._told()
         counts: dict[str, int] = {}
-        summary = self._open().get_summary()
+        first: dict[str, tuple[Any, Any, bytes]] = {}
+        for schema, channel, _, _, data in self._messages(None):
+            topic = channel.topic
+            counts[topic] = counts.get(topic, 0) + 1
+            if topic not in first:
+                first[topic] = schema, channel, data
+                if told and first.keys() >= told.keys():
+                    return told, first
+        for topic in told.keys() - first.keys():
+            raise LogFormatError(self._path, f"announces {told[topic]} messages on {topic!r} and holds none: cut off?")
+        return counts, first
+
+    def _told(self) -> dict[str, int]:
+        """Messages of every topic by the file's summary; empty if it has none."""
+        from mcap.reader import make_reader
+
+        self._file.seek(0)
+        summary = make_reader(self._file).get_summary()
+        counts: dict[str, int] = {}
         if summary is not None and summary.statistics is not None and summary.channels:
             for key, count in summary.statistics.channel_message_counts.items():
                 topic = summary.channels[key].topic
                 counts[topic] = counts.get(topic, 0) + count
-        else:
-            for _, channel, _ in self._open().iter_messages():
-                counts[channel.topic] = counts.get(channel.topic, 0) + 1
         return {topic: count for topic, count in counts.items() if count}
 
-    def _open(self) -> Any:
-        from mcap.reader import make_reader
+    def _messages(self, topic: str | None) -> Iterator[tuple[Any, Any, int, int, bytes]]:
+        """Schema, channel, log time, publish time and data of the messages of a topic, or of all, as they stand."""
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Channel, Schema
 
-        self._file.seek(0)
-        return make_reader(self._file, validate_crcs=True)
+        schemas: dict[int, Any] = {}
+        channels: dict[int, Any] = {}
+        for opcode, raw in self._records():
+            if opcode == MESSAGE:
+                key, _, log_time, publish_time = STAMPED.unpack_from(raw)
+                channel = channels[key]
+                if topic is None or channel.topic == topic:
+                    yield schemas.get(channel.schema_id), channel, log_time, publish_time, bytes(raw[STAMPED.size :])
+            elif opcode == SCHEMA:
+                schema = Schema.read(ReadDataStream(BytesIO(raw)))
+                schemas[schema.id] = schema
+            elif opcode == CHANNEL:
+                found = Channel.read(ReadDataStream(BytesIO(raw)))
+                channels[found.id] = found
 
-    def _messages(self, topic: str) -> Iterator[tuple[Any, Any, Any]]:
-        found: Iterator[tuple[Any, Any, Any]] = self._open().iter_messages(topics=[topic], log_time_order=False)
-        return found
+    def _records(self) -> Iterator[tuple[int, memoryview]]:
+        """Records of the data section, those inside of chunks too."""
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Chunk
+
+        for at, opcode, length in records(self._file, self._path, self._budget):
+            if opcode == CHUNK:
+                chunk = Chunk.read(ReadDataStream(self._file))
+                whole = self._chunks.unfold(at, chunk.compression, chunk.data, chunk.uncompressed_size)
+                if chunk.uncompressed_crc and zlib.crc32(whole) != chunk.uncompressed_crc:
+                    raise LogFormatError(self._path, "has a chunk whose checksum is wrong: damaged.")
+                yield from _inside(memoryview(whole))
+            elif opcode in (SCHEMA, CHANNEL, MESSAGE):
+                yield opcode, memoryview(self._file.read(length))
 
     def _decoder(self, schema: Any, channel: Any) -> Callable[[bytes], Any] | None:
         if channel.message_encoding == "json":
@@ -103,11 +165,46 @@ class McapReader:
             yield block
 
     def _rows(self, topic: str) -> Iterator[tuple[Mapping[str, int], Callable[[], Any]]]:
-        for schema, channel, message in self._messages(topic):
+        for schema, channel, log_time, publish_time, data in self._messages(topic):
+            self._budget.spend(len(data))
+            refuse_large(self._path, topic, data)
             decode = self._decoder(schema, channel) or msgspec.json.decode
-            clocks = {f"{topic}.log_time": message.log_time, f"{topic}.publish_time": message.publish_time}
-            yield clocks, lambda decode=decode, data=message.data: decode(data)  # type: ignore[misc]
+            clocks = {f"{topic}.log_time": log_time, f"{topic}.publish_time": publish_time}
+            yield clocks, lambda decode=decode, data=data: decode(data)  # type: ignore[misc]
 
     def close(self) -> None:
         """See `Reader`."""
         self._file.close()
+
+
+def records(file: Any, path: Path, budget: Budget) -> Iterator[tuple[int, int, int]]:
+    """Place, opcode and length of the records of an open MCAP file, each before its content is read.
+
+    Raises:
+        LogFormatError: for a record that reaches beyond the file, or a chunk that would unfold to too much.
+    """
+    at, end = len(MAGIC), file.seek(0, 2) - len(MAGIC)
+    while at + RECORD.size <= end:
+        file.seek(at)
+        opcode, length = RECORD.unpack(file.read(RECORD.size))
+        if opcode == 0 or length > end - at - RECORD.size:
+            raise LogFormatError(
+                path, "has a record that is none, or reaches beyond its end: cut off? `mcap recover` helps."
+            )
+        if opcode == CHUNK and length >= SIZES.size:
+            budget.hold(2 * SIZES.unpack(file.read(SIZES.size))[2], "a chunk and its messages")
+            file.seek(at + RECORD.size)
+        yield at, opcode, length
+        at += RECORD.size + length
+
+
+def _inside(whole: memoryview) -> Iterator[tuple[int, memoryview]]:
+    """The records in an unfolded chunk; slices of it are no copies."""
+    at = 0
+    while at < len(whole):
+        opcode, length = RECORD.unpack_from(whole, at)
+        at += RECORD.size
+        if length > len(whole) - at:
+            raise ValueError("a record reaches beyond its chunk")
+        yield opcode, whole[at : at + length]
+        at += length

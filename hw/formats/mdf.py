@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._grouping import spans
 from crossbody.hw.formats._guard import library, parsing
+from crossbody.hw.formats._metered import MeteredFile
 
 SUFFIXES = (".mf4", ".mdf", ".dat")
 WHAT = "MDF file"
+LOOKS = 8  # blocks that are unfolded as fast as one block's numbers are read and checked
+DEEPEST = 8  # conversions that refer to conversions
 
 
 class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -44,13 +48,15 @@ class MdfReader:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._budget = current(path)
         self.library = library("asammdf")
         self.refused: dict[str, str] = {}
         self._place: dict[str, tuple[int, int]] = {}
-        self._raw = path.open("rb")  # a file of our own is closed whatever happens in there
+        self._raw = MeteredFile(path, self._budget)  # a file of our own is closed whatever happens in there
         try:
             with parsing(path, WHAT):
                 self._file = _opened(self._raw)
+                self._raw.metered = False
                 self.groups = tuple(g for i in range(len(self._file.groups)) if (g := self._group(i)).columns)
         except BaseException:
             self._raw.close()
@@ -65,7 +71,11 @@ class MdfReader:
 
     def _check_size(self, group: Any, rows: int, index: int) -> None:
         """A cut file announces more rows than its blocks can hold."""
-        stored = sum(block.original_size for block in group.get_data_blocks())
+        sizes = [block.original_size for block in group.get_data_blocks()]
+        stored = sum(sizes)
+        # asammdf unfolds a whole block for every channel that is looked at
+        self._budget.hold(2 * max(sizes, default=0), f"a block of group {index}")
+        self._budget.spend(max(sizes, default=0) * len(group.channels) // LOOKS)
         width = int(group.channel_group.samples_byte_nr)
         if rows and width and stored < rows * width:
             raise LogFormatError(
@@ -79,6 +89,9 @@ class MdfReader:
         name = channel.name if once else f"{index}/{channel.name}"
         self._place[name] = index, i
         if not rows:
+            return None
+        if _has_formula(channel.conversion):
+            self.refused[name] = "is converted by a formula in the file, which is not evaluated"
             return None
         try:
             sample = self._get(name, 0, 1)
@@ -114,6 +127,14 @@ class MdfReader:
         """See `Reader`."""
         self._file.close()
         self._raw.close()
+
+
+def _has_formula(conversion: Any, depth: int = 0) -> bool:
+    """Whether a conversion, or one that it refers to, is text to be evaluated: asammdf would run it as code."""
+    if depth > DEEPEST or bool(getattr(conversion, "formula", None)):
+        return True
+    refers = getattr(conversion, "referenced_blocks", None) or {}
+    return any(_has_formula(one, depth + 1) for one in refers.values())
 
 
 def _opened(raw: Any) -> Any:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from crossbody.hw.formats._bag_folder import check_bag
 from crossbody.hw.formats._rosbag import RosbagReader
 
 SUFFIXES = (".db3",)
@@ -22,4 +23,5 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def open_log(path: Path, options: Options) -> RosbagReader:
     """Open a ROS 2 bag; columns are named `/topic.field.element[0]`."""
+    check_bag(path)
     return RosbagReader(path, "ROS 2 bag")

@@ -10,9 +10,11 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._grouping import spans
 from crossbody.hw.formats._guard import library, parsing
+from crossbody.hw.formats._metered import MeteredFile
 
 SUFFIXES = (".tdms",)
 WHAT = "TDMS file"
@@ -42,10 +44,11 @@ class TdmsReader:
         self.library = library("npTDMS")
         self.refused: dict[str, str] = {}
         self._channels: dict[str, Any] = {}
-        self._raw = path.open("rb")  # a file of our own is closed whatever happens in there
+        self._raw = MeteredFile(path, current(path))  # a file of our own is closed whatever happens in there
         try:
             with parsing(path, WHAT):
                 self._file = TdmsFile.open(self._raw)
+                self._raw.metered = False
                 if self._file.file_status.incomplete_final_segment:
                     raise LogFormatError(path, "was cut off: its last segment is incomplete.")
                 self.groups = tuple(self._groups())

@@ -16,6 +16,8 @@ from crossbody.hw.reading.rows import Floats
 from crossbody.hw.reading.units import is_time, to_si
 
 NAMES = ("t", "time", "stamp", "timestamp", "log_time", "times", "seconds", "sec", "elapsed", "clock", "publish_time")
+EARLY = 1000  # times that tell the unit
+TICKS = (("ns", 3e4), ("us", 100.0))  # step from which on times are no seconds but these
 SUFFIX = re.compile(r"[_\s](ns|us|ms|s)$")
 
 
@@ -64,9 +66,19 @@ def _rank(name: str) -> int:
 
 def _guess(column: Column, raw: NDArray[Any]) -> ClockGuess:
     suffix = SUFFIX.search(last_word(column.name))
-    unit = column.unit if _is_time(column.unit) else suffix.group(1) if suffix else "s"
+    told = column.unit if _is_time(column.unit) else suffix.group(1) if suffix else ""
+    unit = told or unit_of_ticks(raw)
     origin = int(raw[0]) if raw.dtype.kind in "iu" and len(raw) and abs(int(raw[0])) > 2**53 else 0
     return ClockGuess(column=column.name, unit=unit, origin=origin)
+
+
+def unit_of_ticks(raw: NDArray[Any]) -> str:
+    """The unit that times without one seem to be in: seconds, unless their steps would be minutes and more."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.diff(raw[:EARLY].astype(np.float64))  # what a float64 leaves of a large integer tells its size
+    steps = steps[np.isfinite(steps) & (steps > 0.0)]
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    return next((unit for unit, least in TICKS if usual >= least), "s")
 
 
 def _is_time(unit: str) -> bool:

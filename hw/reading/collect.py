@@ -36,10 +36,11 @@ def collect(blocks: Iterable[Rows], plan: Plan, group: Group, limit: int) -> Row
         width = sum(part.itemsize for part in parts)
         need = max(announced, size + len(block.time))
         if need * width > limit:
-            text = f"needs {need * width / 1e9:.1f} GB in memory, above the limit of {limit / 1e9:.1f} GB; `scan` it."
+            text = f"needs {need * width / 1e9:.3g} GB in memory, above the limit of {limit / 1e9:.3g} GB; `scan` it."
             raise LogFormatError(plan.path, text)
         if not held or need > len(held[0]):
-            held = _grown(held, parts, size, max(need, 2 * size, 0 if announced else FIRST))
+            room = max(need, limit // width - size)  # while rows are moved, the old arrays are there too
+            held = _grown(held, parts, size, max(need, min(room, max(2 * size, 0 if announced else FIRST))))
         for whole, part in zip(held, parts, strict=True):
             whole[size : size + len(part)] = part
         size += len(block.time)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
@@ -38,7 +38,8 @@ def draft(found: Survey) -> Columns:
     step = None if main.clock or main.group.step else 1.0
     time = Time(column=main.clock.column if main.clock else "", unit=unit, sample_time=step)
     joined = any(signal.time for table in tables.values() for signal in table.values())
-    columns = Columns(format=found.format, join="hold" if joined else "exact", time=time)
+    how: Literal["hold", "exact"] = "hold" if joined else "exact"
+    columns = Columns(format=found.format, options=dict(found.options), join=how, time=time)
     return msgspec.structs.replace(columns, **tables)
 
 

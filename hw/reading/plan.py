@@ -70,6 +70,7 @@ class Plan:
         time_column: column of the times; empty if rows are counted.
         ticks: from the stored time to seconds.
         step, start: seconds a sample and time of the first, where samples are counted.
+        told: whether map or file say in which unit the times are.
     """
 
     path: Path
@@ -80,6 +81,7 @@ class Plan:
     ticks: Conversion
     step: float
     start: float
+    told: bool = True
 
     @property
     def own(self) -> tuple[Source, ...]:
@@ -116,6 +118,7 @@ def make_plan(path: Path, reader: Reader, columns: Columns) -> Plan:
     return Plan(
         path=path, columns=columns, group=group, sources=sources, time_column=time.column, ticks=ticks, step=step,
         start=group.start if not time.column else 0.0,
+        told=counted or time.unit is not None or time.scale != 1.0 or bool(found.column(time.column)[1].unit),
     )  # fmt: skip
 
 

@@ -17,15 +17,13 @@ from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading import repair as _repair
 from crossbody.hw.reading import store as _store
 from crossbody.hw.reading.collect import collect
-from crossbody.hw.reading.columns import Columns, dump_columns, load_columns
+from crossbody.hw.reading.columns import Columns, Role, dump_columns, load_columns
 from crossbody.hw.reading.hash import file_hash
 from crossbody.hw.reading.join import join
 from crossbody.hw.reading.log import Channel, Log, Provenance, Repair
-from crossbody.hw.reading.plan import Plan, Source, make_plan
+from crossbody.hw.reading.plan import ROTATES, Plan, Source, make_plan
 from crossbody.hw.reading.rows import Floats, Rows
 from crossbody.hw.reading.stream import Stream
-
-LIMIT = 4 << 30  # bytes of numbers that `read` holds unless it is told otherwise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +36,7 @@ class Scan:
         checks: what they are checked by, as far as they have been seen.
         library: package that reads.
         format: name of the format.
+        limit: bytes that its numbers may take in memory.
     """
 
     plan: Plan
@@ -45,6 +44,7 @@ class Scan:
     checks: Checks
     library: str
     format: str
+    limit: int
 
     def rows(self) -> Iterator[Rows]:
         """Blocks of rows in SI, checked as they pass."""
@@ -54,18 +54,22 @@ class Scan:
 
 
 @contextmanager
-def scan(path: str | Path, columns: Columns | str | Path | None = None, part: int | None = None) -> Iterator[Scan]:
+def scan(
+    path: str | Path, columns: Columns | str | Path | None = None, part: int | None = None, *,
+    memory: int = formats.MEMORY,
+) -> Iterator[Scan]:  # fmt: skip
     """Open a log to go through it in bounded memory, however long it is.
 
     Args:
         path: as for `read`.
         columns: as for `read`; signals with times of their own are not possible here.
         part: as for `read`.
+        memory: as for `read`.
 
     Raises:
         ColumnMapError, LogFormatError, FormatUnavailable, UnknownName: as `read`.
     """
-    with _opened(Path(path), columns, part) as found:
+    with _opened(Path(path), columns, part, memory) as found:
         for source in found.plan.joined:
             text = "has other rows than the times; only `read` joins them."
             raise LogFormatError(path, text, column=source.signal.column)
@@ -73,7 +77,7 @@ def scan(path: str | Path, columns: Columns | str | Path | None = None, part: in
 
 
 @contextmanager
-def _opened(path: Path, columns: Columns | str | Path | None, part: int | None) -> Iterator[Scan]:
+def _opened(path: Path, columns: Columns | str | Path | None, part: int | None, memory: int) -> Iterator[Scan]:
     chosen = _store.columns_of(path) if columns is None else columns
     chosen = chosen if isinstance(chosen, Columns) else load_columns(chosen)
     if (part is None) != (not chosen.part):
@@ -81,18 +85,21 @@ def _opened(path: Path, columns: Columns | str | Path | None, part: int | None) 
         raise InvalidValue(f"part is {part} and the map's `part` {chosen.part!r}: {hint}.")
     name = chosen.format or formats.recognise(path)
     options = formats.options(name, chosen.options)
-    reader = formats.open_log(path, name, options)
+    reader = formats.open_log(path, name, options, memory)
     try:
         plan = make_plan(path, reader, chosen)
         checks = Checks(plan.own, chosen.time.sample_time)
-        yield Scan(plan=plan, stream=Stream(plan, reader, part), checks=checks, library=reader.library, format=name)
+        yield Scan(
+            plan=plan, stream=Stream(plan, reader, part), checks=checks, library=reader.library, format=name,
+            limit=reader.budget.memory,
+        )  # fmt: skip
     finally:
         reader.close()
 
 
 def read(
     path: str | Path, columns: Columns | str | Path | None = None, *, part: int | None = None,
-    repair: Collection[str] = (), limit: int = LIMIT,
+    repair: Collection[str] = (), limit: int | None = None, memory: int = formats.MEMORY,
 ) -> Log:  # fmt: skip
     """Read a log.
 
@@ -100,9 +107,11 @@ def read(
         path: file of any format of `formats.names()`, or the folder of a ROS 2 bag.
         columns: the column map: its file, a name of `maps()`, or itself; not needed for a log that `store` wrote.
         part: number of the run, where the map names a column that tells several apart.
-        repair: any of "drop_duplicates" (rows with the time of the row before) and "fill_dropped" (samples that are
-            missing: measured signals linearly, commanded ones held); what was done is in the provenance.
-        limit: largest size of all its numbers in memory, bytes.
+        repair: any of "drop_duplicates" (rows with the time of the row before), "fill_dropped" (samples that are
+            missing: measured signals linearly, commanded ones held) and "unwrap" (coordinates in rad that jump by whole
+            turns); what was done is in the provenance.
+        limit: largest size of all its numbers in memory, bytes; what `memory` admits if not given.
+        memory: bytes over the file's own size that reading may take; a file that unfolds to more is refused.
 
     Returns:
         The log in SI: times strictly increasing, all values finite.
@@ -126,9 +135,9 @@ def read(
     stored = _store.about(Path(path)) if columns is None else None
     if stored is not None and repair:
         raise InvalidValue(f"{path} is a stored log, which is never repaired; repair {stored.provenance.file} instead.")
-    with _opened(Path(path), columns, part) as found:
+    with _opened(Path(path), columns, part, memory) as found:
         plan = found.plan
-        block, repairs, checks = _gather(found, repair, limit)
+        block, repairs, checks = _gather(found, repair, found.limit if limit is None else limit)
         step = plan.columns.time.sample_time or plan.step or checks.clock.step
         made = np.zeros(0, np.int64)
         count = len(block.time)
@@ -156,12 +165,23 @@ def _gather(found: Scan, repair: Collection[str], limit: int) -> tuple[Rows, tup
     repairs: tuple[Repair, ...] = ()
     if "drop_duplicates" in repair:
         block, repairs = _repair.drop_duplicates(block)
+    if "unwrap" in repair:
+        block, unwrapped = _repair.unwrap(block, _angles(plan.own))
+        repairs += unwrapped
     checks = _checked(plan, plan.own, block)
     if plan.joined:
         block, trimmed = _joined(found, block, limit)
         repairs += trimmed
+        if "unwrap" in repair:
+            block, unwrapped = _repair.unwrap(block, _angles(plan.sources))
+            repairs += unwrapped
         checks = _checked(plan, plan.sources, block)
     return block, repairs, checks
+
+
+def _angles(sources: Sequence[Source]) -> list[int]:
+    """Indices of the coordinates in rad."""
+    return [i for i, s in enumerate(sources) if s.role is Role.COORDINATES and s.conversion.si == ROTATES]
 
 
 def _checked(plan: Plan, sources: Sequence[Source], block: Rows) -> Checks:
@@ -200,19 +220,21 @@ def _channel(source: Source, values: Floats) -> Channel:
 
 
 def check(
-    path: str | Path, columns: Columns | str | Path | None = None, part: int | None = None
-) -> tuple[Finding, ...]:
+    path: str | Path, columns: Columns | str | Path | None = None, part: int | None = None, *,
+    memory: int = formats.MEMORY,
+) -> tuple[Finding, ...]:  # fmt: skip
     """Everything that the checks have to say about a log, faults too; in bounded memory.
 
     Args:
         path: as for `read`.
         columns: as for `read`.
         part: as for `read`.
+        memory: as for `read`.
 
     Raises:
         ColumnMapError, LogFormatError, FormatUnavailable: if it cannot be read at all.
     """
-    with _opened(Path(path), columns, part) as found:
+    with _opened(Path(path), columns, part, memory) as found:
         for _ in found.rows():
             pass
         told = list(found.checks.findings())
@@ -225,8 +247,13 @@ def check(
     return tuple(sorted(told, key=lambda finding: (not finding.fault, finding.row)))
 
 
-def parts(path: str | Path, columns: Columns | str | Path) -> tuple[int, ...]:
+def parts(path: str | Path, columns: Columns | str | Path, *, memory: int = formats.MEMORY) -> tuple[int, ...]:
     """Numbers of the runs in a file, by the column that the map names by `part`.
+
+    Args:
+        path: as for `read`.
+        columns: as for `read`.
+        memory: as for `read`.
 
     Raises:
         InvalidValue: if the map names none.
@@ -235,5 +262,5 @@ def parts(path: str | Path, columns: Columns | str | Path) -> tuple[int, ...]:
     chosen = columns if isinstance(columns, Columns) else load_columns(columns)
     if not chosen.part:
         raise InvalidValue("The map names no column by `part`: the file holds one run.")
-    with _opened(Path(path), chosen, 0) as found:
+    with _opened(Path(path), chosen, 0, memory) as found:
         return found.stream.parts()

@@ -7,13 +7,15 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import UnknownName
+from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw.checks.clock import GAP
+from crossbody.hw.checks.jumps import unwrapped
 from crossbody.hw.reading.columns import Role
 from crossbody.hw.reading.log import Repair
 from crossbody.hw.reading.rows import Floats, Rows
 
-REPAIRS = ("drop_duplicates", "fill_dropped")
+REPAIRS = ("drop_duplicates", "fill_dropped", "unwrap")
+MOST = 10  # samples that are filled for each that is there
 LONGEST = 1000  # samples that are filled in one place: more is no dropout but a pause
 
 
@@ -33,6 +35,25 @@ def drop_duplicates(block: Rows) -> tuple[Rows, tuple[Repair, ...]]:
     i = int(np.argmax(again))
     told = Repair(name="drop_duplicates", rows=count, row=int(block.rows[i]), t=float(block.time[i]))
     return block.take(~again), (told,)
+
+
+def unwrap(block: Rows, angles: Collection[int]) -> tuple[Rows, tuple[Repair, ...]]:
+    """Take whole turns off angles from where they wrap on.
+
+    Args:
+        block: the whole log; time strictly increasing.
+        angles: indices of the values that are coordinates in rad.
+    """
+    values, told = list(block.values), list[NDArray[np.int64]]()
+    for i in angles:
+        values[i], wraps = unwrapped(block.time, block.values[i])
+        told.append(wraps)
+    wraps = np.unique(np.concatenate(told)) if told else np.zeros(0, np.int64)
+    if not len(wraps):
+        return block, ()
+    first = int(wraps[0])
+    repair = Repair(name="unwrap", rows=len(wraps), row=int(block.rows[first]), t=float(block.time[first]))
+    return Rows(rows=block.rows, time=block.time, values=tuple(values)), (repair,)
 
 
 def fill_dropped(
@@ -55,6 +76,9 @@ def fill_dropped(
     missing[missing > LONGEST] = 0
     if not missing.any():
         return block, (), np.zeros(0, np.int64)
+    if missing.sum() > MOST * len(steps):
+        text = f"lacks {missing.sum()} samples beside {len(steps) + 1} that are there: no dropouts, but another rate."
+        raise InvalidValue(f"fill_dropped: the log {text}")
     before = np.repeat(np.arange(len(steps)), missing)  # the row before each new one
     inside = np.arange(len(before)) - np.repeat(np.cumsum(missing) - missing, missing) + 1
     share = inside / (missing[before] + 1.0)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats import Group, Reader
+from crossbody.hw.reading.clock_guess import unit_of_ticks
 from crossbody.hw.reading.plan import Plan, Source
 from crossbody.hw.reading.rows import Floats, Rows
 
@@ -53,6 +54,12 @@ class Stream:
 
     def seconds(self, raw: NDArray[Any], column: str) -> Floats:
         """Stored times to seconds; integers that no float64 holds count from the log's first."""
+        unit = unit_of_ticks(raw) if not self.plan.told and not self._begun else "s"
+        if unit != "s":
+            text = (
+                f'has steps of {_usual(raw):.3g} and no unit: as seconds, no rig\'s. Write `unit` ("{unit}"?) for it.'
+            )
+            raise LogFormatError(self.plan.path, text, column=column)
         if raw.dtype.kind in "iu":
             if not self._begun and len(raw):
                 self._begun = True
@@ -94,3 +101,7 @@ class Stream:
                 )
             found.update(np.unique(block[column]).astype(int).tolist())
         return tuple(sorted(found))
+
+
+def _usual(raw: NDArray[Any]) -> float:
+    return float(np.median(np.abs(np.diff(raw[:1000].astype(np.float64)))))

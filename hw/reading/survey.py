@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from crossbody.hw.checks.finding import Finding
 from crossbody.hw.checks.values import ValueCheck
 from crossbody.hw.formats import Column, Group, Reader
 from crossbody.hw.reading.clock_guess import ClockGuess, guess_clock
-from crossbody.hw.reading.columns import Columns
+from crossbody.hw.reading.columns import Columns, load_columns
 from crossbody.hw.reading.rows import Floats
 
 
@@ -74,6 +75,7 @@ class Survey:
         groups: what is in it.
         refused: columns that are no numbers -> why.
         findings: doubts about it; faults first.
+        options: what the format was told by a map.
     """
 
     path: Path
@@ -82,6 +84,7 @@ class Survey:
     groups: tuple[GroupSurvey, ...]
     refused: dict[str, str]
     findings: tuple[Finding, ...]
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     def draft(self) -> Columns:
         """A column map to begin with: roles and missing units are guessed from names."""
@@ -100,28 +103,36 @@ class Survey:
                 raise finding.error(self.path)
 
 
-def survey(path: str | Path) -> Survey:
-    """Go through a file once, in bounded memory, without a column map.
+def survey(path: str | Path, columns: Columns | str | Path | None = None, *, memory: int = formats.MEMORY) -> Survey:
+    """Go through a file once, in bounded memory; a column map is not needed.
 
     Args:
         path: file of any format of `formats.names()`, or the folder of a ROS 2 bag.
+        columns: a map whose `format` and `options` (delimiter, decimal mark, encoding, ...) the file is read by.
+        memory: as for `read`.
 
     Raises:
         LogFormatError: if it cannot be read.
         FormatUnavailable: if the format's package is not installed.
+        ColumnMapError: for a map that cannot be followed.
     """
     path = Path(path)
-    name = formats.recognise(path)
-    reader = formats.open_log(path, name)
+    chosen = columns if columns is None or isinstance(columns, Columns) else load_columns(columns)
+    name = (chosen.format if chosen else None) or formats.recognise(path)
+    reader = formats.open_log(path, name, formats.options(name, chosen.options) if chosen else None, memory)
     try:
         refused, findings = dict(reader.refused), list[Finding]()
         groups = tuple(_group(reader, group, refused, findings) for group in reader.groups)
         if not any(group.rows for group in groups):
-            raise LogFormatError(path, "holds no samples.")
+            why = next((f" ({column}: {text})" for column, text in refused.items()), "")
+            raise LogFormatError(path, f"holds no samples{why}.")
     finally:
         reader.close()
     found = tuple(sorted(findings, key=lambda f: (not f.fault, f.row)))
-    return Survey(path=path, format=name, library=reader.library, groups=groups, refused=refused, findings=found)
+    return Survey(
+        path=path, format=name, library=reader.library, groups=groups, refused=refused, findings=found,
+        options=chosen.options if chosen else {},
+    )  # fmt: skip
 
 
 def _group(reader: Reader, group: Group, refused: dict[str, str], findings: list[Finding]) -> GroupSurvey:
@@ -164,6 +175,8 @@ def _numeric(reader: Reader, group: Group, column: Column, refused: dict[str, st
             pass
     except LogFormatError as error:
         refused[column.name] = "holds text, not numbers"
+        if error.row == 0:
+            refused[column.name] = str(error).rpartition("row 0: ")[2].rstrip(".")
         if error.row:
             text = str(error).rpartition(f"row {error.row}: ")[2]
             findings.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,9 +16,12 @@ from crossbody.hw.formats import unavailable
 
 Floats = NDArray[np.float64]
 
-# Whatever else stands in a file's unit field is not handed to a parser: no numbers but small exponents.
-WRITTEN = re.compile(r"(?:[A-Za-z_µμΩ°%]+|\s|[*/·()]|(?:\*\*|\^)\s*-?\d|[²³]|(?<![\w.])1(?![\w.]))*")
-LONGEST = 40
+# What a file calls a unit reaches pint only if it is one by this grammar, which is bounded in every direction: pint
+# computes powers as they stand, and `m^9^9^9` would never end. No text is two tokens, so that nothing backtracks.
+TOKEN = re.compile(r"(?P<operand>[A-Za-z_µμΩ°%]++|1(?![\w.]))|(?P<power>(?:\*\*|\^)\s*+-?[1-9](?![\w.])|[²³])"
+                   r"|(?P<sign>[*/·])|(?P<open>\()|(?P<close>\))|(?P<space>\s++)")  # fmt: skip
+LONGEST = 40  # characters
+DEEPEST = 2  # brackets inside one another
 PREFERRED = ("N", "N m", "N s", "N/m", "N s/m", "Pa", "W", "V", "ohm", "kg", "A", "m", "s", "K")
 SPELLED = {"°": "degree", "%": "percent", "Nm": "newton * meter", "": "dimensionless", "1": "dimensionless"}
 
@@ -75,14 +79,35 @@ def _registry() -> Any:
     return pint.UnitRegistry(cache_folder=None)
 
 
+def _check_grammar(text: str) -> None:
+    """Refuse what is no product of names and their powers, before a parser sees it."""
+    at, depth, before = 0, 0, "sign"
+    while at < len(text):
+        token = TOKEN.match(text, at) if len(text) <= LONGEST else None
+        kind = token.lastgroup if token else None
+        depth += (kind == "open") - (kind == "close")
+        after_operand = before in ("operand", "power", "close")
+        if token is None or not 0 <= depth <= DEEPEST:
+            raise ValueError(text)
+        if (kind in ("sign", "close") and not after_operand) or (
+            kind == "power" and before in ("sign", "open", "power")
+        ):
+            raise ValueError(text)
+        at, before = token.end(), before if kind == "space" else str(kind)
+    if depth or before in ("sign", "open"):
+        raise ValueError(text)
+
+
 @lru_cache(maxsize=256)
 def _convert(unit: str) -> Conversion:
-    if len(unit) > LONGEST or not WRITTEN.fullmatch(unit):
-        raise ValueError(unit)
+    if unit:
+        _check_grammar(unit)
     registry = _registry()
     text = re.sub(r"(?<=[A-Za-z)])\s+(?=[A-Za-z(])", " * ", SPELLED.get(unit, unit)).replace("·", "*")
     parsed = registry.Unit(text)
     zero, one = (registry.Quantity(x, parsed).to_base_units() for x in (0.0, 1.0))
+    if not 0.0 < one.magnitude - zero.magnitude < math.inf:
+        raise ValueError(unit)
     if zero.magnitude:
         return Conversion(si=_name(one.units), factor=one.magnitude - zero.magnitude, shift=zero.magnitude)
     return Conversion(si=_name(one.units), factor=one.magnitude)

@@ -13,6 +13,10 @@ import click
 from crossbody.reports.voice import speaks
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
+memory_option = click.option(
+    "--memory", type=click.IntRange(1), default=1000, show_default=True, metavar="MB",
+    help="That reading LOG may take over its own size; a file that unfolds to more is refused.",
+)  # fmt: skip
 
 
 def _replayed(command: _Work) -> _Work:
@@ -23,7 +27,10 @@ def _replayed(command: _Work) -> _Work:
         click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them."),
         click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
         click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart."),
-        click.option("--repair", metavar="R", multiple=True, help="fill_dropped or drop_duplicates; repeatable."),
+        click.option(
+            "--repair", metavar="R", multiple=True, help="fill_dropped, drop_duplicates or unwrap; repeatable."
+        ),
+        memory_option,
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the model; repeatable."),
         click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
         click.option("--horizon", type=float, metavar="S", help="Length of a window, s, if not to the next restart."),

@@ -27,6 +27,7 @@ class Ask:
 
     Attributes:
         path, columns, part, repair: as for `hw.read`.
+        memory: that reading may take over the file's own size, MB.
         model: name of the model.
         pairs: K=V, parameters of the model.
         restart, horizon: s; None for the usual.
@@ -42,10 +43,12 @@ class Ask:
     restart: float | None
     horizon: float | None
     delay: float
+    memory: int = 1000
 
     def log(self) -> Log:
         """The log."""
-        return hw.read(self.path, self.columns, part=self.part, repair=self.repair)
+        room = self.memory * 1_000_000
+        return hw.read(self.path, self.columns, part=self.part, repair=self.repair, memory=room)
 
 
 def _ended(model: str, engine: str) -> bool:

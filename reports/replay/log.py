@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 WIDTH = 120  # of the tables in a file or a pipe
 
 
-def info(path: Path, columns: str | None, part: int | None, draft_only: bool) -> int:
+def info(path: Path, columns: str | None, part: int | None, draft_only: bool, memory: int = 1000) -> int:
     """Say what is in a log and what is wrong with it.
 
     Args:
@@ -28,18 +28,20 @@ def info(path: Path, columns: str | None, part: int | None, draft_only: bool) ->
         columns: a column map to check it by; if not given, one is drafted.
         part: number of the run, where the map tells several apart.
         draft_only: whether to print the drafted map and nothing else.
+        memory: that reading may take over the file's own size, MB.
 
     Raises:
         CrossbodyError: if the log cannot be read, or a check refuses it (after everything else was printed).
     """
-    found = hw.survey(path)
+    room = memory * 1_000_000
+    found = hw.survey(path, columns, memory=room)
     if draft_only:
         print(hw.draft_text(found))
         found.refuse()
         return 0
     if not voice.silent():
         _show(found)
-    told = found.findings if columns is None else hw.check(path, columns, part)
+    told = found.findings if columns is None else hw.check(path, columns, part, memory=room)
     if voice.as_json():
         print(json.dumps(plain(found, told), indent=1, allow_nan=False))
     else:

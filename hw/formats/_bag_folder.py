@@ -1,0 +1,78 @@
+"""What stands in the folder of a ROS 2 bag, looked at before a library follows it."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from pathlib import Path
+
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import Budget, current
+from crossbody.hw.formats._guard import fault
+from crossbody.hw.formats.mcap import records
+
+LARGEST_YAML = 1 << 22  # bytes of metadata.yaml
+ALIAS = re.compile(rb"^[^\n'\"]*?(?::|-)\s+[&*][\w-]", re.MULTILINE)  # anchors and what refers to them
+MESSAGES = re.compile(rb"^\s*compression_mode:\s*['\"]?message", re.MULTILINE | re.IGNORECASE)
+PIECE = 1 << 20  # bytes that are unfolded at a time
+KINDS = ("table", "index")  # of the entries of a database that hold what they show
+
+
+def check_bag(path: Path) -> None:
+    """Refuse a bag whose files would unfold to more than its budget, or whose tables compute what they show.
+
+    Raises:
+        LogFormatError: with what is wrong.
+    """
+    budget = current(path)
+    files = sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]
+    for file in files:
+        if file.name == "metadata.yaml":
+            _check_metadata(path, file)
+        elif file.suffix == ".db3":
+            _check_database(path, file)
+        elif file.suffix == ".mcap":
+            with file.open("rb") as stream:
+                for _ in records(stream, path, budget):
+                    pass
+        elif file.suffix == ".zstd":
+            _check_unfolded(path, file, budget)
+
+
+def _check_metadata(path: Path, file: Path) -> None:
+    if file.stat().st_size > LARGEST_YAML:
+        raise LogFormatError(path, f"has a metadata.yaml of more than {LARGEST_YAML} bytes.")
+    text = file.read_bytes()
+    if ALIAS.search(text):
+        raise LogFormatError(path, "has a metadata.yaml with anchors, which no recorder writes.")
+    if MESSAGES.search(text):
+        text_ = "is compressed message by message, which is not read: `ros2 bag convert` unpacks it."
+        raise LogFormatError(path, text_)
+
+
+def _check_database(path: Path, file: Path) -> None:
+    """Refuse views, virtual tables and generated columns: a query of a few bytes may show any number of rows."""
+    try:
+        link = sqlite3.connect(f"{file.absolute().as_uri()}?immutable=1", uri=True)
+    except sqlite3.Error as error:
+        raise fault(path, "ROS 2 bag", error) from error
+    try:
+        for kind, name, text in link.execute("SELECT type, name, sql FROM sqlite_master").fetchall():
+            shown = str(name)[:40]
+            if kind not in KINDS or "VIRTUAL" in str(text).upper().split("(")[0]:
+                raise LogFormatError(path, f"has a {kind} {shown!r} that computes what it shows.")
+            if kind == "table" and any(row[6] for row in link.execute("SELECT * FROM pragma_table_xinfo(?)", (name,))):
+                raise LogFormatError(path, f"has a table {shown!r} with columns that are computed.")
+    except sqlite3.Error as error:
+        raise fault(path, "ROS 2 bag", error) from error
+    finally:
+        link.close()
+
+
+def _check_unfolded(path: Path, file: Path, budget: Budget) -> None:
+    """Unfold a compressed file once to see how large it is: the library writes it to the disk whole."""
+    import zstandard
+
+    with file.open("rb") as raw, zstandard.ZstdDecompressor().stream_reader(raw) as stream:
+        while piece := stream.read(PIECE):
+            budget.spend(len(piece))

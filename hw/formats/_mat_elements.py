@@ -1,0 +1,82 @@
+"""The elements of a MAT v5 file: one variable out of it, unfolded within a budget, before anything recurses into it."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from pathlib import Path
+
+from crossbody.cases import LogFormatError
+from crossbody.hw.formats._budget import Budget
+
+HEADER = 128  # bytes of the file's own header
+MATRIX, COMPRESSED = 14, 15  # types of elements
+DEEPEST = 16  # matrices inside one another: structs of structs
+MOST = 100_000  # elements of one struct
+PIECE = 1 << 20  # bytes that are unfolded at a time
+
+
+def whole_variable(path: Path, index: int, budget: Budget) -> io.BytesIO:
+    """One variable as a MAT file of its own, not compressed.
+
+    Args:
+        path: the file.
+        index: of the variable, in the order of the file.
+        budget: what it may unfold to.
+
+    Raises:
+        LogFormatError: if it unfolds to more than the budget, or its structs are nested without an end.
+    """
+    with path.open("rb") as file:
+        header = file.read(HEADER)
+        order = "<" if header[126:128] == b"IM" else ">"
+        for _ in range(index):
+            _, size = _tag(file.read(8), order)
+            file.seek(size, io.SEEK_CUR)
+        kind, size = _tag(file.read(8), order)
+        if kind == COMPRESSED:
+            whole = _inflated(file, size, budget)
+        else:
+            budget.hold(3 * min(size, path.stat().st_size), "a struct and its arrays")
+            whole = struct.pack(order + "II", kind, size) + file.read(size)
+    budget.hold(3 * len(whole), "a struct and its arrays")
+    _check_nesting(path, whole, order)
+    return io.BytesIO(header + whole)
+
+
+def _tag(raw: bytes, order: str) -> tuple[int, int]:
+    kind, size = struct.unpack(order + "II", raw)
+    return kind, size
+
+
+def _inflated(file: io.BufferedReader, size: int, budget: Budget) -> bytes:
+    """The unfolded element, refused as soon as it is larger than what may be held."""
+    unfold, pieces, length = zlib.decompressobj(), list[bytes](), 0
+    while size > 0 and (raw := file.read(min(PIECE, size))):
+        size -= len(raw)
+        while raw or (pieces and len(pieces[-1]) == PIECE):  # a full piece may leave some inside
+            pieces.append(unfold.decompress(raw, PIECE))
+            raw, length = unfold.unconsumed_tail, length + len(pieces[-1])
+            budget.hold(3 * length, "a struct and its arrays")  # joined, and as arrays
+    return b"".join(pieces)
+
+
+def _check_nesting(path: Path, whole: bytes, order: str) -> None:
+    """Refuse structs that are nested deeper, or have more elements, than a log has any use for."""
+    open_ends, at, count = [len(whole)], 0, 0
+    while open_ends:
+        while open_ends and at + 8 > open_ends[-1]:
+            open_ends.pop()
+        if not open_ends:
+            return
+        kind, size = _tag(whole[at : at + 8], order)
+        count += 1
+        if len(open_ends) > DEEPEST or count > MOST:
+            text = f"has a struct of more than {DEEPEST} levels or {MOST} elements: save plain arrays instead."
+            raise LogFormatError(path, text)
+        if kind == MATRIX:
+            open_ends.append(min(at + 8 + size, open_ends[-1]))
+            at += 8
+        else:  # a small element keeps its data in its own tag
+            at += 8 if kind >> 16 else 8 + size + -size % 8

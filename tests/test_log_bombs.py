@@ -1,0 +1,170 @@
+"""Files made to cost gigabytes or to never end: a clear error, within the stated memory and ten seconds each."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import log_bombs
+import log_damage
+import log_files
+import numpy as np
+import pytest
+
+from crossbody import hw
+from crossbody.cases import InvalidValue, LogFormatError
+from crossbody.hw import formats
+
+BOMBS = {bomb.name: bomb for bomb in log_bombs.bombs()}
+QUICK = (
+    "csv-columns", "mat-deep", "mat-announces", "hdf5-deep", "mat73-big-chunk", "mcap-hides", "mcap-itself",
+    "ros2-view", "ros1-empties", "mdf-formula", "tdms-objects", "tdms-rows",
+)  # fmt: skip
+SECONDS = 10.0  # of processor time
+
+# Resetting the kernel's high-water mark before every file makes its peak that of this file alone.
+CHILD = """
+import json, sys, time
+from pathlib import Path
+from crossbody import hw
+from crossbody.cases import LogFormatError
+
+def status(key):
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) * 1024 for line in file if line.startswith(key))
+
+for clean in sys.argv[2:]:
+    hw.survey(clean)  # the libraries are there before anything is counted
+for name in json.loads(sys.argv[1]):
+    path, told = Path(name), "was read"
+    columns = path.parent / "map.toml"
+    with open("/proc/self/clear_refs", "w") as file:
+        file.write("5")
+    before, begin = status("VmRSS"), time.process_time()
+    try:
+        if columns.exists():
+            hw.read(path, columns, repair=("fill_dropped",))
+        else:
+            hw.survey(path)
+    except LogFormatError as error:
+        told = ""
+    print(json.dumps([name, told, status("VmHWM") - before, time.process_time() - begin]), flush=True)
+"""
+
+
+def _explode(names: list[str], folder: Path) -> None:
+    """Make the bombs, read them all in one process of their own, and hold each against its bounds."""
+    made: dict[str, str] = {}
+    for name in names:
+        (folder / name).mkdir()
+        made[str(BOMBS[name].make(folder / name))] = name
+    clean = []
+    for case in ("csv", "parquet", "mat", *sorted({"hdf5", "mcap", "ros2", "mdf", "tdms"})):
+        (folder / f"clean-{case}").mkdir()
+        clean.append(str(log_files.write(case, folder / f"clean-{case}", log_damage.motion())))
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, json.dumps(list(made)), *clean], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [row[0] for row in found] == list(made)
+    for path, told, memory, seconds in found:
+        size = sum(one.stat().st_size for one in Path(path).parent.rglob("*") if one.is_file())
+        assert not told, f"{made[path]} {told}"
+        assert memory <= formats.MEMORY + size, f"{made[path]} took {memory / 1e6:.0f} MB"
+        assert seconds < SECONDS, f"{made[path]} took {seconds:.1f} s"
+
+
+def _available(names: list[str]) -> list[str]:
+    for package in sorted({BOMBS[name].needs for name in names} - {""}):
+        pytest.importorskip(package)
+    return names
+
+
+def test_there_are_at_least_forty() -> None:
+    assert len(BOMBS) >= 40
+    assert set(QUICK) <= set(BOMBS)
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the peak memory is read from /proc")
+def test_bombs_end_with_an_error_within_memory_and_time(tmp_path: Path) -> None:
+    _explode(_available(list(QUICK)), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the peak memory is read from /proc")
+@pytest.mark.parametrize("name", sorted(set(BOMBS) - set(QUICK)))
+def test_large_bombs_end_with_an_error_within_memory_and_time(name: str, tmp_path: Path) -> None:
+    _explode(_available([name]), tmp_path)
+
+
+def _columns(names: tuple[str, ...]) -> hw.Columns:
+    signals = "".join(f'[sensors.{name}]\ncolumn = "{name}"\nunit = "1"\n' for name in names)
+    return hw.parse_columns(f'[time]\ncolumn = "t"\nunit = "s"\n{signals}')
+
+
+def test_the_stated_memory_decides(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rows = 300_000
+    data = {"t": np.arange(rows) / 1000.0, "a": np.zeros(rows), "b": np.zeros(rows)}
+    pq.write_table(pa.table(data), tmp_path / "log.parquet", compression="zstd")
+    assert len(hw.read(tmp_path / "log.parquet", _columns(("a", "b")), memory=50_000_000)) == rows
+    with pytest.raises(LogFormatError, match="limit"):
+        hw.read(tmp_path / "log.parquet", _columns(("a", "b")), memory=1_000_000)
+    with pytest.raises(InvalidValue, match="above 0"):
+        hw.read(tmp_path / "log.parquet", _columns(("a", "b")), memory=0)
+
+
+@pytest.mark.parametrize("case", log_files.WRITERS)
+def test_legal_logs_need_little_more_than_their_numbers(case: str, tmp_path: Path) -> None:
+    path = log_files.write(case, tmp_path, log_files.table(3000))
+    found = hw.survey(path, memory=32_000_000)
+    assert max(group.rows for group in found.groups) == 3000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["parquet", "hdf5", "mat", "mat73", "mdf", "tdms"])
+def test_large_logs_are_read(case: str, tmp_path: Path) -> None:
+    """Two million rows of noise, 40 MB: nothing that is legal meets a bound."""
+    path = log_files.write(case, tmp_path, log_files.table(2_000_000))
+    before, clock = log_files.WRITERS[case][3:]
+    columns = hw.parse_columns(f'[time]\ncolumn = "{clock}"\n[sensors.a]\ncolumn = "{before}angle"\nunit = "1"\n')
+    assert len(hw.read(path, columns)) == 2_000_000
+
+
+@pytest.mark.parametrize("kind", ["h5py"])
+def test_a_chunk_is_decoded_once(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chunk of many blocks of rows: its rows come one block after another, and its bytes once."""
+    h5py = pytest.importorskip(kind)
+    rows = 40 * formats.BLOCK_ROWS
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file.create_dataset("a", data=np.zeros(rows), chunks=(rows,), compression="gzip")
+    reader = formats.open_log(tmp_path / "log.h5")
+    blocks = reader.blocks(reader.groups[0], ["a"])
+    cost = []
+    for block in blocks:
+        assert len(block["a"]) == formats.BLOCK_ROWS
+        cost.append(reader.budget.taken)
+    reader.close()
+    first, rest = cost[0], cost[-1] - cost[0]
+    assert rest < 8.0 * first, "forty times, if every block decoded the whole chunk"
+
+
+def test_chunks_of_messages_are_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mcap")
+    from crossbody.hw.formats import _unfold
+
+    count: list[int] = []
+    monkeypatch.setitem(_unfold.UNFOLD, "zstd", lambda raw, most, was=_unfold.zstd: count.append(1) or was(raw, most))
+    path = log_files.write("mcap", tmp_path, log_files.table(3000))
+    hw.survey(path)
+    import mcap.reader
+
+    with path.open("rb") as file:
+        summary = mcap.reader.make_reader(file).get_summary()
+    assert summary is not None
+    assert len(count) == len(summary.chunk_indexes) > 10

@@ -1,0 +1,228 @@
+"""Logs that lie: clean ones of any kind are said to be clean, and what is planted anywhere is found there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from log_motions import KINDS, Motion, draw
+
+from crossbody import hw
+from crossbody.cases import LogFormatError
+from crossbody.hw.checks.jumps import JumpCheck, unwrapped
+from crossbody.hw.checks.rates import RateCheck
+from crossbody.hw.checks.values import ValueCheck
+
+MOVING = ("sines", "moves", "swing", "bounces")
+SEEDS = range(6)
+MANY = range(400)
+
+
+def findings(motion: Motion, q: np.ndarray, v: np.ndarray | None = None, cut: int = 1500) -> list[hw.Finding]:
+    """What the checks of a coordinate say, block by block."""
+    rows = np.arange(len(q), dtype=np.int64)
+    value, jumps, rate = ValueCheck("coordinates.q", "rad"), JumpCheck("q", "rad"), RateCheck("q")
+    for part in (slice(0, cut), slice(cut, None)):
+        value.see(rows[part], motion.t[part], q[part])
+        jumps.see(rows[part], motion.t[part], q[part])
+        rate.see(rows[part], motion.t[part], q[part], (motion.v if v is None else v)[part])
+    return [*value.findings(), *jumps.findings(), *rate.findings()]
+
+
+def speed(motion: Motion, row: int) -> float:
+    """What the coordinate moves in a sample about a row, with its noise and grid."""
+    return float(np.abs(np.diff(motion.q[max(row - 20, 0) : row + 20])).max()) + 10.0 * motion.noise + 5.0 * motion.grid
+
+
+def _clean(seed: int, kind: str) -> None:
+    motion = draw(seed, kind)
+    assert findings(motion, motion.q) == []
+
+
+def _wraps(seed: int, kind: str) -> None:
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 1])
+    inside = motion.q + random.uniform(-np.pi, np.pi)
+    q = np.mod(inside + np.pi, 2.0 * np.pi) - np.pi
+    at = np.flatnonzero(np.abs(np.diff(q)) > np.pi) + 1
+    at = at[(at >= 3) & (at <= len(q) - 3)]  # with two neighbours on either side
+    found = [f for f in findings(motion, q) if f.check == "wraps"]
+    assert [f.row for f in found] == at[:1].tolist()
+    assert [f.t for f in found] == motion.t[at[:1]].tolist()
+    assert [f.count for f in found] == [len(at)][: len(found)]
+    straight, rows = unwrapped(motion.t, q)
+    assert rows.tolist() == at.tolist()
+    if len(at) == np.count_nonzero(np.abs(np.diff(q)) > np.pi):
+        np.testing.assert_allclose(np.diff(straight), np.diff(motion.q), atol=1e-9)
+
+
+def _slips(seed: int, kind: str) -> None:
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 2])
+    row = int(random.integers(5, len(motion.q) - 5))
+    q = motion.q.copy()
+    size = 0.5 + 12.0 * speed(motion, row)
+    size += 2.0 if abs(size - 2.0 * np.pi * np.rint(size / (2.0 * np.pi))) < 1.0 else 0.0  # a turn is a wrap
+    q[row:] += random.choice([-1.0, 1.0]) * size
+    found = [f for f in findings(motion, q) if f.check in ("slips", "wraps")]
+    assert [(f.check, f.row, f.t, f.count) for f in found] == [("slips", row, motion.t[row], 1)]
+
+
+def _stuck(seed: int, kind: str) -> None:
+    """A channel freezes while it moves."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 3])
+    row = int(random.integers(60, len(motion.q) - 300))
+    q = motion.q.copy()
+    length = int(random.integers(120, 200))
+    steps = np.diff(q[row - 60 : row + 1])
+    if np.abs(steps[-10:].sum()) <= 10.0 * motion.grid or abs(steps[-10:].mean()) < 0.7 * np.abs(steps).max():
+        return  # it does not move there, or comes to rest
+    q[row : row + length] = q[row]
+    found = [f for f in findings(motion, q) if f.check == "stuck"]
+    assert [(f.row, f.t, f.count) for f in found] == [(row, motion.t[row], length)]
+
+
+def _saturated(seed: int, kind: str) -> None:
+    """A range that ends at four fifths of the motion."""
+    motion = draw(seed, kind)
+    top = float(np.quantile(motion.q, 0.95))
+    if top == 0.0 or top <= motion.q.min():
+        return
+    clipped = np.minimum(motion.q, top)
+    rows = np.flatnonzero(np.diff((motion.q >= top).astype(int), prepend=0) == 1)
+    sharp = [r for r in rows if r > 60 and _enters(motion, r) and np.all(motion.q[r : r + 12] >= top)]
+    found = [f for f in findings(motion, clipped) if f.check == "saturated"]
+    if sharp:
+        assert [f.channel for f in found] == ["coordinates.q"]
+        assert motion.q[found[0].row] >= top
+
+
+def _enters(motion: Motion, row: int) -> bool:
+    steps = np.diff(motion.q[row - 60 : row + 1])
+    return bool(np.all(steps >= 0.0) and steps[-10:].sum() > max(10.0 * motion.grid, 0.25 * steps[-50:].sum()))
+
+
+def _swapped(seed: int, kind: str) -> None:
+    """Position and rate of another joint, or the rate in degrees."""
+    motion, other = draw(seed, kind), draw(seed + 1000, kind)
+    if not judged(motion):
+        return
+    wrong = [motion.v * 180.0 / np.pi, -motion.v]
+    if np.std(other.v) > 0.0 and abs(np.corrcoef(motion.v, other.v)[0, 1]) < 0.5:
+        wrong.append(other.v)
+    for v in wrong:
+        assert [f.check for f in findings(motion, motion.q, v) if f.fault] == ["rates"]
+
+
+def judged(motion: Motion) -> bool:
+    check = RateCheck("q")
+    check.see(np.arange(len(motion.q)), motion.t, motion.q, motion.v)
+    return check._moves()
+
+
+LAWS = {
+    "clean": (_clean, KINDS), "wraps": (_wraps, (*MOVING, "spin")), "slips": (_slips, KINDS[:-1]),
+    "stuck": (_stuck, MOVING), "saturated": (_saturated, ("sines", "swing")), "swapped": (_swapped, MOVING[:3]),
+}  # fmt: skip
+CASES = [(law, kind) for law, (_, kinds) in LAWS.items() for kind in kinds]
+
+
+@pytest.mark.parametrize(("law", "kind"), CASES)
+def test_what_is_planted_is_found_and_nothing_else(law: str, kind: str) -> None:
+    for seed in SEEDS:
+        LAWS[law][0](seed, kind)
+
+
+COLUMNS = """[time]
+column = "t"
+[coordinates.q]
+column = "q"
+unit = "rad"
+[velocities.q]
+column = "v"
+unit = "rad/s"
+"""
+
+
+def _written(path: Path, **columns: np.ndarray) -> Path:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table(columns), path)
+    return path
+
+
+def test_a_wrapped_log_is_refused_and_unwrapped_when_asked(tmp_path: Path) -> None:
+    motion = draw(3, "spin", rows=20_000)
+    q = np.mod(motion.q + np.pi, 2.0 * np.pi) - np.pi
+    path = _written(tmp_path / "log.parquet", t=motion.t, q=q, v=motion.v)
+    first = int(np.flatnonzero(np.abs(np.diff(q)) > np.pi)[0]) + 1
+    with pytest.raises(LogFormatError, match="wraps at a turn") as told:
+        hw.read(path, hw.parse_columns(COLUMNS))
+    assert (told.value.row, told.value.column) == (first, "coordinates.q")
+    log = hw.read(path, hw.parse_columns(COLUMNS), repair=("unwrap",))
+    np.testing.assert_allclose(log.channel("coordinates", "q").values, motion.q + q[0] - motion.q[0], atol=1e-8)
+    (repair,) = log.provenance.repairs
+    assert (repair.name, repair.row, repair.rows) == ("unwrap", first, np.count_nonzero(np.abs(np.diff(q)) > np.pi))
+    assert not [f for f in log.findings if f.check in ("wraps", "slips")]
+
+
+def test_a_wrap_does_not_hide_a_wrong_rate(tmp_path: Path) -> None:
+    t = np.arange(20_000) * 1e-3
+    q = np.mod(9.0 * np.sin(1.3 * t) + np.pi, 2.0 * np.pi) - np.pi
+    path = _written(tmp_path / "log.parquet", t=t, q=q, v=-11.7 * np.cos(1.3 * t))
+    assert [f.check for f in hw.check(path, hw.parse_columns(COLUMNS)) if f.fault] == ["rates", "wraps"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
+def test_text_of_two_bytes_a_letter_is_read(encoding: str, tmp_path: Path) -> None:
+    text = "t,q\n" + "".join(f"{i / 100},{i}\n" for i in range(3000))
+    (tmp_path / "log.csv").write_bytes(text.encode(encoding))
+    columns = hw.parse_columns('[time]\ncolumn = "t"\n[sensors.q]\ncolumn = "q"\nunit = "rad"\n')
+    np.testing.assert_array_equal(hw.read(tmp_path / "log.csv", columns).matrix("sensors")[:, 0], np.arange(3000.0))
+    assert hw.survey(tmp_path / "log.csv").groups[0].rows == 3000
+
+
+def test_units_below_the_header_are_read_or_told(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,q\n[ms],(deg)\n" + "".join(f"{i},{i}\n" for i in range(300)))
+    columns = '[time]\ncolumn = "t"\n[sensors.q]\ncolumn = "q"\n'
+    with pytest.raises(LogFormatError, match=r"options\.units = true"):
+        hw.survey(path)
+    log = hw.read(path, hw.parse_columns("options = {units = true}\n" + columns))
+    np.testing.assert_allclose(log.matrix("sensors")[:, 0], np.deg2rad(np.arange(300.0)))
+    np.testing.assert_allclose(log.time, np.arange(300) / 1000)
+
+
+def test_a_survey_reads_by_the_layout_of_a_map(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t|q\n" + "".join(f"{i},5|{i},25\n" for i in range(300)))
+    with pytest.raises(LogFormatError, match=r"options\.decimal"):
+        hw.survey(path)
+    text = 'options = {decimal = ","}\n[time]\ncolumn = "t"\n[sensors.q]\ncolumn = "q"\nunit = "1"\n'
+    found = hw.survey(path, hw.parse_columns(text))
+    assert found.groups[0].rows == 300
+    assert found.draft().options == {"decimal": ","}
+    assert len(hw.read(path, found.draft())) == 300
+
+
+@pytest.mark.parametrize(("tick", "unit"), [(1_000_000, "ns"), (1000, "us")])
+def test_ticks_are_not_taken_for_seconds(tick: int, unit: str, tmp_path: Path) -> None:
+    t = 1_700_000_000_000_000_000 + tick * np.arange(500)
+    path = _written(
+        tmp_path / "log.parquet", t=t, q=np.sin(np.arange(500) * 0.01), v=np.cos(np.arange(500) * 0.01) * 10
+    )
+    found = hw.survey(path)
+    assert found.groups[0].clock is not None
+    assert found.groups[0].clock.unit == unit
+    assert found.groups[0].step == pytest.approx(1e-3)
+    with pytest.raises(LogFormatError, match=f'Write `unit` \\("{unit}"'):
+        hw.read(path, hw.parse_columns(COLUMNS))
+    log = hw.read(path, hw.parse_columns(COLUMNS.replace('column = "t"', f'column = "t"\nunit = "{unit}"')))
+    np.testing.assert_allclose(np.diff(log.time), 1e-3, rtol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "kind"), CASES)
+def test_what_is_planted_is_found_and_nothing_else_many_times(law: str, kind: str) -> None:
+    for seed in MANY:
+        LAWS[law][0](seed, kind)
