@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from crossbody.cases import InvalidValue, UnknownName, Value
+from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.derivative import apart
 from crossbody.hw.models._contract import Model
 from crossbody.hw.replaying.replay import run_window
-from crossbody.hw.replaying.windows import Window
+from crossbody.hw.replaying.windows import Window, overlap
 
 Floats = NDArray[np.float64]
 STEP = 0.1
@@ -87,7 +88,7 @@ class Differences:
                 other = x.copy()
                 other[i] = min(max(factor * x[i], low), high)
                 rise = self._sums(other) - best
-                if np.mean(rise) <= _scatter(rise, best, len(self.owners())):
+                if np.mean(rise) <= _scatter(rise, best, len(self.layout.windows())):
                     change = 100.0 * (np.sqrt(np.sum(best + rise) / np.sum(best)) - 1.0)
                     found[i] = (
                         f"at {other[i]:.4g} {self.model.parameters[name].unit} the rmse changes by {change:+.1f} %"
@@ -95,13 +96,14 @@ class Differences:
         return found
 
     def _sums(self, x: Floats) -> Floats:
-        r, owners = self.residual(x), self.owners()
+        r, owners = self.residual(x), self.layout.windows()
         sums: Floats = np.bincount(owners, weights=r * r).astype(np.float64)
         return sums
 
-    def owners(self) -> NDArray[np.int64]:
-        """The window of every residual (N,)."""
-        return np.repeat(np.arange(len(self.cut)), [self.k * len(grid) for grid in self.grids])
+    @property
+    def layout(self) -> Layout:
+        """How residuals follow each other."""
+        return Layout(samples=tuple(len(grid) for grid in self.grids), k=self.k, overlap=overlap(self.cut))
 
     def _column(self, x: Floats, i: int, part: float) -> Floats:
         e = np.zeros(len(x))
