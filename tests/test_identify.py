@@ -99,6 +99,22 @@ def test_a_stiffness_is_found_where_contacts_open() -> None:
     assert abs(rows["reference", "impulse_error"]) < 0.01 * rows["reference", "impulse_measured"]
 
 
+def test_a_damping_is_found_from_positions_alone() -> None:
+    """Windows of .25 s start beside bounces, where a polynomial across one gives a rate that is .25 m/s off."""
+    case = cases.load("bouncing_ball", variant="linear", t_end=1.5, a1=71.0)
+    log = run_as_log(case, {"height": 0}, 1e-4)
+    heights = log_of(log.time, tuple(c for c in log.channels if c.role == "coordinates"))
+    starts = windows(heights, models.load("ball"), 0.25)
+    rates = log.matrix("velocities")[np.searchsorted(log.time, [w.t[0] for w in starts]), 0]
+    assert np.abs([w.segment.yd[0] for w in starts] - rates).max() < 0.02
+    known = {name: case.parameters[name] for name in ("a0", "a1", "a2")}
+    fit = hw.identify(heights, "ball", ["a1"], parameters=known | {"a1": 60.0}, restart=0.25, hold=0)
+    assert fit["a1"].value == pytest.approx(71.0, abs=0.5)
+    assert fit["a1"].low <= 71.0 <= fit["a1"].high
+    assert fit["a1"].identifiable
+    assert not any("a1 is not identifiable" in warning for warning in fit.warnings)
+
+
 def test_a_maze_is_replayed_from_where_its_ball_was_seen() -> None:
     log = run_as_log(cases.load("ball_maze", variant="free", t_end=1.5), {"theta": 0, "x": 1, "y": 2}, 1e-6)
     found = hw.replay(log, "maze")

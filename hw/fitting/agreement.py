@@ -20,6 +20,8 @@ from crossbody.hw.fitting.information import WEIGHT, information
 Floats = NDArray[np.float64]
 DIFFERENT = 0.01
 """Probability, shared among all parameters, below which halves do not agree."""
+UNLIKE = 5.0
+"""Ratio of standard deviations from which on one half tells too little to be compared."""
 FEWEST = 8
 """Samples of a channel in a half."""
 
@@ -44,10 +46,11 @@ def agreement(
     sides = [_half(J[rows][:, free], residual[rows], part, scale[free]) for rows, part in _halves(layout)]
     if len(sides) < 2:
         return ()
-    both = [j for j in range(len(free)) if free[j] < len(names) and all(side[3][j] for side in sides)]
+    (a, s, f, first), (b, t, g, second) = sides
+    alike = np.maximum(s, t) <= UNLIKE * np.minimum(s, t)
+    both = [j for j in range(len(free)) if free[j] < len(names) and first[j] and second[j] and alike[j]]
     found = []
     for j in both:
-        (a, s, f, _), (b, t, g, _) = sides
         spread = float(np.hypot(s[j], t[j]))
         z = abs(float(a[j] - b[j])) / spread if spread > 0.0 else (0.0 if a[j] == b[j] else np.inf)
         # Welch and Satterthwaite: two deviations known with different certainty.

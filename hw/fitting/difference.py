@@ -78,7 +78,9 @@ class Differences:
         """Parameters that half or double their value hardly worsens: index -> that in words.
 
         A value is worse if the sums of squares of the windows are larger by more than their scatter explains (one-sided
-        t test at 97.5 %). Local derivatives of such a motion say less: they feel single touches that shift.
+        t test at 97.5 %), or all together by more than one parameter of as many observations as there are windows does
+        (an F test: what a single window tells, others need not). Local derivatives of such a motion say less: they feel
+        single touches that shift.
         """
         best = self._sums(x)
         found = {}
@@ -88,7 +90,8 @@ class Differences:
                 other = x.copy()
                 other[i] = min(max(factor * x[i], low), high)
                 rise = self._sums(other) - best
-                if np.mean(rise) <= _scatter(rise, best, len(self.layout.windows())):
+                scatter = _scatter(rise, best, len(self.layout.windows()))
+                if np.mean(rise) <= scatter and np.sum(rise) <= _chance(best):
                     change = 100.0 * (np.sqrt(np.sum(best + rise) / np.sum(best)) - 1.0)
                     found[i] = (
                         f"at {other[i]:.4g} {self.model.parameters[name].unit} the rmse changes by {change:+.1f} %"
@@ -119,6 +122,12 @@ class Differences:
         found = self.model.differ(window.y[grid], yhat)
         plain = self.model.differ(window.y[grid], np.zeros_like(yhat))
         return np.where(np.isfinite(found), found, plain).T.ravel()
+
+
+def _chance(best: Floats) -> float:
+    """Rise of the whole sum of squares that one parameter makes by chance; any for a single window."""
+    free = len(best) - 1
+    return float(np.sum(best) * stats.f.ppf(0.95, 1, free) / free) if free else np.inf
 
 
 def _scatter(rise: Floats, best: Floats, count: int) -> float:

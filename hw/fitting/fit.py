@@ -74,7 +74,7 @@ class Fit:
         unseen: those combinations, and those that are seen worse than the parameters are large, in words.
         agreement: of the halves of the data, one a parameter that both halves tell.
         parameters: every parameter of the model, the identified ones in place.
-        delay: of the measured coordinates beyond what the map says, s.
+        delay: the identified one, s: beyond what the map says and what was given.
         fitted, held: numbers of the windows that were fitted and of those that were not.
         before, after: error -> (on fitted windows, on held ones) with the parameters at the start and the estimates:
             "rmse", and median and 90th percentile of the largest error at the end of a window.

@@ -29,7 +29,7 @@ def identify(
     log: Log | Sequence[Log], model: str | Model, free: Sequence[str], *, parameters: Mapping[str, Value] | None = None,
     restart: float | None = None, horizon: float | None = None, starts: str = "measured", hold: int = 2,
     stride: int = 1, bounds: Mapping[str, tuple[float, float]] | None = None, engine: str = "",
-    budget: float = BUDGET,
+    delay: float = 0.0, budget: float = BUDGET,
 ) -> Fit:  # fmt: skip
     """Fit parameters to a log.
 
@@ -48,6 +48,7 @@ def identify(
         stride: of so many samples one is compared (neighbours that tell the same need not all be).
         bounds: name -> lowest and highest value, inside those of the model.
         engine: what runs a model whose contacts open: E or E:PROFILE.
+        delay: of the measured coordinates beyond what the column map says, s; a free one is beyond this.
         budget: time that the search may take, s; the best so far is what it then gives, with `success` False.
 
     Raises:
@@ -59,7 +60,7 @@ def identify(
     numbers = chosen.numbers(parameters)
     _check(chosen, free, starts, hold, stride, budget)
     logs = [log] if isinstance(log, Log) else list(log)
-    cut = [window for one in logs for window in windows(one, chosen, restart, 0.0, horizon)]
+    cut = [window for one in logs for window in windows(one, chosen, restart, delay, horizon)]
     held = [i for i in range(len(cut)) if hold and i % hold == hold - 1]
     fitted = [i for i in range(len(cut)) if i not in held]
     if not fitted:

@@ -110,7 +110,7 @@ def run_identify(
     log, given = ask.log(), jobs.parse_settings(ask.pairs)
     fit = hw.identify(
         log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
-        stride=stride, budget=budget,
+        stride=stride, delay=ask.delay, budget=budget,
     )  # fmt: skip
     found = hw.replay(
         log, model, wanted=(model.engine,), parameters=fit.parameters, restart=ask.restart, horizon=ask.horizon,
