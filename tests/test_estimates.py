@@ -74,12 +74,16 @@ def test_intervals_of_white_noise_hold_as_often_as_they_say(shape: str, layout: 
 @pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.5, 0.8, 0.95])
 @pytest.mark.parametrize("layout", LAYOUTS[1:], ids=["600", "3x150x2", "12x50"])
-@pytest.mark.parametrize("shape", SHAPES)
-def test_intervals_of_correlated_noise_hold_too(shape: str, layout: Layout, correlation: float) -> None:
-    found = [covered(shape, layout, correlation, 300, seed) for seed in range(4)]
-    assert 0.90 <= np.mean([one for one, _ in found]) <= 0.985
-    if correlation == 0.95:
-        assert np.mean([white for _, white in found]) < 0.75  # what intervals of white noise would have said
+def test_intervals_of_correlated_noise_hold_too(layout: Layout, correlation: float) -> None:
+    """4 designs of each kind, 150 draws of 3 parameters each; a kind by itself may be a percent wider."""
+    found = {shape: [covered(shape, layout, correlation, 150, seed) for seed in range(4)] for shape in SHAPES}
+    holds = {shape: float(np.mean([one for one, _ in some])) for shape, some in found.items()}
+    print(layout, correlation, holds)
+    assert 0.90 <= np.mean(list(holds.values())) <= 0.98
+    assert min(holds.values()) >= 0.90
+    assert max(holds.values()) <= 0.99
+    if correlation == 0.95:  # what intervals of white noise would have said
+        assert np.mean([white for _, white in found["polynomials"]]) < 0.6
 
 
 def test_some_intervals_hold_in_every_run() -> None:
