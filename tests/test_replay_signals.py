@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -204,3 +206,14 @@ def test_rows_that_do_not_hold_a_pose_are_told() -> None:
     H = np.array([[1.0, 2.0, 0.0], [2.0, 4.0, 1.0]])
     with pytest.raises(SceneError, match=r"rank 1 .* leave coordinates \[0, 1\] free"):
         closed_by(H, np.array([0, 1]), np.ones(2))
+
+
+def test_inverse_says_which_joint_has_no_motor() -> None:
+    t = np.arange(0.0, 0.2, 2e-3)
+    log = log_of(t, channels("coordinates", "rad", {"th1": 2.0 + np.sin(3.0 * t), "th2": 2.5 + np.cos(4.0 * t)}))
+    whole = hw.models.load("double_pendulum")
+    found = hw.inverse(log, whole, stride=10)
+    assert np.all(np.isfinite(found.value))
+    assert np.all((found.condition >= 1.0) & (found.condition < 1e3))
+    with pytest.raises(SceneError, match=r"1 inputs \(torque 1\) and 2 measured .* no input balances th2"):
+        hw.inverse(log, replace(whole, inputs=("torque 1",)), stride=10)
