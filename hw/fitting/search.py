@@ -53,6 +53,7 @@ class _Timed:
         self.free = np.ones(len(x), dtype=bool)
         self.best: tuple[float, Floats, Floats] | None = None
         self.evaluations = 0
+        self.last: tuple[Floats, Floats] | None = None
 
     def whole(self, part: Floats) -> Floats:
         """All unknowns from those that are free."""
@@ -76,8 +77,13 @@ class _Timed:
         """Derivatives by those that are free (N, F)."""
         if time.monotonic() > self.end:
             raise _Spent
-        J: Floats = self.problem.jacobian(self.whole(part))
-        return J[:, self.free]
+        return self.derivatives(self.whole(part))[:, self.free]
+
+    def derivatives(self, x: Floats) -> Floats:
+        """Derivatives by all unknowns (N, P); those at the last place are not computed again."""
+        if self.last is None or not np.array_equal(self.last[0], x):
+            self.last = (x.copy(), self.problem.jacobian(x))
+        return self.last[1]
 
 
 def search(problem: Any, limits: tuple[Floats, Floats], scale: Any, count: int, budget: float) -> Found:
@@ -96,10 +102,10 @@ def search(problem: Any, limits: tuple[Floats, Floats], scale: Any, count: int, 
     low, high = limits
     x = np.clip(problem.first(), low, high)
     timed = _Timed(problem, x, time.monotonic() + budget)
-    kept = _kept(problem.jacobian(x), scale(x), count)
+    kept = _kept(timed.derivatives(x), scale(x), count)
     found = _descend(timed, limits, scale, kept)
     if kept and found.success:
-        still = _kept(problem.jacobian(found.x), scale(found.x), count)
+        still = _kept(timed.derivatives(found.x), scale(found.x), count)
         if len(still) < len(kept):
             timed.x = found.x
             found = _descend(timed, limits, scale, still)
