@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from crossbody.hw import models
     from crossbody.hw.checks.finding import Finding
-    from crossbody.hw.fitting.fit import Estimate, Fit
+    from crossbody.hw.fitting.fit import Agreement, Estimate, Fit
     from crossbody.hw.fitting.identify import identify
     from crossbody.hw.reading.columns import (
         Columns,
@@ -46,7 +46,7 @@ _HOMES = {
     "replaying.comparison": ("Comparison", "Prediction"),
     "reading.draft": ("draft_text",),
     "checks.finding": ("Finding",),
-    "fitting.fit": ("Estimate", "Fit"),
+    "fitting.fit": ("Agreement", "Estimate", "Fit"),
     "fitting.identify": ("identify",),
     "replaying.inverse": ("Inferred", "estimate_force", "inverse"),
     "reading.log": ("Channel", "Log", "Provenance", "Repair"),
@@ -63,6 +63,7 @@ _HOMES = {
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Agreement",
     "Channel",
     "Columns",
     "Comparison",

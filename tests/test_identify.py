@@ -56,18 +56,19 @@ def test_the_fixed_steps_follow_the_integrator_of_the_reference() -> None:
 
 
 def test_friction_comes_out_inside_its_intervals() -> None:
-    missed = 0
+    missed = white = 0
     for seed in range(4):
         fit = hw.identify(
             swing(1e-3, seed), "double_pendulum", list(FREE[:4]), restart=0.0, hold=0, stride=10, starts="free",
             parameters={"k1": 1e-4, "s1": 1e-4, "k2": 1e-4, "s2": 1e-4, "slip": TRUE["slip"]},
         )  # fmt: skip
         assert fit.success
-        assert not fit.warnings
-        assert fit.covariance == "white residuals"
+        white += fit.covariance == "white residuals"
+        assert not [warning for warning in fit.warnings if "halves" not in warning]
         missed += sum(not e.low <= TRUE[e.name] <= e.high for e in fit.estimates)
         assert all(e.std < 0.2 * e.value for e in fit.estimates)
     assert missed <= 3  # of 16, 0.8 expected
+    assert white >= 3  # one of 20 tests of white residuals says no
 
 
 def test_what_the_motion_cannot_tell_is_said() -> None:
@@ -75,10 +76,28 @@ def test_what_the_motion_cannot_tell_is_said() -> None:
     free = ["m1", "m2", "I1", "I2", "k1", "k2", "s1", "s2"]
     fit = hw.identify(swing(1e-3, 0), "double_pendulum", free, restart=0.0, hold=0, stride=20, parameters=TRUE)
     assert not any(e.identifiable for e in fit.estimates if e.name in ("m1", "m2", "I1", "I2"))
-    assert any("combination" in warning and "m2" in warning for warning in fit.warnings)
+    assert any("all multiplied by the same factor. Fix one" in warning for warning in fit.warnings)
+    assert len(fit.kept) == 1
+    assert fit.evaluations < 60  # the search does not wander along what nobody sees
+    model = models.load("double_pendulum")
+    true = model.numbers(TRUE)
+    others = [e for e in fit.estimates if e.name not in fit.kept]
+    assert all(np.isinf(e.low) for e in others)
+    assert sum(e.kept_low <= true[e.name] <= e.kept_high for e in others) >= 5  # 6.7 of 7 expected
     kept = hw.identify(swing(1e-3, 0), "double_pendulum", free[1:], restart=0.0, hold=0, stride=20, parameters=TRUE)
     assert kept["m2"].identifiable
     assert not any("combination" in warning for warning in kept.warnings)
+
+
+def test_two_frictions_that_act_alike_are_not_identifiable() -> None:
+    """Dry friction smoothed over far more than any rate is viscous: k1 + s1/slip is all that a swing tells."""
+    fit = hw.identify(
+        swing(1e-3, 0, seconds=2.0), "double_pendulum", ["k1", "s1"], restart=0.0, hold=0, stride=20,
+        parameters=TRUE | {"slip": 3e3, "s1": 1.0},
+    )  # fmt: skip
+    assert not any(e.identifiable for e in fit.estimates)
+    assert any("k1" in words and "s1" in words for words in fit.unseen)
+    assert any("Fix one of them" in warning for warning in fit.warnings)
 
 
 def test_a_stiffness_is_found_where_contacts_open() -> None:
@@ -96,6 +115,22 @@ def test_a_stiffness_is_found_where_contacts_open() -> None:
     assert rows["reference", "impacts_too_many"] == 0.0
     assert abs(rows["reference", "impact_offset_largest"]) < 1e-3
     assert abs(rows["reference", "impulse_error"]) < 0.01 * rows["reference", "impulse_measured"]
+
+
+def test_a_damping_is_found_from_positions_alone() -> None:
+    """Windows of .25 s start beside bounces, where a polynomial across one gives a rate that is .25 m/s off."""
+    case = cases.load("bouncing_ball", variant="linear", t_end=1.5, a1=71.0)
+    log = run_as_log(case, {"height": 0}, 1e-4)
+    heights = log_of(log.time, tuple(c for c in log.channels if c.role == "coordinates"))
+    starts = windows(heights, models.load("ball"), 0.25)
+    rates = log.matrix("velocities")[np.searchsorted(log.time, [w.t[0] for w in starts]), 0]
+    assert np.abs([w.segment.yd[0] for w in starts] - rates).max() < 0.02
+    known = {name: case.parameters[name] for name in ("a0", "a1", "a2")}
+    fit = hw.identify(heights, "ball", ["a1"], parameters=known | {"a1": 60.0}, restart=0.25, hold=0)
+    assert fit["a1"].value == pytest.approx(71.0, abs=0.5)
+    assert fit["a1"].low <= 71.0 <= fit["a1"].high
+    assert fit["a1"].identifiable
+    assert not any("a1 is not identifiable" in warning for warning in fit.warnings)
 
 
 def test_a_maze_is_replayed_from_where_its_ball_was_seen() -> None:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from rig_data import PENDULUM, needs_pendulum
+from rig_data import PENDULUM, channels, log_of, needs_pendulum
 
-from crossbody import hw
+from crossbody import engines, hw
+from crossbody.cases import Limit
+from crossbody.hw.models._contract import Segment
 from crossbody.reports.cli import main
+from crossbody.reports.replay.comparison import verdicts
 
 MODEL = ["--model", "double_pendulum", "--columns", "multiarm_double"]
 
@@ -118,3 +123,94 @@ def test_models_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert code("list") == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in hw.models.names())
+
+
+@pytest.fixture(scope="module")
+def two_frictions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A pendulum whose friction is tenfold in every other second, as a stored log with rates."""
+    model, step = hw.models.load("single_pendulum"), 1e-2
+    y, yd = [], []
+    for k1 in (1e-2, 1e-3) * 4:
+        case = model.build(model.numbers({"k1": k1}), Segment(y=np.array([2.0]), yd=np.array([1.0]), t_end=1.0))
+        run = engines.load("reference").prepare(case, samples=step * np.arange(100), rtol=1e-9).run()
+        y.append(run.q[:100, 2])
+        yd.append(run.v[:100, 2])
+    t = step * np.arange(800)
+    log = log_of(
+        t, channels("coordinates", "rad", {"th1": np.concatenate(y)}),
+        channels("velocities", "rad/s", {"th1": np.concatenate(yd)}),
+    )  # fmt: skip
+    path = tmp_path_factory.mktemp("logs") / "two.parquet"
+    hw.store(log, path)
+    return path
+
+
+ONE = ("-m", "single_pendulum", "--restart", "1", "--horizon", "0.98", "--set", "k1=1e-3")
+
+
+def test_a_fit_that_is_worse_where_it_was_not_fitted_is_outside(
+    two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    asked = ("identify", two_frictions, *ONE, "-f", "k1", "--out", out)
+    assert code(*asked) == 1
+    said = capsys.readouterr().out
+    assert "worse than the start" in said
+    assert re.search(r"outside: reference:compiled held_out_worse is [\d.e+]+ %", said)
+    held = json.loads((out / "held_out.json").read_text(encoding="utf-8"))["rows"]
+    assert [row["verdict"] for row in held] == ["outside", "not judged", "not judged"]
+    assert code(*asked, "--limit", "held_out_worse=1e9", "--quiet") == 0
+    assert code(*asked, "--hold", "0", "--json") == 0
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        (["fit=1"], 0), (["fit=99.9999"], 1), (["rmse=1"], 0), (["rmse=1e-9"], 1), (["rmse_th1=1", "rmse=1e-9"], 0),
+        (["windows_failed=0"], 0), (["autocorrelation_inside=0"], 0),
+    ],
+)  # fmt: skip
+def test_replay_has_limits_and_an_exit_code(
+    limits: list[str], expected: int, two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = [word for limit in limits for word in ("--limit", limit)]
+    asked = ("replay", two_frictions, *ONE, "-e", "reference", *options, "--json", "--out", tmp_path / "out")
+    assert code(*asked) == expected
+    rows = json.loads(capsys.readouterr().out)["metrics"]
+    judged = [row["verdict"] for row in rows if row["verdict"] != "not judged"]
+    assert judged
+    assert ("outside" in judged) == bool(expected)
+    assert set(judged) <= {"within", "outside"}
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [("fit", "is not NAME=VALUE"), ("fit=-1", "at least 0"), ("fit=101", "at most 100"), ("fitt=90", "no metric")],
+)
+def test_a_wrong_limit_is_one_sentence_and_writes_nothing(
+    limit: str, words: str, two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert code("replay", two_frictions, *ONE, "-e", "reference", "--limit", limit, "--out", out) == 2
+    assert words in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_model_brings_limits_of_its_own(two_frictions: Path) -> None:
+    log, model = hw.read(two_frictions), hw.models.load("single_pendulum")
+    strict = replace(model, limits=(Limit(metric="fit", value=99.9999, why="A pendulum in a vacuum."),))
+    found = hw.replay(log, strict, restart=1.0)
+    rows = verdicts(found, "a command")
+    assert rows.loc[rows["metric"] == "fit_th1", "verdict"].tolist() == ["outside"]
+    given = verdicts(found, "a command", (Limit(metric="fit", value=1.0),))
+    assert given.loc[given["metric"] == "fit_th1", "verdict"].tolist() == ["within"]
+
+
+def test_a_search_ends_within_its_time(two_frictions: Path) -> None:
+    fit = hw.identify(hw.read(two_frictions), "single_pendulum", ["k1", "a1"], restart=1.0, budget=1e-3)
+    assert not fit.success
+    assert "time for the search was over" in fit.message
+    assert np.isfinite(fit["k1"].value)
+    with pytest.raises(ValueError, match="budget is 0"):
+        hw.identify(hw.read(two_frictions), "single_pendulum", ["k1"], budget=0)

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from crossbody.cases import UnknownName, Value
 from crossbody.engines._equations import system_of
+from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.rk4 import march
 from crossbody.hw.models._contract import Model
 from crossbody.hw.replaying.lift import check_measured, lift
-from crossbody.hw.replaying.windows import Window
+from crossbody.hw.replaying.windows import Window, overlap
 from crossbody.reference import System
 
 Floats = NDArray[np.float64]
@@ -100,9 +101,10 @@ class Exact:
         """Nothing: exact derivatives tell what is flat."""
         return {}
 
-    def owners(self) -> NDArray[np.int64]:
-        """The window of every residual (N,)."""
-        return np.repeat(np.arange(len(self.cut)), [self.k * len(grid) for grid in self.grids])
+    @property
+    def layout(self) -> Layout:
+        """How residuals follow each other."""
+        return Layout(samples=tuple(len(grid) for grid in self.grids), k=self.k, overlap=overlap(self.cut))
 
     def _columns(self, j: int) -> list[int]:
         own = list(range(len(self.free)))

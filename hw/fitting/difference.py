@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from crossbody.cases import InvalidValue, UnknownName, Value
+from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.derivative import apart
 from crossbody.hw.models._contract import Model
 from crossbody.hw.replaying.replay import run_window
-from crossbody.hw.replaying.windows import Window
+from crossbody.hw.replaying.windows import Window, overlap
 
 Floats = NDArray[np.float64]
 STEP = 0.1
@@ -77,7 +78,9 @@ class Differences:
         """Parameters that half or double their value hardly worsens: index -> that in words.
 
         A value is worse if the sums of squares of the windows are larger by more than their scatter explains (one-sided
-        t test at 97.5 %). Local derivatives of such a motion say less: they feel single touches that shift.
+        t test at 97.5 %), or all together by more than one parameter of as many observations as there are windows does
+        (an F test: what a single window tells, others need not). Local derivatives of such a motion say less: they feel
+        single touches that shift.
         """
         best = self._sums(x)
         found = {}
@@ -87,7 +90,8 @@ class Differences:
                 other = x.copy()
                 other[i] = min(max(factor * x[i], low), high)
                 rise = self._sums(other) - best
-                if np.mean(rise) <= _scatter(rise, best, len(self.owners())):
+                scatter = _scatter(rise, best, len(self.layout.windows()))
+                if np.mean(rise) <= scatter and np.sum(rise) <= _chance(best):
                     change = 100.0 * (np.sqrt(np.sum(best + rise) / np.sum(best)) - 1.0)
                     found[i] = (
                         f"at {other[i]:.4g} {self.model.parameters[name].unit} the rmse changes by {change:+.1f} %"
@@ -95,13 +99,14 @@ class Differences:
         return found
 
     def _sums(self, x: Floats) -> Floats:
-        r, owners = self.residual(x), self.owners()
+        r, owners = self.residual(x), self.layout.windows()
         sums: Floats = np.bincount(owners, weights=r * r).astype(np.float64)
         return sums
 
-    def owners(self) -> NDArray[np.int64]:
-        """The window of every residual (N,)."""
-        return np.repeat(np.arange(len(self.cut)), [self.k * len(grid) for grid in self.grids])
+    @property
+    def layout(self) -> Layout:
+        """How residuals follow each other."""
+        return Layout(samples=tuple(len(grid) for grid in self.grids), k=self.k, overlap=overlap(self.cut))
 
     def _column(self, x: Floats, i: int, part: float) -> Floats:
         e = np.zeros(len(x))
@@ -117,6 +122,12 @@ class Differences:
         found = self.model.differ(window.y[grid], yhat)
         plain = self.model.differ(window.y[grid], np.zeros_like(yhat))
         return np.where(np.isfinite(found), found, plain).T.ravel()
+
+
+def _chance(best: Floats) -> float:
+    """Rise of the whole sum of squares that one parameter makes by chance; any for a single window."""
+    free = len(best) - 1
+    return float(np.sum(best) * stats.f.ppf(0.95, 1, free) / free) if free else np.inf
 
 
 def _scatter(rise: Floats, best: Floats, count: int) -> float:

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
-
-from crossbody.hw.replaying.whiteness import autocorrelation
 
 Floats = NDArray[np.float64]
-LEVEL = 0.95
-NULL = 1e-9
-"""Singular value of the scaled derivatives, over the largest, below which a direction has no effect."""
-CLUSTERS = 8
-"""Windows from which on their scatter tells the covariance."""
-WHITE = 0.9
-"""Part of the lags inside the 99 % band from which on residuals count as white."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +23,10 @@ class Estimate:
         low, high: 95 % interval.
         start: where the search began.
         bounds: of the search.
-        identifiable: whether the interval tells it from anything within the bounds.
+        identifiable: whether the interval is finite, reaches no bound, and tells the value from 0 where 0 is a bound.
+        kept_low, kept_high: the interval if the parameters of `Fit.kept` have the values they were kept at; the same as
+            low and high where none was kept.
+        freedom: degrees of freedom that the standard deviation is known with.
     """
 
     name: str
@@ -44,6 +38,28 @@ class Estimate:
     start: float
     bounds: tuple[float, float]
     identifiable: bool
+    kept_low: float
+    kept_high: float
+    freedom: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """One parameter as the first and the second half of the fitted data tell it, to first order about the estimate.
+
+    Attributes:
+        name: which one.
+        values: of the two halves.
+        stds: their standard deviations.
+        probability: of a difference at least as large if both halves have the same true value.
+        agrees: whether that is not below 1 %, shared among all parameters.
+    """
+
+    name: str
+    values: tuple[float, float]
+    stds: tuple[float, float]
+    probability: float
+    agrees: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,9 +69,12 @@ class Fit:
     Attributes:
         model: of what.
         estimates: one a free parameter.
-        correlation (P, P): of the estimates; NaN where one is not identifiable.
+        correlation (P, P): of the estimates; NaN where one has no finite interval.
+        kept: parameters that the search kept at their start, because the data see a combination of them alone.
+        unseen: those combinations, and those that are seen worse than the parameters are large, in words.
+        agreement: of the halves of the data, one a parameter that both halves tell.
         parameters: every parameter of the model, the identified ones in place.
-        delay: of the measured coordinates beyond what the map says, s.
+        delay: the identified one, s: beyond what the map says and what was given.
         fitted, held: numbers of the windows that were fitted and of those that were not.
         before, after: error -> (on fitted windows, on held ones) with the parameters at the start and the estimates:
             "rmse", and median and 90th percentile of the largest error at the end of a window.
@@ -63,13 +82,16 @@ class Fit:
         covariance: how the intervals were found.
         warnings: what the data cannot tell, and what does not fit.
         evaluations: runs of all windows.
-        success: whether the search converged.
+        success: whether the search converged; whether the estimates are worth anything, `worse` tells.
         message: of the search.
     """
 
     model: str
     estimates: tuple[Estimate, ...]
     correlation: Floats
+    kept: tuple[str, ...]
+    unseen: tuple[str, ...]
+    agreement: tuple[Agreement, ...]
     parameters: Mapping[str, float | int | str | bool]
     delay: float
     fitted: tuple[int, ...]
@@ -87,68 +109,12 @@ class Fit:
         """One estimate by its name."""
         return next(e for e in self.estimates if e.name == name)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Spread:
-    """Covariance of estimates (P, P), the quantile that makes intervals of it, unknown directions, and how."""
-
-    covariance: Floats
-    quantile: float
-    null: Floats
-    how: str
-
-
-def spread(J: Floats, residual: Floats, owners: NDArray[np.int64], scale: Floats) -> Spread:
-    """Covariance of least-squares estimates.
-
-    White residuals: s^2 (J^T J)^-1. Else, with at least 8 windows, the scatter of the windows' own gradients
-    (J^T J)^-1 (sum g_w g_w^T) (J^T J)^-1, g_w = J_w^T r_w, for windows that are independent of each other however
-    residuals are correlated within one (Liang and Zeger 1986). Else s^2 (J^T J)^-1 times the correlation time.
-
-    Args:
-        J: derivatives (N, P).
-        residual: (N,).
-        owners: window of every residual (N,).
-        scale: typical size of every unknown (P,).
-    """
-    n, size = J.shape
-    _, s, Vt = np.linalg.svd(J * scale, full_matrices=False)
-    known = s > NULL * s[0]
-    inverse = (Vt[known].T / s[known] ** 2) @ Vt[known]
-    null = Vt[~known]
-    free = max(n - size, 1)
-    noise = float(residual @ residual) / free
-    tests = [autocorrelation(residual[owners == w]) for w in np.unique(owners) if np.sum(owners == w) > 60]
-    white = not tests or float(np.mean([test.inside for test in tests])) >= WHITE
-    groups = np.unique(owners)
-    if white:
-        return Spread(
-            covariance=_scaled(noise * inverse, scale), quantile=_quantile(free), null=null, how="white residuals"
-        )
-    if len(groups) >= CLUSTERS:
-        g = np.array([(J * scale)[owners == w].T @ residual[owners == w] for w in groups])
-        middle = len(groups) / (len(groups) - 1) * g.T @ g
-        return Spread(
-            covariance=_scaled(inverse @ middle @ inverse, scale), quantile=_quantile(len(groups) - 1), null=null,
-            how=f"scatter of {len(groups)} windows, residuals being correlated within each",
-        )  # fmt: skip
-    time = max(_correlation_time(residual[owners == w]) for w in groups)
-    return Spread(
-        covariance=_scaled(time * noise * inverse, scale), quantile=_quantile(max(n / time - size, 1.0)), null=null,
-        how=f"residuals correlated over {time:.3g} samples",
-    )  # fmt: skip
-
-
-def _scaled(covariance: Floats, scale: Floats) -> Floats:
-    return covariance * np.outer(scale, scale)
-
-
-def _quantile(free: float) -> float:
-    return float(stats.t.ppf(0.5 + 0.5 * LEVEL, free))
-
-
-def _correlation_time(residual: Floats) -> float:
-    """1 + 2 sum of the autocorrelations up to the first that is not positive, samples."""
-    rho = autocorrelation(residual, len(residual) // 2).values[1:]
-    stop = int(np.argmax(rho <= 0.0)) if np.any(rho <= 0.0) else len(rho)
-    return 1.0 + 2.0 * float(np.sum(rho[:stop]))
+    @property
+    def worse(self) -> float:
+        """By how much the rmse on held-out windows grew, %; 0 if it did not, NaN if none were held out."""
+        before, after = self.before["rmse"][1], self.after["rmse"][1]
+        if math.isnan(before):
+            return math.nan
+        if not math.isfinite(after):
+            return math.inf
+        return max(0.0, 100.0 * (after / before - 1.0)) if before > 0.0 else (math.inf if after > 0.0 else 0.0)

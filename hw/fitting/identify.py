@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from crossbody.cases import InvalidValue, SceneError, Value
 from crossbody.hw import models
 from crossbody.hw.fitting.derivative import DELAY, Exact
 from crossbody.hw.fitting.difference import Differences
-from crossbody.hw.fitting.fit import Estimate, Fit, Floats, Spread, spread
+from crossbody.hw.fitting.fit import Fit, Floats
+from crossbody.hw.fitting.judged import Search, judged
+from crossbody.hw.fitting.search import search
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.windows import Window, windows
+from crossbody.hw.replaying.windows import windows
 
 LONGEST_DELAY = 0.1
 """Bound on an identified delay, s."""
-TOGETHER = 0.999
-"""Correlation from which on two parameters are told apart by nothing but noise."""
-CHECK = 1e-3
-"""Relative difference of exact derivatives and central differences that is worth a warning."""
+BUDGET = 300.0
+"""Time for a search, s."""
 
 
 def identify(
     log: Log | Sequence[Log], model: str | Model, free: Sequence[str], *, parameters: Mapping[str, Value] | None = None,
     restart: float | None = None, horizon: float | None = None, starts: str = "measured", hold: int = 2,
     stride: int = 1, bounds: Mapping[str, tuple[float, float]] | None = None, engine: str = "",
+    delay: float = 0.0, budget: float = BUDGET,
 ) -> Fit:  # fmt: skip
     """Fit parameters to a log.
 
@@ -47,6 +48,8 @@ def identify(
         stride: of so many samples one is compared (neighbours that tell the same need not all be).
         bounds: name -> lowest and highest value, inside those of the model.
         engine: what runs a model whose contacts open: E or E:PROFILE.
+        delay: of the measured coordinates beyond what the column map says, s; a free one is beyond this.
+        budget: time that the search may take, s; the best so far is what it then gives, with `success` False.
 
     Raises:
         UnknownName: for a model or parameter that does not exist.
@@ -55,9 +58,9 @@ def identify(
     """
     chosen = models.load(model) if isinstance(model, str) else model
     numbers = chosen.numbers(parameters)
-    _check(chosen, free, starts, hold, stride)
+    _check(chosen, free, starts, hold, stride, budget)
     logs = [log] if isinstance(log, Log) else list(log)
-    cut = [window for one in logs for window in windows(one, chosen, restart, 0.0, horizon)]
+    cut = [window for one in logs for window in windows(one, chosen, restart, delay, horizon)]
     held = [i for i in range(len(cut)) if hold and i % hold == hold - 1]
     fitted = [i for i in range(len(cut)) if i not in held]
     if not fitted:
@@ -65,16 +68,20 @@ def identify(
     kind: Any = Exact if chosen.places and not engine else Differences
     more = (engine,) if kind is Differences else ()
     problem = kind(chosen, numbers, free, [cut[i] for i in fitted], starts == "free", stride, *more)
-    low, high = _limits(chosen, free, bounds or {}, len(problem.first()))
-    x0 = np.clip(problem.first(), low, high)
-    found = least_squares(
-        problem.residual, x0, jac=problem.jacobian, bounds=(low, high), x_scale=_sizes(x0, low, high), method="trf",
-        xtol=problem.ftol, ftol=problem.ftol, gtol=1e-12, max_nfev=problem.most,
-    )  # fmt: skip
-    return _judged(chosen, numbers, free, problem, x0, found, (low, high), cut, (fitted, held), kind, stride, more)
+    limits = _limits(chosen, free, bounds or {}, len(problem.first()))
+    x0 = np.clip(problem.first(), *limits)
+    found = search(problem, limits, lambda x: _sizes(x, *limits), len(free), budget)
+    sides = [
+        kind(chosen, numbers, free, [cut[i] for i in part], False, stride, *more) if part else None
+        for part in (fitted, held)
+    ]
+    return judged(Search(
+        model=chosen, numbers=numbers, free=tuple(free), problem=problem, x0=x0, found=found, limits=limits,
+        sizes=_sizes(found.x, *limits), sides=tuple(sides), fitted=tuple(fitted), held=tuple(held),
+    ))  # fmt: skip
 
 
-def _check(model: Model, free: Sequence[str], starts: str, hold: int, stride: int) -> None:
+def _check(model: Model, free: Sequence[str], starts: str, hold: int, stride: int, budget: float) -> None:
     model.numbers({name: model.parameters[name].default for name in free if name in model.parameters})
     if not free or len(set(free)) < len(free):
         raise InvalidValue("Name at least one free parameter, and none twice.")
@@ -83,6 +90,8 @@ def _check(model: Model, free: Sequence[str], starts: str, hold: int, stride: in
         model.numbers(dict.fromkeys(unknown, 0.0))
     if starts not in ("measured", "free") or hold < 0 or hold == 1 or stride < 1:
         raise InvalidValue("starts is measured or free, hold is 0 or at least 2, stride at least 1.")
+    if not 0.0 < budget < math.inf:
+        raise InvalidValue(f"budget is {budget!r} s; it must be above 0 and finite.")
 
 
 def _limits(
@@ -106,104 +115,3 @@ def _sizes(x: Floats, low: Floats, high: Floats) -> Floats:
     span = high - low
     small = np.where(np.isfinite(span) & (span < 1e2), 1e-3 * span, 1e-3)
     return np.where(np.abs(x) > 1e-12, np.abs(x), small)
-
-
-def _judged(
-    model: Model, numbers: Mapping[str, Value], free: Sequence[str], problem: Any, x0: Floats, found: Any,
-    limits: tuple[Floats, Floats], cut: Sequence[Window], parts: tuple[list[int], list[int]], kind: Any, stride: int,
-    more: tuple[str, ...],
-) -> Fit:  # fmt: skip
-    count, x = len(free), found.x
-    J = problem.jacobian(x)
-    wide = spread(J, found.fun, problem.owners(), _sizes(x, *limits))
-    flat = problem.flat(x)
-    estimates = tuple(_estimate(model, name, i, x, x0, wide, limits, i not in flat) for i, name in enumerate(free))
-    sizes = _sizes(np.where(np.abs(x) > 1e-9 * np.abs(x0), x, x0), *limits)[:count]
-    off = problem.checked(x, J, sizes, limits[0])
-    sides = [
-        kind(model, numbers, free, [cut[i] for i in part], False, stride, *more) if part else None for part in parts
-    ]
-    before, after = (_errors(sides, y[:count]) for y in (x0, x))
-    values = {name: float(x[i]) for i, name in enumerate(free) if name != DELAY}
-    return Fit(
-        model=model.name, estimates=estimates, correlation=_correlation(wide, estimates),
-        parameters=dict(numbers) | values, delay=float(x[free.index(DELAY)]) if DELAY in free else 0.0,
-        fitted=tuple(parts[0]), held=tuple(parts[1]), before=before, after=after,
-        sensitivities=f"{problem.how}; central differences at the solution differ by {off:.1e} of their size",
-        covariance=wide.how, warnings=_warnings(estimates, wide, off, found, flat, problem.tolerance),
-        evaluations=int(found.nfev), success=bool(found.success), message=str(found.message),
-    )  # fmt: skip
-
-
-def _estimate(
-    model: Model, name: str, i: int, x: Floats, x0: Floats, wide: Spread, limits: tuple[Floats, Floats], steep: bool
-) -> Estimate:
-    unknown = bool(np.any(np.abs(wide.null[:, i]) > 1e-2)) if len(wide.null) else False
-    std = np.inf if unknown else float(np.sqrt(max(wide.covariance[i, i], 0.0)))
-    half = wide.quantile * std
-    bounds = (float(limits[0][i]), float(limits[1][i]))
-    span = bounds[1] - bounds[0]
-    told = half < 0.5 * span and (half < max(abs(float(x[i])), 1e-300) or name == DELAY or x[i] - half <= bounds[0])
-    return Estimate(
-        name=name, unit="s" if name == DELAY else model.parameters[name].unit, value=float(x[i]), std=std,
-        low=float(x[i]) - half, high=float(x[i]) + half, start=float(x0[i]), bounds=bounds,
-        identifiable=bool(told and steep and np.isfinite(half)),
-    )  # fmt: skip
-
-
-def _correlation(wide: Spread, estimates: Sequence[Estimate]) -> Floats:
-    count = len(estimates)
-    C = wide.covariance[:count, :count]
-    std = np.array([e.std for e in estimates])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(np.isfinite(np.outer(std, std)), C / np.outer(std, std), np.nan)
-
-
-def _errors(sides: Sequence[Any], x: Floats) -> dict[str, tuple[float, float]]:
-    """Errors on the fitted windows and on the held ones, all started as measured."""
-    found: list[tuple[float, float, float]] = []
-    for part in sides:
-        if part is None:
-            found.append((np.nan, np.nan, np.nan))
-            continue
-        r, owners = part.residual(x), part.owners()
-        last = [np.max(np.abs(_ends(r[owners == w], part.k))) for w in np.unique(owners)]
-        found.append(
-            (float(np.sqrt(np.mean(r * r))), float(np.median(last)), float(np.percentile(last, 90.0)))
-        )  # fmt: skip
-    names = ("rmse", "end_median", "end_90")
-    return {name: (found[0][i], found[1][i]) for i, name in enumerate(names)}
-
-
-def _ends(r: Floats, k: int) -> Floats:
-    """The last residual of every coordinate of one window."""
-    return np.asarray(r.reshape(k, -1)[:, -1])
-
-
-def _warnings(
-    estimates: Sequence[Estimate], wide: Spread, off: float, found: Any, flat: Mapping[int, str], tolerance: float
-) -> tuple[str, ...]:
-    told = []
-    count = len(estimates)
-    for row in wide.null:
-        part = [e.name for e, weight in zip(estimates, row[:count], strict=True) if abs(weight) > 1e-2]
-        told.append(f"{', '.join(part)}: the data tell a combination of them only; keep one of them.")
-    C = _correlation(wide, estimates)
-    for i, e in enumerate(estimates):
-        if i in flat:
-            told.append(f"{e.name} is not identifiable: {flat[i]}.")
-        elif np.isfinite(e.std) and not e.identifiable:
-            told.append(f"{e.name} is not identifiable: {e.value:.4g} +- {e.high - e.value:.2g} {e.unit}.")
-        if e.low <= e.bounds[0] <= 0.0 < e.high and e.identifiable:
-            told.append(f"{e.name} cannot be told from its bound {e.bounds[0]:g} {e.unit}.")
-        elif found.active_mask[i]:
-            told.append(f"{e.name} stands at a bound, {e.value:.4g} {e.unit}.")
-        told += [
-            f"{e.name} and {estimates[j].name} can hardly be told apart (correlation {C[i, j]:+.4f})."
-            for j in range(i) if abs(C[i, j]) > TOGETHER
-        ]  # fmt: skip
-    if off > tolerance:
-        told.append(f"Derivatives differ from central differences by {off:.1e}: judge the intervals by it.")
-    if not found.success:
-        told.append(f"The search did not converge: {found.message}")
-    return tuple(told)

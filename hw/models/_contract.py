@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from crossbody.cases import Case, Coordinate, Parameter, SceneError, Trajectory, UnknownName, Value
+from crossbody.cases import Case, Coordinate, Limit, Parameter, SceneError, Trajectory, UnknownName, Value
 
 if TYPE_CHECKING:
     from crossbody.hw.reading.log import Log
@@ -87,6 +87,7 @@ class Model:
         references: names of the references that the controller follows.
         read: the measured coordinates of a log, and their rates if it has them.
         see: the measured coordinates of a run at given times.
+        turns: of each rotation among the compared coordinates, the first of the three that are its rotation vector.
         differ: (measured, predicted), both (n, k) -> what an identification makes small (n, k).
         engine: what runs it where derivatives are finite differences.
         falls: which compared coordinate jumps in its rate at impacts; -1 for none.
@@ -95,6 +96,8 @@ class Model:
         settings: engine -> settings of the usual profile.
         why_not: engine -> the sentence why it cannot run the model.
         profiles: engine -> profile, where the usual one does not serve.
+        limits: on metrics of its replays, judged by the commands: of shares (`fit`, `*_inside`) the least, of others
+            the largest size; `held_out_worse` is that of an identification.
     """
 
     name: str
@@ -111,6 +114,7 @@ class Model:
     references: tuple[str, ...] = ()
     read: Callable[[Model, Log], tuple[Floats, Floats | None]] = read_as_they_are
     see: Callable[[Model, Trajectory, Floats], tuple[Floats, Floats]] = see_by_hermite
+    turns: tuple[int, ...] = ()
     differ: Callable[[Floats, Floats], Floats] = plain_difference
     engine: str = "reference"
     falls: int = -1
@@ -119,6 +123,7 @@ class Model:
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=lambda: MappingProxyType({}))
     why_not: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     profiles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    limits: tuple[Limit, ...] = ()
 
     def numbers(self, given: Numbers | None = None) -> dict[str, Value]:
         """Every parameter: the given ones, checked, and the defaults.

@@ -76,6 +76,7 @@ MODEL = Model(
     build=build,
     read=read,
     see=see,
+    turns=(3,),
     differ=differ,
     falls=2,
     engine="mujoco",

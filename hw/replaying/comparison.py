@@ -10,13 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Coordinate, Outcome, Trajectory, Value
+from crossbody.cases import Coordinate, Limit, Outcome, Trajectory, Value
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying import measures as _measures
 from crossbody.hw.replaying.impacts import impacts, least_of, matched
 from crossbody.hw.replaying.rates import Floats, rates_by_fit
-from crossbody.hw.replaying.whiteness import Correlation, autocorrelation, crosscorrelation
+from crossbody.hw.replaying.turns import deviation, difference, increments, way
+from crossbody.hw.replaying.whiteness import Correlation, autocorrelation, crosscorrelation, noise_level, stride_of
 from crossbody.hw.replaying.windows import Window
+
+ENOUGH = 50
+"""Averages of residuals from which on their correlations tell something: the band is then .36 wide."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,6 +82,8 @@ class Comparison:
         delay: of the measured coordinates beyond what the column map says, s.
         falls: which coordinate jumps in its rate at impacts; -1 for none.
         mass: of what strikes, kg.
+        limits: of the model.
+        turns: of each rotation among the coordinates, the first of its three columns.
     """
 
     log: Log
@@ -93,6 +99,8 @@ class Comparison:
     delay: float = 0.0
     falls: int = -1
     mass: float = 1.0
+    limits: tuple[Limit, ...] = ()
+    turns: tuple[int, ...] = ()
 
     @property
     def measured(self) -> Floats:
@@ -110,23 +118,55 @@ class Comparison:
         for window, yhat in zip(self.windows, prediction.y, strict=True):
             k = int(np.searchsorted(window.t - window.t[0], age - 1e-9))
             if k < len(window.t):
-                found.append(float(np.max(np.abs(yhat[k] - window.y[k]))))
+                off = difference(window.y[k : k + 1], yhat[k : k + 1], self.turns)
+                found.append(float(np.max(np.abs(off))))
         return np.array(found)
 
     def residual(self, prediction: Prediction) -> Floats:
-        """Measured less predicted (n, k), all windows; NaN where a run ended early."""
-        return self.measured - np.concatenate(prediction.y)
+        """Measured less predicted (n, k), all windows; NaN where a run ended early.
+
+        Of rotations it is the logarithm of the relative one, at most pi long.
+        """
+        return np.concatenate(self._residuals(prediction))
+
+    def _residuals(self, prediction: Prediction) -> list[Floats]:
+        return [difference(w.y, yhat, self.turns) for w, yhat in zip(self.windows, prediction.y, strict=True)]
+
+    def _pieces(self, prediction: Prediction, channel: int) -> list[tuple[Window, Floats]]:
+        """Windows with the residuals of one coordinate, where all of them are finite."""
+        pairs = zip(self.windows, self._residuals(prediction), strict=True)
+        return [(w, r[:, channel]) for w, r in pairs if np.all(np.isfinite(r[:, channel]))]
+
+    def noise(self, channel: int) -> float:
+        """Size of the measurement's noise, or rounding, in one coordinate."""
+        return noise_level(self._motion(channel))
+
+    def _motion(self, channel: int) -> list[Floats]:
+        """Measured values of one coordinate, window by window; of a rotation its way, without jumps."""
+        return [way(w.y, self.turns)[:, channel] for w in self.windows]
 
     def autocorrelation(self, prediction: Prediction, channel: int) -> Correlation:
-        """Of the residuals of one coordinate, where they are finite."""
-        residual = self.residual(prediction)[:, channel]
-        return autocorrelation(residual[np.isfinite(residual)])
+        """Of the residuals of one coordinate in the windows that were run to their end; see `whiteness`."""
+        stride, floor = self._scales(channel)
+        return autocorrelation([r for _, r in self._pieces(prediction, channel)], stride=stride, floor=floor)
 
     def crosscorrelation(self, prediction: Prediction, channel: int, which: int) -> Correlation:
-        """Of the residuals of one coordinate with one recorded input."""
-        residual, u = self.residual(prediction)[:, channel], np.concatenate([w.u for w in self.windows])[:, which]
-        good = np.isfinite(residual)
-        return crosscorrelation(residual[good], u[good])
+        """Of the same residuals with one recorded input."""
+        stride, floor = self._scales(channel)
+        pieces = self._pieces(prediction, channel)
+        left, inputs = [r for _, r in pieces], [w.u[:, which] for w, _ in pieces]
+        return crosscorrelation(left, inputs, stride=stride, floor=floor)
+
+    def tells(self, channel: int) -> bool:
+        """Whether there are averages enough to test residuals of a coordinate for what the model misses."""
+        stride, _ = self._scales(channel)
+        return sum(len(w.t) // stride for w in self.windows) >= ENOUGH
+
+    def _scales(self, channel: int) -> tuple[int, float]:
+        """Samples to average, and the error that is not worth telling."""
+        motion = self._motion(channel)
+        noise = noise_level(motion)
+        return stride_of(motion, noise), noise
 
     def rows(self) -> tuple[Row, ...]:
         """Every metric of every prediction."""
@@ -139,14 +179,24 @@ class Comparison:
                 unit=unit,
             )  # fmt: skip
 
-        y, yhat = self.measured, np.concatenate(prediction.y)
+        y, left = deviation(self.measured, self.turns), self.residual(prediction)
+        yhat = np.concatenate(prediction.y)
+        for turn in self.turns:
+            yhat[:, turn : turn + 3] = (y - left)[:, turn : turn + 3]
+        steps, said = (
+            [increments(one, self.turns) for one in side] for side in ([w.y for w in self.windows], prediction.y)
+        )
         for i, c in enumerate(self.coordinates):
             a, b = y[:, i], yhat[:, i]
             yield row("fit", _measures.fit(a, b), "%", c.name)
             for name, measure in (("rmse", _measures.rmse), ("largest", _measures.largest), ("bias", _measures.bias)):
                 yield row(name, measure(a, b), c.unit, c.name)
-            yield row("delay", _measures.delay(a, b, self.log.sample_time), "s", c.name)
-            if np.all(np.isfinite(b)) and len(a) > 100:
+            late = _measures.shift([s[:, i] for s in steps], [s[:, i] for s in said], self.log.sample_time)
+            yield row("delay", late, "s", c.name)
+            noise = self.noise(i)
+            yield row("noise", noise, c.unit, c.name)
+            yield row("unexplained", math.sqrt(max(float(np.mean((a - b) ** 2)) - noise**2, 0.0)), c.unit, c.name)
+            if np.all(np.isfinite(b)) and self.tells(i):
                 inside = 100.0 * self.autocorrelation(prediction, i).inside
                 yield row("autocorrelation_inside", inside, "%", c.name)
                 for j in range(self.windows[0].u.shape[1]):
@@ -191,7 +241,9 @@ class Comparison:
     def measurement(self) -> Trajectory:
         """What was measured, as a motion in the model's measured coordinates; it has no forces and no modes."""
         y = [w.y for w in self.windows]
-        return self._trajectory(y, [rates_by_fit(w.t, w.y) for w in self.windows], Outcome.FINISHED, "", 0, 0.0)
+        return self._trajectory(
+            y, [rates_by_fit(w.t, way(w.y, self.turns)) for w in self.windows], Outcome.FINISHED, "", 0, 0.0
+        )
 
     def trajectory(self, prediction: Prediction) -> Trajectory:
         """What one engine predicts, at the same instants."""

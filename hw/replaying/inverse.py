@@ -14,7 +14,7 @@ is one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from crossbody.engines._equations import system_of
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.lift import check_measured, lift, rows_at
+from crossbody.hw.replaying.lift import check_measured, closed_by, lift, rows_at
+from crossbody.hw.replaying.rank import conditions
 from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, Rows, derivatives, felt
 from crossbody.reference import System
 
@@ -38,6 +39,7 @@ class Inferred:
         value (n, k): the estimate.
         std (n, k): standard deviation that the noise of the measured coordinates gives it.
         recorded (n, k): the same as the log has it; NaN where it does not.
+        condition (n,): of the map from what is estimated to the forces that the motion shows, its columns of size 1.
     """
 
     t: Floats
@@ -46,6 +48,7 @@ class Inferred:
     value: Floats
     std: Floats
     recorded: Floats
+    condition: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -75,7 +78,8 @@ def inverse(
         stride: of so many samples one is evaluated.
 
     Raises:
-        SceneError: if the log or the model does not fit.
+        SceneError: if the log or the model does not fit, or the motion cannot tell the torques apart: it names those
+            that it cannot, the coordinates that none of them moves, and the condition.
         InvalidValue: for a log shorter than a polynomial.
     """
     chosen = models.load(model) if isinstance(model, str) else model
@@ -86,7 +90,7 @@ def inverse(
     recorded = (
         _felt(log, chosen, delay, half, degree, rows) if have else np.full((len(balance.t), len(chosen.inputs)), np.nan)
     )
-    return _solved(balance, B, balance.needed, chosen.inputs, "N m", recorded)
+    return _solved(balance, B, balance.needed, chosen, chosen.inputs, "N m", recorded)
 
 
 def estimate_force(
@@ -104,7 +108,8 @@ def estimate_force(
     left = balance.needed - np.einsum("nij,nj->ni", balance.inputs[:, :, :own], torque)
     names = chosen.forces
     nothing = np.full((len(balance.t), len(names)), np.nan)
-    return _solved(balance, balance.inputs[:, :, own : own + len(names)], left, names, "N", nothing)
+    B = balance.inputs[:, :, own : own + len(names)]
+    return _solved(balance, B, left, chosen, names, "N", nothing)
 
 
 def pushed(model: str | Model) -> Model:
@@ -142,12 +147,13 @@ def _felt(log: Log, model: Model, delay: float, half: int, degree: int, rows: Ro
 
 
 def _solved(
-    balance: _Balance, B: Floats, left: Floats, names: tuple[str, ...], unit: str, recorded: Floats
+    balance: _Balance, B: Floats, left: Floats, model: Model, names: tuple[str, ...], unit: str, recorded: Floats
 ) -> Inferred:
+    condition = conditions(balance.t, B, tuple(c.name for c in model.measured), names, model.name)
     value = np.asarray(np.linalg.solve(B, left[:, :, None])[:, :, 0], dtype=np.float64)
     gain = np.linalg.solve(B, balance.mass)
     std: Floats = np.sqrt(np.einsum("nij,nj->ni", gain**2, balance.noise**2))
-    return Inferred(t=balance.t, names=names, unit=unit, value=value, std=std, recorded=recorded)
+    return Inferred(t=balance.t, names=names, unit=unit, value=value, std=std, recorded=recorded, condition=condition)
 
 
 def _balance(
@@ -190,8 +196,8 @@ def _one(
     others = np.setdiff1d(np.arange(system.n), own)
     S, vd = np.zeros((system.n, len(own))), np.zeros(system.n)
     S[own], vd[own] = np.eye(len(own)), ydd
-    S[others] = -np.linalg.solve(H[:, others], H[:, own])
-    vd[others] = -np.linalg.solve(H[:, others], drift + H[:, own] @ ydd)
+    S[others] = -closed_by(H, others, H[:, own])
+    vd[others] = -closed_by(H, others, drift + H[:, own] @ ydd)
     M, f = system.terms(q, v)
     B = np.column_stack([system.terms(q, v, e)[1] - f for e in np.eye(system.inputs)])
     return q, S.T @ (M @ vd - f), S.T @ B, S.T @ M @ S

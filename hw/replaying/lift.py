@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,8 @@ from crossbody.cases import SceneError
 from crossbody.reference import System
 
 Array = NDArray[np.complex128]
+SINGULAR = 1e-12
+"""Singular value of the rows, over the largest, that holds nothing."""
 POLISH = 2
 """Newton steps from a closed start: one carries a complex step on, the other what rounding left of the real part."""
 
@@ -35,6 +39,25 @@ def _unused(system: System) -> tuple[Array, Array]:
     return np.zeros((system.n, system.mass_block), np.complex128), np.zeros(system.n, np.complex128)
 
 
+def closed_by(H: NDArray[Any], others: NDArray[np.int64], right: NDArray[Any]) -> NDArray[Any]:
+    """What the coordinates that are not measured must do so that rows close: the solution of H[:, others] x = right.
+
+    Raises:
+        SceneError: if the rows do not hold them, naming their rank and what is free.
+    """
+    block = H[:, others]
+    try:
+        return np.linalg.solve(block, right)
+    except np.linalg.LinAlgError:
+        _, s, Vt = np.linalg.svd(block.real)
+        rank = int(np.sum(s > SINGULAR * s[0]))
+        free = [int(i) for i in others[np.abs(Vt[-1]) > 0.1 * np.max(np.abs(Vt[-1]))]]
+        raise SceneError(
+            f"A singular pose: the {len(block)} rows have rank {rank} in the coordinates that are not measured, and "
+            f"leave coordinates {free} free; the measured ones do not tell the pose there."
+        ) from None
+
+
 def lift(system: System, seen: tuple[int, ...], q: Array, y: Array, yd: Array, p: Array) -> Array:
     """State (2 n,) that closes all rows, h = 0 and H v = 0, with the measured coordinates as given.
 
@@ -53,7 +76,7 @@ def lift(system: System, seen: tuple[int, ...], q: Array, y: Array, yd: Array, p
     x[own], v[own] = y, yd
     for _ in range(POLISH):
         H, h, _ = rows_at(system, x, v, p)
-        x[others] -= np.linalg.solve(H[:, others], h)
+        x[others] -= closed_by(H, others, h)
     H, _, _ = rows_at(system, x, v, p)
-    v[others] = -np.linalg.solve(H[:, others], H[:, own] @ v[own])
+    v[others] = -closed_by(H, others, H[:, own] @ v[own])
     return np.concatenate([x, v])

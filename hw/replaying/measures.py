@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crossbody.hw.replaying.whiteness import noise_level
+
 Floats = NDArray[np.float64]
+REACH = 0.25
+"""Largest lag that is looked at, as a part of a window."""
+RIVAL = 0.9
+"""Part of the highest correlation from which on a maximum may be the delay: real models are off by that much."""
+ALIKE = 0.8
+"""Part of the correlation that noise admits, from which on two motions have the same shape."""
+NEARER = 0.8
+"""How much nearer to 0 a maximum must be than its rival on the other side."""
 
 
 def fit(y: Floats, yhat: Floats) -> float:
@@ -34,37 +45,75 @@ def bias(y: Floats, yhat: Floats) -> float:
     return float(np.mean(yhat - y))
 
 
-def delay(y: Floats, yhat: Floats, step: float, reach: float = 0.25) -> float:
-    """How much later the measurement is than the prediction, s: maximum of their cross-correlation.
-
-    The correlation of the first differences (slow drifts would hide the peak) is taken by FFT and normalised by the
-    energy of both at each lag; a parabola through the largest value and its neighbours gives parts of a sample.
+def delay(y: Floats, yhat: Floats, step: float, reach: float = REACH) -> float:
+    """How much later the measurement is than the prediction, s; see `shift`, which takes their first differences.
 
     Args:
         y: measured, equidistant (n,).
         yhat: predicted (n,).
         step: time between samples, s.
         reach: largest lag, as a part of the record.
+    """
+    return shift([np.diff(y)], [np.diff(yhat)], step, reach)
+
+
+def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = REACH) -> float:
+    """How much later increments a are than increments b, s: a maximum of their cross-correlation.
+
+    The correlation is taken by FFT within each window and normalised by the energy of both at each lag; a parabola
+    through a maximum and its neighbours gives parts of a sample. (Of increments: slow drifts would hide the peak.)
+    A motion that repeats itself correlates nearly as well at lags of whole periods, and what is left to tell them apart
+    is the model's error: of all maxima that are nearly as high as the highest, the one nearest to 0 is taken.
+
+    Args:
+        a: of the measurement, equidistant, one array a window.
+        b: of the prediction.
+        step: time between samples, s.
+        reach: largest lag, as a part of the shortest window.
 
     Returns:
-        NaN where one of them does not move, or the best lag lies at the edge.
+        NaN where one of them does not move, where they do not have the same shape at any lag, where the correlation is
+        highest at the edge, or where maxima on both sides of 0 are as near to it (the delay is then about half a
+        period, forwards or backwards).
     """
-    a, b = np.diff(y), np.diff(yhat)
-    n, most = len(a), max(2, int(reach * len(a)))
-    size = 1 << (2 * n - 1).bit_length()
-    cross = np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
-    lags = np.arange(-most, most + 1)
-    energy_a, energy_b = (np.concatenate(([0.0], np.cumsum(x * x))) for x in (a, b))
-    after, before = np.maximum(lags, 0), np.maximum(-lags, 0)
-    overlap = n - after - before
-    norm = np.sqrt((energy_a[after + overlap] - energy_a[after]) * (energy_b[before + overlap] - energy_b[before]))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        rho = cross[lags] / norm
+    most = max(2, int(reach * min(map(len, a))))
+    lags, rho = _lagged(a, b, most)
     if not np.all(np.isfinite(rho)):
         return math.nan
-    k = int(np.argmax(rho))
-    if k in (0, len(rho) - 1):
+    peaks = 1 + np.flatnonzero((rho[1:-1] >= rho[:-2]) & (rho[1:-1] >= rho[2:]))
+    if not len(peaks) or rho[peaks].max() < rho.max() or not rho.max() > 0.0:
+        return math.nan
+    if rho.max() < ALIKE * _ceiling(a):
+        return math.nan
+    rivals = peaks[rho[peaks] >= RIVAL * rho.max()]
+    k = int(rivals[np.argmin(np.abs(lags[rivals]))])
+    other = rivals[np.sign(lags[rivals]) == -np.sign(lags[k])]
+    if len(other) and lags[k] and abs(lags[k]) > NEARER * np.min(np.abs(lags[other])):
         return math.nan
     low, top, high = rho[k - 1 : k + 2]
     bend = low - 2.0 * top + high
     return float(step * (lags[k] + (0.5 * (low - high) / bend if bend < 0.0 else 0.0)))
+
+
+def _ceiling(a: Sequence[Floats]) -> float:
+    """Correlation that the noise of the measurement leaves to a perfect prediction."""
+    noise = noise_level([np.concatenate(([0.0], np.cumsum(x))) for x in a])
+    power = sum(float(x @ x) for x in a) / sum(map(len, a))
+    return math.sqrt(max(1.0 - 2.0 * noise**2 / power, 0.0)) if power > 0.0 else 0.0
+
+
+def _lagged(a: Sequence[Floats], b: Sequence[Floats], most: int) -> tuple[NDArray[np.int64], Floats]:
+    """Lags -most to most and the normalised correlations there, summed over windows."""
+    lags = np.arange(-most, most + 1)
+    cross, size_a, size_b = (np.zeros(len(lags)) for _ in range(3))
+    for x, y in zip(a, b, strict=True):
+        n = len(x)
+        size = 1 << (2 * n - 1).bit_length()
+        cross += np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)[lags]
+        energy_x, energy_y = (np.concatenate(([0.0], np.cumsum(z * z))) for z in (x, y))
+        after, before = np.maximum(lags, 0), np.maximum(-lags, 0)
+        both = n - after - before
+        size_a += energy_x[after + both] - energy_x[after]
+        size_b += energy_y[before + both] - energy_y[before]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return lags, cross / np.sqrt(size_a * size_b)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import InvalidValue
+from crossbody.hw.replaying.smooth_rates import smooth_rates
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -16,11 +17,11 @@ DEGREE = 3
 
 
 def rates_by_fit(t: Floats, y: Floats, rows: Rows | None = None) -> Floats:
-    """Rates (m, k) of samples y (n, k) at times t (n,), at some rows or at all; zeros for a record too short."""
-    wanted = np.arange(len(t)) if rows is None else rows
-    if len(t) < 2 * HALF + 1:
-        return np.zeros((len(wanted), y.shape[1]))
-    return derivatives(t, y, rows=wanted)[1]
+    """Rates (m, k) of samples y (n, k) at times t (n,), at some rows or at all, by polynomials that cross no impact.
+
+    Zeros for a record too short.
+    """
+    return smooth_rates(t, y, np.arange(len(t)) if rows is None else rows)
 
 
 def derivatives(

@@ -76,7 +76,8 @@ def replay(
         log=log, model=chosen.name, title=chosen.title, kind=kind, parameters=MappingProxyType(numbers),
         units=MappingProxyType({k: p.unit for k, p in chosen.parameters.items()}), coordinates=chosen.measured,
         windows=cut, predictions=tuple(predictions), skipped=MappingProxyType(skipped), delay=delay,
-        falls=chosen.falls, mass=float(numbers.get("mass", 1.0)),
+        falls=chosen.falls, mass=float(numbers.get("mass", 1.0)), limits=chosen.limits,
+        turns=chosen.turns,
     )  # fmt: skip
 
 

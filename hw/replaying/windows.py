@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from crossbody.cases import InvalidValue, SceneError
 from crossbody.hw.models._contract import Floats, Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.rates import rates_by_fit
+from crossbody.hw.replaying.turns import advanced
 
 FEWEST = 8
 """Samples of a window."""
@@ -69,7 +71,7 @@ def windows(
         starts = np.array([a for a, _ in cuts])
         yd = np.zeros_like(y)
         yd[starts] = rates_by_fit(log.time, y, starts)
-    return tuple(_window(log, y, yd, u, delays, a, b) for a, b in cuts)
+    return tuple(_window(log, y, yd, u, delays, model.turns, a, b) for a, b in cuts)
 
 
 def _delays(log: Log, model: Model) -> Floats:
@@ -92,12 +94,12 @@ def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:
     return found
 
 
-def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, a: int, b: int) -> Window:
+def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, turns: Sequence[int], a: int, b: int) -> Window:
     rows = slice(a, b + 1)
     t = log.time[rows]
     age = (t - t[0])[:, None] - delays
     # The state at the window's beginning was measured a delay later: the rate carries it there.
-    start, rate = y[a] + yd[a] * delays, yd[a]
+    start, rate = advanced(y[a], yd[a], delays, turns), yd[a]
     driven = bool(u.shape[1])
     segment = Segment(
         y=start, yd=rate, t_end=float(t[-1] - t[0]), times=t[:-1] - t[0] if driven else np.zeros(0),
@@ -106,3 +108,16 @@ def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, a: int, 
     last = float(log.time[b]) if b + 1 == len(log) else float(log.time[b + 1])
     kept = log.window(float(t[0]), np.nextafter(last, math.inf) if b + 1 == len(log) else last)
     return Window(t=t, age=age, y=y[rows], u=u[rows], segment=segment, log=kept)
+
+
+def overlap(cut: Sequence[Window]) -> int:
+    """How many of the windows behind it a window has samples in common with, at most; other logs begin anew."""
+    found = 0
+    for i, window in enumerate(cut):
+        count, last = 0, window.t[0]
+        for other in cut[i + 1 :]:
+            if not last < other.t[0] < window.t[-1]:
+                break
+            count, last = count + 1, other.t[0]
+        found = max(found, count)
+    return found

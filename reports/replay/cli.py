@@ -35,6 +35,13 @@ def _replayed(command: _Work) -> _Work:
         click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
         click.option("--horizon", type=float, metavar="S", help="Length of a window, s, if not to the next restart."),
         click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of what was measured, s."),
+        click.option(
+            "--limit",
+            "limits",
+            metavar="NAME=V",
+            multiple=True,
+            help="Limit on a metric, for example fit=90 or rmse_th1=0.01; repeatable.",
+        ),
         click.option("--out", type=click.Path(path_type=Path), default=place, show_default=True, metavar="DIR"),
     )
     for option in reversed(options):
@@ -64,12 +71,13 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 @click.option("--hold", type=int, default=2, show_default=True, help="Every so manieth window is held out; 0: none.")
 @click.option("--starts", type=click.Choice(["measured", "free"]), default="measured", show_default=True)
 @click.option("--stride", type=int, default=1, show_default=True, help="Of so many samples one is compared.")
+@click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time of the search, s.")
 @speaks
-def identify(free: tuple[str, ...], hold: int, starts: str, stride: int, out: Path, **log: Any) -> int:
+def identify(free: tuple[str, ...], hold: int, starts: str, stride: int, budget: float, out: Path, **log: Any) -> int:
     """Identify parameters of a model from LOG, with intervals, judged on windows that were held out."""
     from crossbody.reports.replay.command import Ask, run_identify
 
-    return run_identify(Ask(**log), free, hold, starts, stride, out, _command())
+    return run_identify(Ask(**log), free, hold, starts, stride, budget, out, _command())
 
 
 def _command() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +15,10 @@ from crossbody.cases import CaseUnsupported
 from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import voice
 from crossbody.reports.commands import where
+from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison as replay
+from crossbody.reports.replay import limits
 from crossbody.reports.runs import jobs, output, study, watch
 from crossbody.reports.runs.jobs import DEFAULT_ENGINES
 from crossbody.reports.runs.provenance import provenance
@@ -32,6 +35,7 @@ class Ask:
         pairs: K=V, parameters of the model.
         restart, horizon: s; None for the usual.
         delay: of the measured coordinates beyond what the map says, s.
+        limits: NAME=VALUE, on metrics of the replay.
     """
 
     path: Path
@@ -44,6 +48,7 @@ class Ask:
     horizon: float | None
     delay: float
     memory: int = 1000
+    limits: Sequence[str] = ()
 
     def log(self) -> Log:
         """The log."""
@@ -72,6 +77,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
     """
     hw.models.load(ask.model)
     output.check(out, "replay")
+    given = limits.parse(ask.limits)
     engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
     if not engines:
         raise CaseUnsupported(f"No engine that was asked for has come back: {'; '.join(watch.all_lost())}.")
@@ -86,17 +92,21 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
             restart=ask.restart, horizon=ask.horizon, delay=ask.delay, tell=tell,
         )  # fmt: skip
     watch.unlimited()
-    rows = replay.verdicts(found, command)
+    limits.check(given, found)
+    rows = replay.verdicts(found, command, given)
     _write(out, found, rows, provenance(command, log=replay.log_about(found)), {}, "replay")
-    metrics = _metrics(found)
+    metrics = _metrics(found, rows)
     if not voice.told_as_json({"metrics": metrics, "findings": replay.findings(found)}):
         if not voice.quiet():
             _say(found, metrics)
+        _say_outside(rows)
         where(out)
-    return 0 if not any(p.failed for p in found.predictions) else 1
+    return exit_code(rows["verdict"])
 
 
-def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, out: Path, command: str) -> int:
+def run_identify(
+    ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, budget: float, out: Path, command: str
+) -> int:
     """Identify parameters, replay the log with them, and write the report.
 
     Args:
@@ -105,6 +115,7 @@ def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: 
         hold: every so manieth window is held out.
         starts: "measured" or "free".
         stride: of so many samples one is compared.
+        budget: time that the search may take, s.
         out: folder to write.
         command: what was typed, for provenance.
 
@@ -113,10 +124,11 @@ def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: 
     """
     model = hw.models.load(ask.model)
     output.check(out, "identify")
+    asked = limits.parse(ask.limits)
     log, given = ask.log(), jobs.parse_settings(ask.pairs)
     fit = hw.identify(
         log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
-        stride=stride,
+        stride=stride, delay=ask.delay, budget=budget,
     )  # fmt: skip
     found = hw.replay(
         log, model, wanted=(model.engine,), parameters=fit.parameters, restart=ask.restart, horizon=ask.horizon,
@@ -127,25 +139,32 @@ def run_identify(ask: Ask, free: Sequence[str], hold: int, starts: str, stride: 
         "sensitivities": fit.sensitivities, "covariance": fit.covariance, "warnings": list(fit.warnings),
         "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message,
     }  # fmt: skip
-    rows = replay.verdicts(found, command)
+    limits.check(asked, found, (limits.HELD,))
+    rows = replay.verdicts(found, command, asked, fit)
+    tables["held_out"]["verdict"] = _held_verdicts(fit, rows)
     _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables, "identify")
-    if not voice.told_as_json(tables | {"warnings": pd.DataFrame({"text": list(fit.warnings)})}):
+    more = {"warnings": pd.DataFrame({"text": list(fit.warnings)}), "metrics": _metrics(found, rows)}
+    if not voice.told_as_json(tables | more):
         if not voice.quiet():
             for shown in tables.values():
                 print(shown.to_string(index=False, float_format=lambda x: f"{x:.6g}"), end="\n\n")
             print(f"{fit.sensitivities}\nIntervals: {fit.covariance}")
         for warning in fit.warnings:
             print(f"warning: {warning}")
+        _say_outside(rows)
         where(out)
-    return 0 if fit.success else 1
+    return exit_code(rows["verdict"]) if fit.success else 1
 
 
 def estimates(fit: Fit) -> pd.DataFrame:
     """One row an identified parameter."""
+    halves = {one.name: one.values for one in fit.agreement}
     return pd.DataFrame(
         {
             "name": e.name, "value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "start": e.start,
-            "identifiable": e.identifiable,
+            "identifiable": e.identifiable, "std": e.std, "freedom": e.freedom, "kept_low": e.kept_low,
+            "kept_high": e.kept_high, "first_half": halves.get(e.name, (math.nan, math.nan))[0],
+            "second_half": halves.get(e.name, (math.nan, math.nan))[1],
         } for e in fit.estimates
     )  # fmt: skip
 
@@ -161,13 +180,32 @@ def held_out(fit: Fit) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def _metrics(found: Comparison) -> pd.DataFrame:
-    columns = ["who", "metric", "channel", "value", "unit"]
-    rows = [
+def _held_verdicts(fit: Fit, rows: pd.DataFrame) -> list[str]:
+    """What is said of every row of `held_out`: the rmse alone is judged."""
+    word = rows.loc[rows["metric"] == limits.HELD, "verdict"]
+    return [word.iloc[0] if name == "rmse" and len(word) else Word.INFO.value for name in fit.before]
+
+
+def _metrics(found: Comparison, rows: pd.DataFrame) -> pd.DataFrame:
+    """Every metric with its channel, and what the verdicts say of it."""
+    columns = ["who", "metric", "channel", "value", "unit", "expected", "limit", "verdict"]
+    said = rows.drop_duplicates(["engine", "profile", "metric"]).set_index(["engine", "profile", "metric"])
+    told = [
         {"who": f"{r.engine}:{r.profile}", "metric": r.metric, "channel": r.channel, "value": r.value, "unit": r.unit}
+        | said.loc[(r.engine, r.profile, limits.label(r)), ["expected", "limit", "verdict"]].to_dict()
         for r in found.rows()
     ]  # fmt: skip
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(told, columns=columns)
+
+
+def _say_outside(rows: pd.DataFrame) -> None:
+    """One line a number that is outside its limit."""
+    for row in rows[rows["verdict"] == Word.OUTSIDE].to_dict(orient="records"):
+        best = f" of {row['expected']:g}" if row["expected"] else ""
+        print(
+            f"outside: {row['engine']}:{row['profile']} {row['metric']} is {row['value']:.4g} {row['unit']}, limit "
+            f"{row['limit']:.4g}{best}. {row['why']}"
+        )
 
 
 def _say(found: Comparison, metrics: pd.DataFrame) -> None:
@@ -192,7 +230,7 @@ def _write(
     with output.folder(out, name) as made:
         study.write(made, [], rows, told)
         tables = {
-            "replay": _metrics(found), "findings": replay.findings(found), "residuals": replay.residuals(found),
+            "replay": _metrics(found, rows), "findings": replay.findings(found), "residuals": replay.residuals(found),
             "correlations": replay.correlations(found), **more,
         }  # fmt: skip
         for stem, shown in tables.items():

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from crossbody.hw import Comparison, Log, Prediction
+from crossbody.cases import Limit
+from crossbody.hw import Comparison, Fit, Log, Prediction
 from crossbody.reports.judging.comparison import table
-from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.judging.verdict import Verdict, Word, limit_for
 from crossbody.reports.pages.styles import TRUTH
+from crossbody.reports.replay import limits
 from crossbody.reports.runs.store import Trace, save
 
 MEASURED, SYNTHETIC = "measurement", "SYNTHETIC, no measurement"
@@ -30,8 +32,16 @@ def variant(log: Log) -> str:
     return f"{'' if not log.provenance.synthetic or 'synthetic' in stem else 'synthetic_'}{stem}{part}"
 
 
-def verdicts(found: Comparison, command: str) -> pd.DataFrame:
-    """Every metric of every engine; nothing is judged: a log has no limits."""
+def verdicts(found: Comparison, command: str, given: Sequence[Limit] = (), fit: Fit | None = None) -> pd.DataFrame:
+    """Every metric of every engine, judged where the model or the command has a limit on it.
+
+    Args:
+        found: the replay.
+        command: what reproduces it.
+        given: limits that go before those of the model.
+        fit: the identification that the parameters come from, whose held-out error is judged too.
+    """
+    rules = (*found.limits, *given)
     source = f"{found.kind}, {len(found.windows)} windows of {found.log.provenance.file}"
 
     def row(engine: str, profile: str, **more: Any) -> Verdict:
@@ -40,12 +50,21 @@ def verdicts(found: Comparison, command: str) -> pd.DataFrame:
             command=command, **more,
         )  # fmt: skip
 
-    rows = [
-        row(
-            r.engine, r.profile, metric=f"{r.metric}_{r.channel}" if r.channel else r.metric, value=r.value,
-            unit=r.unit, verdict=Word.INFO, why=source,
-        ) for r in found.rows()
-    ]  # fmt: skip
+    rows = []
+    for r in found.rows():
+        word, why, best, allowed = limits.judged(r, rules)
+        rows.append(row(
+            r.engine, r.profile, metric=limits.label(r), value=r.value, unit=r.unit, verdict=word, expected=best,
+            limit=allowed, why=why or source,
+        ))  # fmt: skip
+    if fit is not None and not np.isnan(fit.worse):
+        rule = limit_for((limits.WORSE, *rules), limits.HELD, "*", "*")
+        word, why, best, allowed = limits.against(fit.worse, rule)
+        for p in found.predictions[:1]:
+            rows.append(row(
+                p.engine, p.profile, metric=limits.HELD, value=fit.worse, unit="%", verdict=word, expected=best,
+                limit=allowed, why=why,
+            ))  # fmt: skip
     rows += [
         row(engine, profile, metric="-", value=np.nan, unit="", verdict=Word.SKIPPED, why=why)
         for (engine, profile), why in found.skipped.items()
@@ -76,6 +95,8 @@ def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[st
         return
     who = f"{prediction.engine}:{prediction.profile}"
     for i, c in enumerate(found.coordinates):
+        if not found.tells(i):
+            continue
         tests = {"": found.autocorrelation(prediction, i)}
         count = found.windows[0].u.shape[1]
         tests |= {f"input {j + 1}": found.crosscorrelation(prediction, i, j) for j in range(count)}

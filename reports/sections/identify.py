@@ -13,11 +13,12 @@ TITLE = "Identification"
 ESTIMATES = columns(
     name="Parameter", value=("Estimate", Kind.NUMBER), low=("95 % from", Kind.NUMBER), high=("to", Kind.NUMBER),
     unit="Unit", start=("Start", Kind.NUMBER), identifiable="Identifiable",
+    first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
 )  # fmt: skip
 HELD = columns(
     error="Error", fitted_before=("Fitted windows, start", Kind.NUMBER), fitted_after=("estimate", Kind.NUMBER),
     held_before=("Held-out windows, start", Kind.NUMBER), held_after=("estimate", Kind.NUMBER),
-    change=("Change on held-out [%]", Kind.NUMBER),
+    change=("Change on held-out [%]", Kind.NUMBER), verdict="Verdict",
 )  # fmt: skip
 
 
@@ -26,6 +27,8 @@ def sections(out: Path) -> tuple[Section, ...]:
     if not (out / "identify.json").is_file():
         return ()
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
+    estimates = estimates.reindex(columns=[column.key for column in ESTIMATES])
+    held = held.reindex(columns=[column.key for column in HELD])
     told = read_json(out / "identify.json")["provenance"]["fit"]
     text = (
         f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}. {' '.join(told['warnings'])} "

@@ -12,11 +12,12 @@ from crossbody.reports.runs.study import read_json
 TITLE = "Replay"
 TEXT = (
     "The model starts in each window from what was measured there and runs on recorded inputs, held between their "
-    "recorded times. Of white residuals 99 of 100 correlations lie within the band; what lies outside is for the model "
-    "to explain."
+    "recorded times. Residuals are averaged over a twelfth of the motion's period; where what is left is noise, and an "
+    "error no larger than that of one sample, 99 of 100 correlations lie within the band."
 )
 METRICS = columns(
-    who="Engine", metric="Metric", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit"
+    who="Engine", metric="Metric", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
+    expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER), verdict="Verdict",
 )  # fmt: skip
 FINDINGS = columns(
     what="Check", channel="Channel", row=("Row [1]", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)
@@ -33,6 +34,7 @@ def sections(out: Path) -> tuple[Section, ...]:
         pd.DataFrame(read_json(out / f"{name}.json")["rows"])
         for name in ("replay", "findings", "residuals", "correlations")
     )
+    metrics = metrics.reindex(columns=[column.key for column in METRICS])  # an earlier run judged nothing
     plots = [Plot(name="replay-residual", figure=residual(left))] if len(left) else []
     plots += [Plot(name="replay-correlation", figure=correlation(correlated))] if len(correlated) else []
     tables = [Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")]

@@ -1,0 +1,225 @@
+"""What a search found, judged: intervals, what the data do not see, halves that disagree, windows not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import Value
+from crossbody.hw.fitting.agreement import agreement
+from crossbody.hw.fitting.covariance import Scatter, scatter
+from crossbody.hw.fitting.derivative import DELAY
+from crossbody.hw.fitting.fit import Agreement, Estimate, Fit
+from crossbody.hw.fitting.information import WEIGHT, in_words, information, unseen_by, weak
+from crossbody.hw.fitting.search import Found
+from crossbody.hw.models._contract import Model
+
+Floats = NDArray[np.float64]
+TOGETHER = 0.999
+"""Correlation from which on two parameters are told apart by nothing but noise."""
+EFFECTIVE = 4.0
+"""Degrees of freedom below which a standard deviation is itself hardly known."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Search:
+    """A search that has ended, with what it was asked.
+
+    Attributes:
+        model, numbers, free: what was searched: the model, all its parameters, and the names of the free ones.
+        problem: residuals and derivatives of the fitted windows.
+        x0, found: where it began and ended.
+        limits, sizes: bounds and typical sizes of the unknowns.
+        sides: problems of the fitted and of the held-out windows, all started as measured; None for no windows.
+        fitted, held: their numbers.
+    """
+
+    model: Model
+    numbers: Mapping[str, Value]
+    free: tuple[str, ...]
+    problem: Any
+    x0: Floats
+    found: Found
+    limits: tuple[Floats, Floats]
+    sizes: Floats
+    sides: tuple[Any, ...]
+    fitted: tuple[int, ...]
+    held: tuple[int, ...]
+
+
+def judged(search: Search) -> Fit:
+    """The fit of a search."""
+    problem, found, free, limits = search.problem, search.found, search.free, search.limits
+    count, x = len(free), found.x
+    J = problem.jacobian(x)
+    null = unseen_by(information(J, search.sizes), count)
+    loose = np.setdiff1d(np.arange(len(x)), found.kept)
+    told = information(J[:, loose], search.sizes[loose])
+    blind = np.ones(len(x), dtype=bool)
+    blind[loose] = np.any(np.abs(told.null) > WEIGHT, axis=0) if len(told.null) else False
+    own = np.flatnonzero(loose < count)
+    spread = scatter(told.basis, told.weights[:, own], found.residual, problem.layout)
+    open_ = np.any(null != 0.0, axis=0) if len(null) else np.zeros(count, dtype=bool)
+    flat = problem.flat(x)
+    estimates = tuple(_estimates(search, spread, loose[own], blind, open_, flat))
+    unseen = _unseen(search, null, spread, loose[own], blind)
+    halves = agreement(
+        J, found.residual, problem.layout, x, search.sizes, free, [*found.kept, *np.flatnonzero(found.active)]
+    )  # fmt: skip
+    sizes = np.where(np.abs(x) > 1e-9 * np.abs(search.x0), search.sizes, np.maximum(search.sizes, np.abs(search.x0)))
+    off = problem.checked(x, J, sizes[:count], limits[0])
+    before, after = (_errors(search.sides, y[:count]) for y in (search.x0, x))
+    values = {name: float(x[i]) for i, name in enumerate(free) if name != DELAY}
+    fit = Fit(
+        model=search.model.name, estimates=estimates, correlation=_correlation(spread, loose[own], estimates),
+        kept=tuple(free[i] for i in found.kept), unseen=tuple(unseen.values()), agreement=halves,
+        parameters=dict(search.numbers) | values, delay=float(x[free.index(DELAY)]) if DELAY in free else 0.0,
+        fitted=search.fitted, held=search.held, before=before, after=after,
+        sensitivities=f"{problem.how}; central differences at the solution differ by {off:.1e} of their size",
+        covariance=spread.how, warnings=(), evaluations=found.evaluations, success=found.success,
+        message=found.message,
+    )  # fmt: skip
+    return replace(fit, warnings=tuple(_warnings(fit, unseen, found, flat, off, problem.tolerance)))
+
+
+def _estimates(
+    search: Search, spread: Scatter, own: NDArray[np.int64], blind: NDArray[np.bool_], open_: NDArray[np.bool_],
+    flat: Mapping[int, str],
+) -> Iterator[Estimate]:  # fmt: skip
+    """One estimate a parameter; `own` says which unknowns the scatter is of."""
+    place = {int(i): j for j, i in enumerate(own)}
+    for i, name in enumerate(search.free):
+        value, j = float(search.found.x[i]), place.get(i)
+        std, half, freedom = 0.0, 0.0, np.inf  # of one that was kept
+        if j is not None:
+            std, half, freedom = (float(part[j]) for part in (spread.std, spread.half, spread.freedom))
+            half = np.inf if blind[i] else half
+        wide = np.inf if open_[i] else half
+        bounds = (float(search.limits[0][i]), float(search.limits[1][i]))
+        yield Estimate(
+            name=name, unit="s" if name == DELAY else search.model.parameters[name].unit, value=value,
+            std=np.inf if np.isinf(wide) else std, low=value - wide, high=value + wide, start=float(search.x0[i]),
+            bounds=bounds, identifiable=_identifiable(value, wide, bounds) and i not in flat,
+            kept_low=value - half, kept_high=value + half, freedom=freedom,
+        )  # fmt: skip
+
+
+def _identifiable(value: float, half: float, bounds: tuple[float, float]) -> bool:
+    """Whether an interval is finite, reaches no bound, and is not wider than the value itself.
+
+    Where the bounds admit both signs there is no natural size but their span.
+    """
+    if not np.isfinite(half) or value - half <= bounds[0] or value + half >= bounds[1]:
+        return False
+    signed = bounds[0] < 0.0 < bounds[1]
+    size = 0.5 * (bounds[1] - bounds[0]) if signed and np.isfinite(bounds[1] - bounds[0]) else abs(value)
+    return bool(half < size)
+
+
+def _unseen(
+    search: Search, null: Floats, spread: Scatter, own: NDArray[np.int64], blind: NDArray[np.bool_]
+) -> dict[str, str]:
+    """Directions of several parameters that the data do not see at all, or hardly: sentence -> combination."""
+    names, found = search.free, {}
+    kept = [names[i] for i in search.found.kept]
+    for row in null:
+        words = in_words(row, names)
+        part = [n for n, weight in zip(names, row, strict=True) if weight != 0.0]
+        fix = next((n for n in kept if n in part), part[0])
+        one = f"The data do not see {words}" if len(part) == 1 else f"The data do not see one combination: {words}"
+        found[f"{one}. Fix one of them, for example {fix}." if len(part) > 1 else f"{one}: fix it."] = words
+    seen = [j for j, i in enumerate(own) if not blind[i]]
+    if len(seen) > 1 and np.all(spread.std[seen] > 0.0):
+        at = own[seen]
+        sizes = np.maximum(np.maximum(np.abs(search.found.x[at]), np.abs(search.x0[at])), 1e-300)
+        sizes = np.where([names[i] == DELAY for i in at], search.limits[1][at], sizes)
+        quantile = float(np.median(spread.half[seen] / spread.std[seen]))
+        for row in weak(spread.covariance[np.ix_(seen, seen)], sizes, quantile):
+            words = in_words(row, [names[i] for i in at])
+            if np.sum(np.abs(row) > WEIGHT * np.max(np.abs(row))) > 1:
+                found[f"The data hardly see one combination: {words} are not told from none. Fix one of them."] = words
+    return found
+
+
+def _correlation(spread: Scatter, own: NDArray[np.int64], estimates: Sequence[Estimate]) -> Floats:
+    """Correlations (P, P) of the estimates that have a finite interval."""
+    found = np.full((len(estimates), len(estimates)), np.nan)
+    good = [j for j, i in enumerate(own) if np.isfinite(estimates[i].std) and spread.std[j] > 0.0]
+    C = spread.covariance[np.ix_(good, good)]
+    size = np.sqrt(np.diag(C))
+    found[np.ix_(own[good], own[good])] = C / np.outer(size, size)
+    return found
+
+
+def _errors(sides: Sequence[Any], x: Floats) -> dict[str, tuple[float, float]]:
+    """Errors on the fitted windows and on the held ones, all started as measured."""
+    found: list[tuple[float, float, float]] = []
+    for part in sides:
+        if part is None:
+            found.append((np.nan, np.nan, np.nan))
+            continue
+        r, owners = part.residual(x), part.layout.windows()
+        last = [np.max(np.abs(_ends(r[owners == w], part.k))) for w in np.unique(owners)]
+        found.append(
+            (float(np.sqrt(np.mean(r * r))), float(np.median(last)), float(np.percentile(last, 90.0)))
+        )  # fmt: skip
+    names = ("rmse", "end_median", "end_90")
+    return {name: (found[0][i], found[1][i]) for i, name in enumerate(names)}
+
+
+def _ends(r: Floats, k: int) -> Floats:
+    """The last residual of every coordinate of one window."""
+    return np.asarray(r.reshape(k, -1)[:, -1])
+
+
+def _warnings(
+    fit: Fit, unseen: Mapping[str, str], found: Found, flat: Mapping[int, str], off: float, tolerance: float
+) -> Iterator[str]:
+    yield from unseen
+    if fit.kept:
+        rest = [f"{e.name} = {e.value:.4g} [{e.kept_low:.4g}, {e.kept_high:.4g}]" for e in fit.estimates
+                if e.name not in fit.kept and not np.isfinite(e.std)]  # fmt: skip
+        yield f"With {', '.join(fit.kept)} kept where the search began: {', '.join(rest) or 'nothing else is known'}."
+    for i, e in enumerate(fit.estimates):
+        yield from _about(e, i, fit, bool(found.active[i]), flat)
+    yield from (_differ(one) for one in fit.agreement if not one.agrees)
+    if fit.worse > 0.0:
+        before, after = fit.before["rmse"][1], fit.after["rmse"][1]
+        yield f"On windows that were not fitted the rmse grew from {before:.4g} to {after:.4g}: worse than the start."
+    few = [e.name for e in fit.estimates if np.isfinite(e.std) and e.freedom < EFFECTIVE]
+    if few:
+        yield f"The intervals of {', '.join(few)} rest on few independent pieces of data: more windows would tell."
+    if off > tolerance:
+        yield f"Derivatives differ from central differences by {off:.1e}: judge the intervals by it."
+    if not found.success:
+        yield f"The search did not converge: {found.message}"
+
+
+def _about(e: Estimate, i: int, fit: Fit, active: bool, flat: Mapping[int, str]) -> Iterator[str]:
+    """What is to be said of one estimate."""
+    reached = (e.low <= e.bounds[0], e.high >= e.bounds[1])
+    bound = next((b for b, near in zip(e.bounds, reached, strict=True) if near), None)
+    if i in flat:
+        yield f"{e.name} is not identifiable: {flat[i]}."
+    elif np.isfinite(e.std) and bound is not None:
+        yield f"{e.name} cannot be told from its bound {bound:g} {e.unit}: {e.value:.4g} [{e.low:.4g}, {e.high:.4g}]."
+    elif active:
+        yield f"{e.name} stands at a bound, {e.value:.4g} {e.unit}."
+    elif np.isfinite(e.std) and not e.identifiable:
+        yield f"{e.name} is not identifiable: {e.value:.4g} +- {e.high - e.value:.2g} {e.unit}."
+    for j in range(i):
+        if abs(fit.correlation[i, j]) > TOGETHER:
+            other = fit.estimates[j].name
+            yield f"{e.name} and {other} can hardly be told apart (correlation {fit.correlation[i, j]:+.4f})."
+
+
+def _differ(one: Agreement) -> str:
+    (a, b), (s, t) = one.values, one.stds
+    return (
+        f"{one.name} is not the same in both halves of the data: {a:.4g} +- {s:.2g} and {b:.4g} +- {t:.2g} (standard "
+        "deviations). The model lacks something that moves it, and no interval covers that."
+    )

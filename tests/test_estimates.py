@@ -1,0 +1,155 @@
+"""Intervals as often right as they say, and what no data see: laws over designs and noises at random."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from crossbody.hw.fitting.agreement import agreement
+from crossbody.hw.fitting.covariance import Layout, scatter, whiteness
+from crossbody.hw.fitting.information import in_words, information, to_keep, unseen_by
+
+PARAMETERS = 3
+SHAPES = ("polynomials", "waves", "growing waves")
+
+
+def design(shape: str, layout: Layout, random: np.random.Generator) -> np.ndarray:
+    """Derivatives (N, 3) of one of the kinds that replays have."""
+    columns = []
+    for p in range(PARAMETERS):
+        parts = []
+        for m in layout.samples:
+            t = np.linspace(0.0, 1.0, m)
+            for c in range(layout.k):
+                wave = np.sin(2.0 * np.pi * random.uniform(0.5, 8.0) * t + random.uniform(0.0, 6.0))
+                scale = {"polynomials": t**p * (1.0 + 0.3 * c), "waves": wave, "growing waves": t ** (p % 2 + 1) * wave}
+                parts.append(scale[shape])
+        columns.append(np.concatenate(parts))
+    return np.column_stack(columns)
+
+
+def noise(layout: Layout, correlation: float, draws: int, random: np.random.Generator) -> np.ndarray:
+    """Stationary first-order noise of unit variance (N, draws), independent between channels and windows."""
+    parts = []
+    for m in np.repeat(layout.samples, layout.k):
+        e = random.standard_normal((m, draws)) * np.sqrt(1.0 - correlation**2)
+        e[0] /= np.sqrt(1.0 - correlation**2)
+        parts.append(signal.lfilter([1.0], [1.0, -correlation], e, axis=0))
+    return np.concatenate(parts)
+
+
+def covered(shape: str, layout: Layout, correlation: float, draws: int, seed: int) -> tuple[float, float]:
+    """Part of the true values inside 95 % intervals, and inside those of white residuals."""
+    random = np.random.default_rng(seed)
+    J = design(shape, layout, random)
+    told = information(J, np.ones(PARAMETERS))
+    hits, white = [], []
+    for e in noise(layout, correlation, draws, random).T:
+        estimate = told.weights.T @ e
+        left = e - told.basis @ (told.basis.T @ e)
+        hits.append(np.abs(estimate) <= scatter(told.basis, told.weights, left, layout).half)
+        std = np.sqrt(left @ left / (len(e) - PARAMETERS)) * np.linalg.norm(told.weights, axis=0)
+        white.append(np.abs(estimate) <= 1.96 * std)
+    return float(np.mean(hits)), float(np.mean(white))
+
+
+LAYOUTS = (
+    Layout(samples=(60,), k=1), Layout(samples=(600,), k=1), Layout(samples=(150,) * 3, k=2),
+    Layout(samples=(50,) * 12, k=1),
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", LAYOUTS, ids=["60", "600", "3x150x2", "12x50"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_intervals_of_white_noise_hold_as_often_as_they_say(shape: str, layout: Layout) -> None:
+    """4 designs of 600 draws of 3 parameters: 95 % has a deviation of .4 % where the parameters were one."""
+    found = np.mean([covered(shape, layout, 0.0, 600, seed)[0] for seed in range(4)])
+    assert 0.93 <= found <= 0.97
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("correlation", [0.5, 0.8, 0.95])
+@pytest.mark.parametrize("layout", LAYOUTS[1:], ids=["600", "3x150x2", "12x50"])
+def test_intervals_of_correlated_noise_hold_too(layout: Layout, correlation: float) -> None:
+    """4 designs of each kind, 150 draws of 3 parameters each; a kind by itself may be a percent wider."""
+    found = {shape: [covered(shape, layout, correlation, 150, seed) for seed in range(4)] for shape in SHAPES}
+    holds = {shape: float(np.mean([one for one, _ in some])) for shape, some in found.items()}
+    print(layout, correlation, holds)
+    assert 0.90 <= np.mean(list(holds.values())) <= 0.98
+    assert min(holds.values()) >= 0.90
+    assert max(holds.values()) <= 0.99
+    if correlation == 0.95:  # what intervals of white noise would have said
+        assert np.mean([white for _, white in found["polynomials"]]) < 0.6
+
+
+def test_some_intervals_hold_in_every_run() -> None:
+    """A small part of the two laws."""
+    for layout, correlation, low in ((LAYOUTS[0], 0.0, 0.91), (LAYOUTS[3], 0.0, 0.91), (LAYOUTS[3], 0.95, 0.88)):
+        assert covered("growing waves", layout, correlation, 120, 5)[0] >= low
+
+
+def test_short_windows_are_tested_for_white_noise() -> None:
+    """20 windows of 50 samples, none of which tells much by itself."""
+    layout, random = Layout(samples=(50,) * 20, k=1), np.random.default_rng(0)
+    Q = information(design("waves", layout, random), np.ones(PARAMETERS)).basis
+    said = {r: [whiteness(Q, e, layout) for e in noise(layout, r, 60, random).T] for r in (0.0, 0.3, 0.957)}
+    assert np.mean(np.array(said[0.0]) < 0.05) < 0.15
+    assert max(said[0.3]) < 0.05
+    assert max(said[0.957]) < 1e-12
+
+
+def test_a_noisy_channel_widens_only_what_it_tells() -> None:
+    layout, random = Layout(samples=(400,), k=2), np.random.default_rng(1)
+    J = np.zeros((800, 2))
+    J[:400, 0] = J[400:, 1] = 1.0
+    e = random.standard_normal(800) * np.repeat([1.0, 30.0], 400)
+    told = information(J, np.ones(2))
+    found = scatter(told.basis, told.weights, e - told.basis @ (told.basis.T @ e), layout)
+    np.testing.assert_allclose(found.std, [1.0 / 20.0, 30.0 / 20.0], rtol=0.15)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(2, 7), st.integers(0, 3), st.integers(0, 2**32 - 1))
+def test_every_null_direction_is_found_and_one_parameter_each_is_kept(size: int, lost: int, seed: int) -> None:
+    """J = B (I - N^T N) D: what it does not see is known."""
+    random = np.random.default_rng(seed)
+    lost = min(lost, size - 1)
+    N = np.linalg.qr(random.standard_normal((size, max(lost, 1))))[0][:, :lost].T
+    scale = 10.0 ** random.uniform(-6.0, 6.0, size)
+    J = random.standard_normal((40, size)) @ (np.eye(size) - N.T @ N) / scale
+    told = information(J, scale)
+    null = unseen_by(told, size)
+    kept = to_keep(null, np.linalg.norm(J * scale, axis=0))
+    assert len(null) == len(kept) == lost
+    assert np.abs((J * scale) @ null.T).max(initial=0.0) < 1e-6 * np.abs(J * scale).max()
+    rest = np.setdiff1d(np.arange(size), kept)
+    assert not len(unseen_by(information(J[:, rest], scale[rest]), len(rest)))
+
+
+def test_a_combination_is_named() -> None:
+    names = ("m1", "m2", "I1", "k1")
+    assert in_words(np.array([0.5, 0.5, 0.5, 0.5]), names) == "m1, m2, I1, k1 all multiplied by the same factor"
+    assert in_words(np.array([0.0, 0.0, -1.0, 0.0]), names) == "I1"
+    assert in_words(np.array([0.0, 1.0, 0.0, -0.5]), names) == "relative changes of m2 by +1 and k1 by -0.5"
+
+
+@pytest.mark.parametrize("layout", [Layout(samples=(300,), k=2), Layout(samples=(60,) * 10, k=1)], ids=["one", "ten"])
+def test_halves_disagree_where_the_parameter_moved_and_seldom_else(layout: Layout) -> None:
+    random, told = np.random.default_rng(2), []
+    J = design("waves", layout, random)
+    half = layout.times() > 0.5 if len(layout.samples) == 1 else layout.windows() >= len(layout.samples) // 2
+    for moved in (0.0, 1.0):
+        for e in 0.2 * noise(layout, 0.6, 40, random).T:
+            y = e + moved * half * J[:, 1]
+            x = np.linalg.lstsq(J, y, rcond=None)[0]
+            halves = agreement(J, y - J @ x, layout, x, np.ones(3), ("a", "b", "c"), ())
+            assert len(halves) == 3
+            told.append((moved, halves[1].agrees))
+            if moved and len(layout.samples) > 1:
+                assert halves[1].values[1] - halves[1].values[0] == pytest.approx(1.0, abs=0.5)
+    assert np.mean([agrees for moved, agrees in told if not moved]) > 0.9
+    assert np.mean([agrees for moved, agrees in told if moved]) < 0.1
