@@ -12,7 +12,7 @@ run: $(READY)
 	$(BIN)/crossbody run --out out
 
 test: $(READY)
-	$(BIN)/pytest -m "not slow and not bench"
+	$(BIN)/pytest -m "not slow and not bench" -n auto --dist loadfile
 
 slow: $(READY)
 	$(BIN)/pytest -m slow

@@ -11,10 +11,15 @@ from crossbody.cases import Event, Mode, Outcome, Switch, Trajectory
 from crossbody.cases._arrays import Floats
 
 Observe = Callable[[Floats, Floats], tuple[Floats, Floats]]
-"""(q (n, nq), v (n, nv)) -> gap (n, nc), energy (n, 2), in the case's coordinates."""
+"""(q (n, nq), v (n, nv)) of the engine -> gap (n, nc), energy (n, 2)."""
 Chart = Callable[[Floats, Floats], tuple[Floats, Floats]]
 """(q (n, nq), v (n, nv)) of an engine -> those of the case."""
 Modes = tuple[int, ...]
+
+
+def charted(chart: Chart, observe: Observe) -> Observe:
+    """What an engine observes that takes the coordinates of the case."""
+    return lambda q, v: observe(*chart(q, v))
 
 
 class Log:
@@ -65,9 +70,9 @@ class Log:
         """The run; gaps and energies are evaluated here."""
         t, q, v = self.columns()
         with np.errstate(all="ignore"):  # a run that failed may end where squares overflow
+            gap, energy = observe(q, v)
             if chart is not None:
                 q, v = chart(q, v)
-            gap, energy = observe(q, v)
         return Trajectory(
             t=t,
             q=q,

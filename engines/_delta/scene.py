@@ -10,6 +10,7 @@ import numpy as np
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
 from crossbody.engines._delta import chart
+from crossbody.engines._delta.controller import Controller, controller
 from crossbody.engines._delta.forces import table
 from crossbody.engines._linear import Spot
 from crossbody.reference.delta import Robot, scene
@@ -25,11 +26,11 @@ class Drive:
     """
 
     def __init__(self, case: Case) -> None:
-        self.program = scene.program_of(case.parameters)
+        self.controller = _controller(case)
         given = case.inputs
         self._changes = {} if given is None else dict(zip(given.times.tolist(), given.values, strict=True))
         self._ticks: dict[float, None] = {}
-        if self.program is not None:
+        if self.controller is not None:
             ticks = scene.sampling_of(case.parameters).ticks(case.t_end).tolist()
             self._ticks = dict.fromkeys(t for t in ticks if t < case.t_end)
         self.times: list[float] = sorted(t for t in {**self._changes, **self._ticks} if t < case.t_end)
@@ -39,14 +40,23 @@ class Drive:
     def reset(self) -> None:
         """Nothing acts, and the controller remembers nothing."""
         self.u[:] = 0.0
-        self.memory = np.zeros(self.program.memory if self.program else 0)
+        if self.controller is not None:
+            self.controller.reset()
 
-    def change(self, t: float, q: Floats, v: Floats) -> None:
-        """Put in force what acts from t on; q, v (9,) are absolute angles and rates at t."""
+    def change(self, t: float, q: Floats) -> None:
+        """Put in force what acts from t on; q (9,) are the absolute angles at t."""
         if t in self._changes:
             self.u[:] = self._changes[t]
-        if self.program is not None and t in self._ticks:
-            self.program.control(t, q, v, self.u, self.memory, self.program.parameters)
+        if self.controller is not None and t in self._ticks:
+            self.u[:3] = self.controller.tick(t, q)
+
+
+def _controller(case: Case) -> Controller | None:
+    path = scene.path_of(case.parameters)
+    if path is None:
+        return None
+    scene.program_of(case.parameters)  # refuses what the reference refuses, in the same words
+    return controller(case.parameters, scene.robot_of(case.parameters), path, scene.sampling_of(case.parameters))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,10 +82,6 @@ class Delta:
         if len(q) > 1:
             q[:, 2::3] = np.unwrap(q[:, 2::3], axis=0)
         return q, v
-
-    def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Gaps (n, 6), m, and energies (n, 2), J, of absolute angles and rates."""
-        return closures(self.robot, q, v)
 
 
 def closures(robot: Robot, q: Floats, v: Floats) -> tuple[Floats, Floats]:

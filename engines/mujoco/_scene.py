@@ -27,7 +27,7 @@ class Scene:
         modes: -> mode of every row.
         lam: -> multiplier of every row, N (one number for one row).
         safe: -> whether the state is finite and within what the scene can reach.
-        observe: gaps and energies of many states, in the case's coordinates.
+        observe: gaps and energies of many states of the model.
         chart: positions and velocities of the model -> those of the case; None where they are the same.
         instants: when the inputs change, s, increasing.
         change: puts in force what acts from such an instant on.

@@ -13,7 +13,7 @@ import numpy as np
 from crossbody.cases import Case, Mode, Outcome, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.engines._cube import Cube, cube, quaternion, rotation_vector
-from crossbody.engines._log import Log
+from crossbody.engines._log import Log, charted
 from crossbody.engines.mujoco._globals import captured
 
 FASTEST = 1e4
@@ -75,7 +75,9 @@ class CubeRun:
             outcome = self._steps(log, dt)
         wall = perf_counter() - start
         message = " ".join(f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys(warned))
-        return log.trajectory(self.cube.observe, outcome, message, len(log.motion) - 1, wall, chart=_chart)
+        return log.trajectory(
+            charted(_chart, self.cube.observe), outcome, message, len(log.motion) - 1, wall, chart=_chart
+        )
 
     def _steps(self, log: Log, dt: float) -> Outcome:
         model, data = self.model, self.data

@@ -22,6 +22,7 @@ from crossbody.engines.mujoco._delta_model import compiled
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
 from crossbody.engines.mujoco._linear import Stand
+from crossbody.engines.mujoco._observe import of_equalities
 from crossbody.engines.mujoco._scene import Scene
 
 HELD = (int(Mode.BILATERAL),) * 6
@@ -53,7 +54,7 @@ def build(case: Case, profile: str, dt: float) -> Scene:
         modes=lambda: HELD,
         lam=lambda: np.array(data.efc_force),  # a view into the arena: copied
         safe=_guard(data),
-        observe=own.observe,
+        observe=of_equalities(model),
         chart=own.absolute,
         instants=own.drive.times,
         change=_change(own, model, data),
@@ -102,8 +103,7 @@ def _change(own: Delta, model: Any, data: Any) -> Callable[[float], None]:
     tips = [model.body(f"tip{i}").id for i in (1, 2, 3)]
 
     def change(t: float) -> None:
-        q, v = chart.from_tree(data.qpos, data.qvel)
-        own.drive.change(t, q, v)
+        own.drive.change(t, chart.from_tree(data.qpos, data.qvel)[0])
         data.xfrc_applied[tips, :3] = own.drive.u[3:] / 3
 
     return change

@@ -10,6 +10,7 @@ import numpy as np
 
 from crossbody.cases import Case, Mode
 from crossbody.engines._link_chain import LinkChain, link_chain
+from crossbody.engines._log import charted
 from crossbody.engines.mujoco._scene import Scene
 
 FASTEST = 1e5
@@ -34,8 +35,8 @@ def build(case: Case, profile: str, dt: float) -> Scene:
     held = (int(Mode.BILATERAL),) * len(case.contacts)
     scene = Scene(
         model=model, data=data, nc=len(case.contacts), start=_start(own, model, data), modes=lambda: held,
-        lam=lambda: unknown, safe=_guard(data), observe=own.observe, chart=own.absolute, hook=_hook(own, data),
-        instants=own.times.tolist(), change=own.change,
+        lam=lambda: unknown, safe=_guard(data), observe=charted(own.absolute, own.observe),
+        chart=own.absolute, hook=_hook(own, data), instants=own.times.tolist(), change=own.change,
     )  # fmt: skip
     q0, v0 = own.absolute(own.r0[None], own.rd0[None])
     scene.audit = {

@@ -17,7 +17,7 @@ from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _soft_contact as soft
 from crossbody.engines._linear import Spot, same
-from crossbody.engines._log import Chart, Modes
+from crossbody.engines._log import Chart, Modes, charted
 from crossbody.engines._soft_contact import NAMES, SoftContact
 from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
@@ -94,7 +94,8 @@ def _matched(own: SoftContact, case: Case) -> Scene:
     hook = pairs.beside(_forces(own, data))
     scene = Scene(
         model=model, data=data, nc=2, start=start, modes=pairs.modes, lam=pairs.lam, safe=_guard(own, data),
-        observe=own.observe, chart=soft.chart, instants=soft.instants(own.p, case.t_end), hook=hook, always=True,
+        observe=charted(soft.chart, own.observe), chart=soft.chart, instants=soft.instants(own.p, case.t_end),
+        hook=hook, always=True,
         arm=pairs.arm(reach=own.sizes[0][0]), margins=pairs.margins, machine="level",
     )  # fmt: skip
     scene.audit = _listed(scene, own, case, np.eye(len(NAMES))) | _listed_rows(scene, pairs)
@@ -126,7 +127,8 @@ def _obvious(own: SoftContact, case: Case) -> Scene:
 
     scene = Scene(
         model=model, data=data, nc=2, start=_start(own, case, model, data, tree), modes=modes, lam=lam,
-        safe=_guard(own, data), observe=own.observe, chart=_chart(tree), hook=_beside(own, data, tree),
+        safe=_guard(own, data), observe=charted(_chart(tree), own.observe), chart=_chart(tree),
+        hook=_beside(own, data, tree),
     )  # fmt: skip
     scene.audit = _listed(scene, own, case, tree) | {"constants": {"solref": np.array(model.geom_solref[0])}}
     return scene

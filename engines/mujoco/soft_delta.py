@@ -16,6 +16,7 @@ from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _soft_contact as soft
 from crossbody.engines._linear import Spot
+from crossbody.engines._log import charted
 from crossbody.engines._soft_delta import (
     AXES,
     HINGES,
@@ -150,7 +151,7 @@ def _scene(own: SoftDelta, case: Case, model: Any, data: Any, pairs: Pairs) -> S
         modes=lambda: HELD + pairs.modes(),
         lam=lambda: np.append(data.efc_force[:LOOPS], pairs.lam()),
         safe=lambda: bool((np.abs(rates) < FASTEST).all()),
-        observe=own.observe, chart=of_case, instants=own.instants(case.t_end),
+        observe=charted(of_case, own.observe), chart=of_case, instants=own.instants(case.t_end),
     )  # fmt: skip
 
 

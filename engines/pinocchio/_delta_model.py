@@ -72,6 +72,15 @@ class Closed:
         h, hd, Hdv = (np.concatenate((x[0] - x[1], x[0] - x[2])) for x in (at, rate, drift))
         return h, hd, Hdv
 
+    def observe(self, r: Floats, rd: Floats) -> tuple[Floats, Floats]:
+        """Gaps (n, 6), m, of the loops, and kinetic and potential energy (n, 2), J, of many states (n, 9)."""
+        gaps, energy = np.empty((len(r), 6)), np.empty((len(r), 2))
+        for i, (position, rate) in enumerate(zip(r, rd, strict=True)):
+            gaps[i] = self.loops(position, rate)[0]
+            energy[i, 0] = pin.computeKineticEnergy(self.model, self.data)
+            energy[i, 1] = pin.computePotentialEnergy(self.model, self.data)
+        return gaps, energy
+
     def derivatives(self, r: Floats, rd: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
         """Of the accelerations by r, r' and tau (9, 9), as `computeConstraintDynamicsDerivatives` has them."""
         self.accelerate(r, rd, tau)

@@ -48,7 +48,7 @@ class Scene:
         rows: gaps, accelerations and multipliers.
         points: every row as a constraint of Pinocchio with three components, the normal last (profile admm); or a
             function of q that makes them, where they move along the bodies.
-        observe: gaps and energies of many states, in the case's coordinates.
+        observe: gaps and energies of many states of the model.
         sizes: how far the coordinates move (or how deep contacts give), and how fast: numbers, or one a coordinate
             (n,). Times rtol they are the absolute tolerances.
         start: q and v at the start in the engine's coordinates; None where they are the case's.

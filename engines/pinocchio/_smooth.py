@@ -12,7 +12,7 @@ from sksundae.cvode import CVODE
 
 from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
-from crossbody.engines._log import Chart, Log, Modes
+from crossbody.engines._log import Chart, Log, Modes, Observe
 from crossbody.reference.sundials.quiet import quiet
 
 PER_SOLVE = 100_000
@@ -31,7 +31,7 @@ class Smooth:
         change: (t, q, v) puts in force what acts from such an instant on.
         reset: back to the start: no input, no memory.
         chart: positions and velocities of the engine -> those of the case.
-        observe: gaps and energies in the case's coordinates.
+        observe: gaps and energies of many states of the model.
         audit: the physics read back from the model.
     """
 
@@ -43,7 +43,7 @@ class Smooth:
     change: Callable[[float, Floats, Floats], None]
     reset: Callable[[], None]
     chart: Chart
-    observe: Chart
+    observe: Observe
     audit: Any
 
 

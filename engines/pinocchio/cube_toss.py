@@ -18,7 +18,7 @@ import pinocchio as pin
 from crossbody.cases import Case, Mode, Outcome, Parameter, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.engines._cube import CORNERS, Cube, cube, quaternion, rotation_vector
-from crossbody.engines._log import Log
+from crossbody.engines._log import Log, charted
 
 SETTINGS = {
     "dt": Parameter(default=1e-3, unit="s", doc="time step", low=0.0, open_low=True),
@@ -78,7 +78,9 @@ class CubeRun:
         outcome = self._steps(log, q, v, float(self.settings["dt"]))
         wall = perf_counter() - start
         counts = {"iterations": self.iterations}
-        return log.trajectory(self.cube.observe, outcome, "", len(log.motion) - 1, wall, counts, _chart)
+        return log.trajectory(
+            charted(_chart, self.cube.observe), outcome, "", len(log.motion) - 1, wall, counts, _chart
+        )
 
     def _steps(self, log: Log, q: Floats, v: Floats, dt: float) -> Outcome:
         count = int(np.ceil(self.case.t_end / dt - 1e-9))

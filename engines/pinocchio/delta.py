@@ -43,7 +43,7 @@ def smooth(case: Case, model: str) -> Smooth:
         return closed.accelerate(r, rd, tau)
 
     def change(t: float, r: Floats, rd: Floats) -> None:
-        drive.change(t, *chart.from_tree(r, rd))
+        drive.change(t, chart.from_tree(r, rd)[0])
 
     return Smooth(
         q0=own.r0,
@@ -54,7 +54,7 @@ def smooth(case: Case, model: str) -> Smooth:
         change=change,
         reset=drive.reset,
         chart=own.absolute,
-        observe=own.observe,
+        observe=closed.observe,
         audit=_audit(case, own, closed),
     )
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
 from crossbody.engines._link_chain import LinkChain, link_chain
+from crossbody.engines._log import charted
 from crossbody.engines.pinocchio._smooth import Smooth
 
 MODELS = {"by_hand": "joint by joint"}
@@ -35,7 +36,7 @@ def smooth(case: Case, model: str) -> Smooth:
     q0, v0 = own.absolute(own.r0[None], own.rd0[None])
     return Smooth(
         q0=own.r0, v0=own.rd0, accelerate=accelerate, nc=len(case.contacts), instants=own.times.tolist(),
-        change=change, reset=own.reset, chart=own.absolute, observe=own.observe,
+        change=change, reset=own.reset, chart=own.absolute, observe=charted(own.absolute, own.observe),
         audit={
             "masses": np.array([inertia.mass for inertia in tree.inertias[1:]]), "constants": {},
             "gravity": float(np.linalg.norm(tree.gravity.linear)), "q0": q0[0], "v0": v0[0],

@@ -11,6 +11,7 @@ from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _soft_contact as soft
 from crossbody.engines._linear import Spot
+from crossbody.engines._log import charted
 from crossbody.engines.pinocchio._linear import Stand, of_rows
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene
@@ -41,7 +42,7 @@ def build(case: Case, algebra: str) -> Scene:
         algebra=algebra, forces=own.forces,
     )  # fmt: skip
     return Scene(
-        rows=rows, observe=own.observe, sizes=own.sizes, start=own.start(case), chart=soft.chart,
+        rows=rows, observe=charted(soft.chart, own.observe), sizes=own.sizes, start=own.start(case), chart=soft.chart,
         audit=_listed(rows, own),
     )  # fmt: skip
 

@@ -15,6 +15,7 @@ import pinocchio as pin
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines._linear import Spot
+from crossbody.engines._log import charted
 from crossbody.engines._soft_delta import (
     CLOCK,
     HINGES,
@@ -61,7 +62,7 @@ def build(case: Case, algebra: str) -> Scene:
 
     rows = PinRows(_beside(closed, own), jacobian, heights, drift, case.law, algebra, forces=own.forces)
     return Scene(
-        rows=rows, observe=own.observe, sizes=own.sizes, start=own.start(case), chart=of_case,
+        rows=rows, observe=charted(of_case, own.observe), sizes=own.sizes, start=own.start(case), chart=of_case,
         audit=_listed(rows, closed, own),
     )  # fmt: skip
 
