@@ -43,7 +43,8 @@ class Run(Protocol):
         """The physics as it reached the engine, for the parity audit (spec 5.3).
 
         Keys: masses, gravity, constants, q0, v0; and where the engine exposes them the functions
-        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates.
+        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates; and `hidden`, quantity -> why this
+        mechanism's model does not show it, beside what the engine's own `hidden` says.
         """
         ...
 

@@ -293,9 +293,12 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict
             continue
         value, compared = _value(metric, name, truth, run, judge_.case)
         needs = getattr(metric, "NEEDS", "")
-        if value is not None and not (math.isnan(value) and (needs in judge_.entry.hidden or not wanted)):
+        excused = (
+            value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
+        )
+        if value is not None and not excused:
             yield judge_.judged(name, value, metric.UNIT, truth, compared)
-        elif value is not None and not wanted:
+        elif excused and not wanted:
             continue
         elif name in judge_.claims or (wanted and _shown(metric, truth, judge_.case)):
             why = (

@@ -25,6 +25,7 @@ class Word(StrEnum):
     OUTSIDE = "outside"
     EXPECTED = "expected-outside"
     INFO = "not judged"
+    LEDGER = "ledger only"
     SKIPPED = "skipped"
     CRASHED = "crashed"
 

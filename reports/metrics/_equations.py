@@ -25,6 +25,11 @@ def equations(case: Case) -> System | None:
         return None
 
 
+def finite(run: Trajectory) -> bool:
+    """Whether every recorded state is a number, so that equations can be asked about it."""
+    return bool(np.isfinite(run.q).all() and np.isfinite(run.v).all())
+
+
 def spread(run: Trajectory, among: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
     """Indices of at most `SAMPLES` samples, evenly spread; of those that are true in `among` (n,), if it is given."""
     some = np.arange(len(run.t)) if among is None else np.flatnonzero(among)

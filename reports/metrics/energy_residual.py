@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.reports.metrics._equations import equations, spread
+from crossbody.reports.metrics._equations import equations, finite, spread
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -24,6 +25,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     system = equations(case)
     if system is None or system.energy is None:
         return None
+    if not finite(run):
+        return math.nan
     some = spread(run)
     wanted = np.zeros((len(some), 2))
     for row, q, v in zip(wanted, run.q[some], run.v[some], strict=True):

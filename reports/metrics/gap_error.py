@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.reports.metrics._align import aligned
+from crossbody.reports.metrics._impulse import away
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -17,11 +18,15 @@ CLAIMED = False
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |gap - gap_truth| / max |gap_truth| over samples and unilateral rows; None without such a row."""
+    """Max |gap - gap_truth| / max |gap_truth| over samples and unilateral rows; None without such a row.
+
+    Where a discrete variable changes a gap may jump: those instants are left out.
+    """
     rows = case.law.unilateral
     inside, exact = aligned(truth, run)
     if not rows.any() or not inside.any():
         return None
-    off = float(np.max(np.abs(run.gap[inside] - exact.gap)[:, rows]))
+    smooth = away(exact, [switch.t for switch in truth.trajectory.switches], case.t_end)
+    off = float(np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], initial=0.0))
     scale = float(np.max(np.abs(truth.trajectory.gap[:, rows])))
     return off / scale if scale else off

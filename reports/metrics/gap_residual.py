@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.reports.metrics._equations import equations, spread
+from crossbody.reports.metrics._equations import equations, finite, spread
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -26,6 +27,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     system = equations(case)
     if system is None or not run.gap.shape[1] or system.switch is not None:
         return None
+    if not finite(run):
+        return math.nan
     some = spread(run)
     wanted = np.array([system.gap(q)[0] for q in run.q[some]])
     scale = max(float(np.max(np.abs(wanted))), ROUNDING * float(np.max(np.abs(run.q[some]))))

@@ -18,7 +18,7 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._contacts import CLOSED
-from crossbody.reports.metrics._equations import equations, spread
+from crossbody.reports.metrics._equations import equations, finite, spread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,7 +63,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     system = equations(case)
     if system is None or system.control is not None or system.switch is not None:
         return None
-    if np.isnan(run.lam).any():
+    if np.isnan(run.lam).any() or not finite(run):
         return math.nan
     closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
     told = np.asarray(closed.any(axis=1))

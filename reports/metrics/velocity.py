@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._impulse import SAME
+from crossbody.reports.metrics._impulse import away
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -29,10 +29,6 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     scale = np.array([own[units == unit].max() for unit in units])
     if not inside.any():
         return None
-    struck = np.array([event.t for event in truth.trajectory.events if event.impulse])
-    smooth = np.ones(len(exact.t), dtype=bool)
-    if len(struck):
-        nearest = np.min(np.abs(exact.t[:, None] - struck), axis=1)
-        smooth = nearest > SAME * float(truth.trajectory.t[-1])
+    smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     off = np.abs(run.v[inside] - exact.v)[smooth] / np.where(scale > 0.0, scale, 1.0)
     return float(np.max(off, initial=0.0))

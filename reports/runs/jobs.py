@@ -169,8 +169,9 @@ def _entry(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mappin
 
 def _ran(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
     prepared = prepare(case, pick, asked)
-    hidden = engines.hidden(engines.load(pick.engine), prepared.profile)
-    rows: tuple[AuditRow, ...] = audit(prepared.audit(), reference, case, hidden) if reference else ()
+    shown = prepared.audit()
+    hidden = {**engines.hidden(engines.load(pick.engine), prepared.profile), **shown.get("hidden", {})}
+    rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     natural: Trajectory = prepared.run()
     return Entry(
         engine=pick.engine,

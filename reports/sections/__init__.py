@@ -59,8 +59,8 @@ def shown(name: str, out: Path) -> tuple[Section, ...]:
         if wrote == version("crossbody"):
             raise
         told = (
-            f"Another version of crossbody wrote these tables ({wrote or 'unknown'}), read by {version('crossbody')}: {error} is not as "
-            "expected; run the study again."
+            f"Another version of crossbody wrote these tables ({wrote or 'unknown'}; {error} is not as expected): "
+            "run the study again."
         )
         return (Section(name=name, title=study.TITLE, text=told),)
 
