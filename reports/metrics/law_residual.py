@@ -43,8 +43,8 @@ def multipliers(
     a2 = np.where(fast, 0.0, law.a2)[rows]
     wanted = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
     inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
-    found: Floats = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
-    return found
+    found = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
+    return np.asarray(found, dtype=np.float64)
 
 
 def _held(case: Case, t: float) -> Floats | None:
