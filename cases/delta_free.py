@@ -29,7 +29,7 @@ _TITLES = {
 }
 
 
-CHAOS = Chaos(until=0.2, why="the robot folds through coincident elbows again and again, with nothing to damp it")
+CHAOS = Chaos(until=2.0, why="the robot folds through coincident elbows again and again, with nothing to damp it")
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:

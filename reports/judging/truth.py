@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Tier, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.cases._trajectory import Ledger
-from crossbody.engines._equations import builder
 from crossbody.reports.judging._between import between
 
 SECOND = 10.0
@@ -82,6 +81,8 @@ def truth_of(case: Case) -> Truth:
     Raises:
         CrossbodyError: if the reference cannot run the case.
     """
+    from crossbody.engines._equations import builder
+
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
         return _integrated(case, _tight(case), "cvode" if case.fsm == "level" else "compiled")
