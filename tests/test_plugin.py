@@ -71,7 +71,7 @@ def test_one_test_for_every_limit_of_a_case_file_elsewhere(pytester: pytest.Pyte
 def test_outside_fails_with_the_numbers_and_the_command(pytester: pytest.Pytester) -> None:
     done = run(pytester, "--crossbody-case", f"{OWN}:wrong", *REFERENCE)
     assert done.parseoutcomes()["failed"] >= 3, "position, velocity, and the truth itself"
-    done.stdout.fnmatch_lines_random(["truth is 0.0*, limit *"])
+    done.stdout.fnmatch_lines_random(["truth is *, limit *"])
     done.stdout.fnmatch_lines(
         ["position is 0.0*, limit 1e-06. tolerance", f"crossbody run {OWN} --variant wrong --engine reference:compiled"]
     )
@@ -233,4 +233,4 @@ def test_plug_ins_of_another_distribution_are_found_by_their_entry_points(
     )
     monkeypatch.setenv("PYTHONPATH", str(pytester.path))
     done = run(pytester, "--crossbody-case", "their_case:right", *REFERENCE, "-k", "position or named")
-    done.assert_outcomes(passed=2, deselected=4)
+    done.assert_outcomes(passed=2, deselected=9)

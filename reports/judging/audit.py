@@ -141,11 +141,12 @@ def audit(
     """Compare what `Run.audit()` of an engine shows with the reference's.
 
     Args:
-        mine: of the engine.
+        mine: of the engine; it may name itself what it hides.
         theirs: of the reference; what it lacks is not asked for.
         case: the scene.
         hidden: quantity -> why the engine does not show it (`crossbody.engines.hidden`).
     """
+    hidden = {**hidden, **mine.get("hidden", {})}
     at = states(case, theirs)
     functions = (_function(key, mine, theirs, at, hidden) for key in FUNCTIONS if key in theirs)
     return (*_numbers(mine, theirs, hidden), *functions)

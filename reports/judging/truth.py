@@ -97,8 +97,10 @@ def truth_of(case: Case) -> Truth:
     )
     if builder(case.mechanism) is None:
         return truth
-    told = _held_against(truth, _tight(case), case, case.tight)
-    return replace(told, trusted=math.inf, parted=math.inf)  # a closed form is not cut short by what is held against it
+    second = _tight(case)
+    told = _held_against(truth, second, case, case.tight)
+    # A closed form is not cut short by what is held against it.
+    return replace(told, trusted=math.inf, parted=math.inf, agreement=_agreement(truth, second, case))
 
 
 def cache_of_one(function: Callable[[Floats], Trajectory]) -> Callable[[Floats], Trajectory]:

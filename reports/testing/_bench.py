@@ -72,7 +72,9 @@ class Bench:
         if (scene, pick) not in self._verdicts:
             entry = self.entry(scene, pick)
             asked = (self.case(scene), self.truth(scene), repeat(scene))
-            rows = [*verdicts(asked[0], entry, *asked[1:]), *truth_row(*asked)]
+            rows = verdicts(asked[0], entry, *asked[1:])
+            if entry.run is not None:
+                rows += truth_row(*asked)
             self._verdicts[scene, pick] = {row.metric: row for row in rows}
         return self._verdicts[scene, pick]
 
