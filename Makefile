@@ -6,7 +6,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test slow bench check docs wheel-check picture format clean
+.PHONY: run test slow bench bands check docs wheel-check picture format clean
 
 run: $(READY)
 	$(BIN)/crossbody run --out out
@@ -20,6 +20,9 @@ slow: $(READY)
 bench: $(READY)
 	$(BIN)/pytest -m bench
 	$(BIN)/crossbody bench --out out/bench
+
+bands: $(READY)
+	$(BIN)/python -m crossbody.reports.judging.stored
 
 check: $(READY)
 	$(BIN)/ruff check .

@@ -31,17 +31,20 @@ from crossbody.cases._errors import (
 from crossbody.cases._outcome import Outcome
 
 if TYPE_CHECKING:
-    from crossbody.cases._case import Case, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
+    from crossbody.cases._case import Case, Chaos, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
     from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
 
 _LAZY = {
-    **dict.fromkeys(("Case", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"),
+    **dict.fromkeys(
+        ("Case", "Chaos", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"
+    ),
     **dict.fromkeys(("Event", "Ledger", "Mode", "Switch", "Trajectory"), "_trajectory"),
 }
 
 __all__ = [
     "Case",
     "CaseUnsupported",
+    "Chaos",
     "Claim",
     "ColumnMapError",
     "Coordinate",

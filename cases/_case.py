@@ -164,16 +164,18 @@ class Limit:
     """How large one metric may be for one engine and profile, and why.
 
     Attributes:
-        metric: name of a metric in reports/metrics.
+        metric: name of a metric in reports/metrics; "*" for a known property that shows in any of them, with no value
+            of its own.
         value: the largest absolute value that is still within, in the metric's unit.
         engine, profile: which runs it judges; "*" is any.
         why: the reason for the number.
         known: a known property of the engine that takes it outside; empty if it should be within.
-        known_size: how far that property may take it; beyond, it is outside like any other.
+        known_size: how far that property may take it; beyond, it is outside like any other. Where it is infinite, the
+            size is that of a stored run; without one, what lies beyond the limit is not judged.
     """
 
     metric: str
-    value: float
+    value: float = 0.0
     engine: str = "*"
     profile: str = "*"
     why: str = ""
@@ -203,6 +205,19 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Chaos:
+    """That neighbouring motions of a case part, so that no integrator can be trusted to its horizon.
+
+    Attributes:
+        until: up to when two independent integrators must agree all the same, s.
+        why: what multiplies differences.
+    """
+
+    until: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """A scene, complete: any engine can build its own model from it.
 
@@ -224,6 +239,7 @@ class Case:
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
         tight: tolerance at which the reference stands for the truth; larger where a stiff spring on a small mass makes
             rounding count before that (kp eps |q|/m against the tolerance of a velocity).
+        chaos: declared where the truth cannot be trusted to the horizon; None where it must be.
     """
 
     name: str
@@ -245,6 +261,7 @@ class Case:
     limits: tuple[Limit, ...] = ()
     discrete: tuple[str, ...] = ()
     tight: float = 1e-13
+    chaos: Chaos | None = None
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:

@@ -127,5 +127,6 @@ def _limits(
             metric=metric, value=value, engine=engine, profile=profile, why=why, known=known,
             known_size=sizes.get(metric, 0.0),
         )  # fmt: skip
+    yield Limit(metric="*", engine=engine, profile=profile, known=known)
     if (engine, profile) not in _LAW:
-        yield Limit(metric="audit", value=0.0, engine=engine, profile=profile, known=known)
+        yield Limit(metric="audit", engine=engine, profile=profile, known=known)

@@ -133,9 +133,6 @@ def _order_claims(p: Mapping[str, float], frozen: bool) -> Iterator[Claim]:
         pushed = fall.press(fall.tilt, p["spin"]) + 2.0 * p["zeta3"] * math.sqrt(p["b0"]) * fall.speed
         source = "(g + b1 v) / G33 at the first touch"
         yield Claim(metric="peak_lam3", expected=pushed / fall.delassus(fall.tilt), tier=Tier.A, source=source)
-    if all(p[k] == PARAMETERS[k].default for k in PARAMETERS if k != "t_end"):
-        source = "compiled reference and CVODE, 1e-11 of each other"
-        yield Claim(metric="peak_lam4", expected=426.6300695, tier=Tier.C, source=source)
 
 
 def _still_claims(p: Mapping[str, float]) -> Iterator[Claim]:

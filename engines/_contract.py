@@ -9,6 +9,17 @@ if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
 
 
+QUANTITIES = ("masses", "gravity", "constants", "q0", "v0", "M", "bias", "H", "lam", "ledger")
+"""What an engine must show or name in `hidden`: keys of its audit where the reference has them, `lam` of its
+trajectories where there are rows, and their account of energy."""
+
+
+def hidden(engine: Engine, profile: str) -> Mapping[str, str]:
+    """What an engine does not show under a profile, and why; a quantity of `QUANTITIES` each."""
+    told: Mapping[str, Mapping[str, str]] = getattr(engine, "hidden", {})
+    return {**told.get("*", {}), **told.get(profile, {})}
+
+
 class Run(Protocol):
     """One prepared run: the model is built, what the scene does not need is left out.
 
@@ -32,7 +43,8 @@ class Run(Protocol):
         """The physics as it reached the engine, for the parity audit (spec 5.3).
 
         Keys: masses, gravity, constants, q0, v0; and where the engine exposes them the functions
-        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates.
+        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates; and `hidden`, quantity -> why this
+        mechanism's model does not show it, beside what the engine's own `hidden` says.
         """
         ...
 
@@ -44,6 +56,9 @@ class Engine(Protocol):
         name: as in engines.names().
         profiles: profile -> one sentence; the first is the default one.
         versions: package -> version, for provenance.
+
+    An engine may have `hidden`, profile ("*" for all) -> quantity -> why it does not show it. Whatever of `QUANTITIES`
+    is not named there it must show: the parity audit and the metrics count what is missing as wrong.
 
     An engine may have `orders`, profile -> promised order of the error in its step `dt` or its tolerance `rtol`; the
     benchmark holds the observed one against it.

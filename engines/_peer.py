@@ -46,6 +46,14 @@ class PeerRun:
         return self.physics
 
 
+_SCALAR = "Bodies on a line alone are compared: masses, gravity and constants say all."
+HIDDEN: Mapping[str, Mapping[str, str]] = {
+    "*": {"ledger": "Its steps keep no account of the work of its forces."}
+    | dict.fromkeys(("M", "bias", "H", "lam", "constants"), _SCALAR)
+}
+"""What no engine for bodies on a line shows; see `crossbody.engines.Engine`."""
+
+
 def why_not(engine: str, case: Case) -> str | None:
     """The sentence for a mechanism that is not on a line."""
     if case.mechanism in MECHANISMS:

@@ -11,7 +11,7 @@ import numpy as np
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.engines import _settings
 from crossbody.engines._line import Line, line
-from crossbody.engines._peer import PeerRun, why_not
+from crossbody.engines._peer import HIDDEN, PeerRun, why_not
 from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
 
 THICK = 1.0  # m, of the floor
@@ -84,6 +84,7 @@ class Dart:
     profiles: Mapping[str, str] = {
         "matched": "the restitution of the law's linear part, DART's own step (1 ms) and solver (Dantzig): first order"
     }
+    hidden = HIDDEN
     versions: Mapping[str, str] = {"dartpy": dartpy.__version__}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 

@@ -18,7 +18,7 @@ from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajector
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _scale, _settings
 from crossbody.engines._line import Line, followed, law_name, line
-from crossbody.engines._peer import PeerRun, ended, sampled, why_not
+from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
 
 METHODS = ("DOPRI5", "DVERK6", "ODE23")
 ATOL_PART = 1e-3  # absolute tolerance in units of the relative one
@@ -199,6 +199,7 @@ class Exudyn:
         "at a tight tolerance; memoryless, every row as if it were alone",
         "default": "the obvious model: springs and dampers that act below the surface, generalised-alpha, fixed steps",
     }
+    hidden = HIDDEN
     versions: Mapping[str, str] = {"exudyn": version("exudyn")}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 

@@ -11,7 +11,7 @@ import pymunk
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.engines import _settings
 from crossbody.engines._line import Line, line
-from crossbody.engines._peer import PeerRun, why_not
+from crossbody.engines._peer import HIDDEN, PeerRun, why_not
 from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
 
 ITERATIONS = 200
@@ -73,6 +73,7 @@ class Pymunk:
         "matched": "the restitution of the law's linear part, no allowed overlap, 200 iterations, steps of 1 ms",
         "default": "as it comes: overlap of 0.1 allowed, 10 iterations, steps of 1/60 s",
     }
+    hidden = HIDDEN
     versions: Mapping[str, str] = {"pymunk": pymunk.version, "Chipmunk": pymunk.chipmunk_version}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 

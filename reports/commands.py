@@ -13,7 +13,7 @@ from crossbody import engines
 from crossbody.cases import Case, InvalidValue
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
-from crossbody.reports.judging.verdict import Word, exit_code
+from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.pages import site
 from crossbody.reports.runs import jobs, output, study
 from crossbody.reports.runs.parts import Parts
@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
+WRONG = [Word.OUTSIDE, Word.CRASHED]
 WIDTH = 120  # of the table in a file or a pipe
 SHOWN = {"position": "position", "event_times": "times [s]", "energy_drift": "energy"}
-COLOURS = {Word.WITHIN: "green", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
+COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
 
 
 def run(
@@ -138,7 +139,7 @@ def show(rows: pd.DataFrame, out: Path) -> None:
         console.print(_summary(rows))
         counts = rows["verdict"].value_counts()
         console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
-    told = rows[rows["verdict"].isin([Word.OUTSIDE] if voice.quiet() else [Word.SKIPPED, Word.OUTSIDE])]
+    told = rows[rows["verdict"].isin(WRONG if voice.quiet() else [Word.SKIPPED, *WRONG])]
     for row in told.to_dict(orient="records"):
         run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
         number = (
@@ -146,6 +147,11 @@ def show(rows: pd.DataFrame, out: Path) -> None:
         )
         text = f"{row['verdict']}: {run} {row['metric']}{number}. {row['why']}"
         console.print(text, soft_wrap=True, highlight=False, markup=False)
+    lost = rows[rows["regression"] == Regression.LOST]
+    for row in lost.to_dict(orient="records"):
+        run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
+        text = f"more than a stored run gave: {run} {row['metric']} {row['value']:.4g} {row['unit']}"
+        console.print(f"{text}, band {row['band']:.3g}", soft_wrap=True, highlight=False, markup=False)
     where(out)
 
 

@@ -110,6 +110,16 @@ def test_audit_reads_the_case_back(name: str, profile: str) -> None:
 
 
 @each_profile
+def test_what_an_engine_does_not_show_its_contract_names(name: str, profile: str) -> None:
+    prepared = FOUND[name].prepare(cases.load("bouncing_ball"), profile)
+    hidden, run = {**engines.hidden(FOUND[name], profile), **prepared.audit().get("hidden", {})}, prepared.run()
+    shown = {*prepared.audit(), *(("ledger",) if run.ledger is not None else ())}
+    assert set(engines.QUANTITIES) - shown <= set(hidden)
+    assert set(hidden) <= set(engines.QUANTITIES)
+    assert all(why.endswith(".") for why in hidden.values())
+
+
+@each_profile
 def test_an_audit_leaves_the_run_as_it_was(name: str, profile: str) -> None:
     case = cases.load("bouncing_ball", t_end=0.6)
     plain, audited = FOUND[name].prepare(case, profile), FOUND[name].prepare(case, profile)

@@ -176,9 +176,10 @@ def test_tables_carry_all_digits(out: Path) -> None:
 def test_the_index_says_which_engine_is_right(out: Path) -> None:
     text = (out / "index.html").read_text()
     cells = [a for tag, a in Tags(text).found if tag == "td" and "cell" in (a.get("class") or "")]
-    assert len(cells) == 2
+    assert len(cells) == 3
     assert "outside" in (cells[0]["class"] or "")
     assert "skipped" in (cells[1]["class"] or "")
+    assert "within" in (cells[2]["class"] or ""), "the truth"
     assert "\u2717" in text
     assert "made by crossbody 0.0.1" in text
 
@@ -216,8 +217,8 @@ def test_a_case_begins_with_every_metric_of_every_engine(out: Path) -> None:
     rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["engine"] == "fake"]
     judged = [row for row in rows if row["verdict"] in ("within", "outside", "expected-outside")]
     shown = cells(out, "glance")
-    assert len(shown) == 2 + len(judged)
-    told = sorted(cell[0].split()[0] for cell in shown[2:])
+    assert len(shown) == 2 + len(judged) + 1, "the truth has a line of its own"
+    told = sorted(cell[0].split()[0] for cell in shown[2:] if cell[0].strip())
     assert told == sorted(row["verdict"] for row in judged)
     text = (out / CASE).read_text()
     assert text.index("At a glance") < text.index('class="verdicts"')

@@ -52,8 +52,11 @@ def test_an_unrelated_run_imports_nothing_of_ours_but_the_plugin(pytester: pytes
 
 def test_one_test_for_every_limit_of_a_case_file_elsewhere(pytester: pytest.Pytester) -> None:
     done = run(pytester, "--crossbody-case", f"{OWN}:right", *REFERENCE, "-v", "--junitxml=found.xml")
-    done.assert_outcomes(passed=5)
-    names = ("finished", "audit", "contacts", "position", "energy_integrator")
+    names = (
+        "finished", "audit", "truth", "contacts", "position", "velocity", "energy_drift", "energy_integrator",
+        "energy_residual", "rate_residual",
+    )  # fmt: skip
+    done.assert_outcomes(passed=len(names))
     done.stdout.fnmatch_lines([f"crossbody::own_case:right::reference:compiled::{name} PASSED*" for name in names])
     tests = ET.parse(pytester.path / "found.xml").iter("testcase")
     told = {test.get("name"): {p.get("name"): p.get("value") for p in test.iter("property")} for test in tests}
@@ -67,7 +70,8 @@ def test_one_test_for_every_limit_of_a_case_file_elsewhere(pytester: pytest.Pyte
 
 def test_outside_fails_with_the_numbers_and_the_command(pytester: pytest.Pytester) -> None:
     done = run(pytester, "--crossbody-case", f"{OWN}:wrong", *REFERENCE)
-    done.assert_outcomes(passed=4, failed=1)
+    assert done.parseoutcomes()["failed"] >= 3, "position, velocity, and the truth itself"
+    done.stdout.fnmatch_lines_random(["truth is *, limit *"])
     done.stdout.fnmatch_lines(
         ["position is 0.0*, limit 1e-06. tolerance", f"crossbody run {OWN} --variant wrong --engine reference:compiled"]
     )
@@ -82,12 +86,12 @@ def test_known_is_an_xfail_absent_and_unsupported_are_skips_and_k_chooses(pytest
         word for name in ("reference:compiled", "mujoco:matched", "pinocchio") for word in (*REFERENCE[:1], name)
     ]
     done = run(pytester, "--crossbody-case", f"{OWN}:known", *engines, "-k", "position or pinocchio or matched")
-    done.assert_outcomes(xfailed=1, skipped=6, deselected=4)
+    done.assert_outcomes(xfailed=1, skipped=11, deselected=9)
     done.stdout.fnmatch_lines_random(
         [
             "XFAIL *position is 0.0*, limit 1e-06. The frequency of this closed form is known to be off.",
             "SKIPPED [[]1[]] *Engine 'pinocchio' needs the package 'pinocchio', which is not installed*",
-            "SKIPPED [[]5[]] *MuJoCo has no model of the mechanism*",
+            "SKIPPED [[]10[]] *MuJoCo has no model of the mechanism*",
         ]
     )
 
@@ -120,7 +124,7 @@ def test_fixtures_are_parametrised_over_what_the_configuration_asks_for(pytester
         """
     )
     done = run(pytester, "-v", "--strict-markers")
-    done.assert_outcomes(passed=7 + 10)
+    done.assert_outcomes(passed=7 + 20)
     done.stdout.fnmatch_lines_random(
         [
             "test_mine.py::test_run[[]own_case:right-reference:cvode[]] PASSED*",
@@ -229,4 +233,4 @@ def test_plug_ins_of_another_distribution_are_found_by_their_entry_points(
     )
     monkeypatch.setenv("PYTHONPATH", str(pytester.path))
     done = run(pytester, "--crossbody-case", "their_case:right", *REFERENCE, "-k", "position or named")
-    done.assert_outcomes(passed=2, deselected=4)
+    done.assert_outcomes(passed=2, deselected=9)

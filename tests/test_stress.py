@@ -18,13 +18,15 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome, SceneError, Trajectory, UnknownName
 from crossbody.reports import suites
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.suites._axis import Levels, Linear, Log, Whole, decades
 from crossbody.reports.suites._contract import Family, Ladder, Suite
 from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
-from crossbody.reports.sweep.execute import COLUMNS, execute
+from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, row
 from crossbody.reports.sweep.map import MAP, stability_map, summary
+from crossbody.reports.sweep.measure import Error
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.together import together
@@ -477,3 +479,23 @@ def test_the_colour_of_an_error_ends_where_the_scale_does() -> None:
     )  # fmt: skip
     field, _ = stress_map(cells).data
     np.testing.assert_allclose(np.asarray(field.marker.color, float), [BEST, -6.0, WORST])
+
+
+@pytest.mark.parametrize("name", suites.names())
+def test_no_suite_calls_a_motion_right_that_is_visibly_wrong(name: str) -> None:
+    """An error of a hundred-millionth may pass, one of a ten-thousandth at the default tolerance never."""
+    suite = suites.load(name)
+    specs = draw.specs([(name, suite)], {name: (REFERENCE,)}, len(suite.families), 0, share=False)
+    assert len(specs) >= len(suite.families)
+    for spec in specs:
+        wrong = Error(value=1e-4, tier="C", until=1.0)
+        told = row(replace(spec, rung=-1), Tried(outcome=Outcome.FINISHED.value), wrong, [])
+        assert told["verdict"] == "outside", spec
+
+
+def test_an_account_alone_is_a_word_of_its_own() -> None:
+    spec = drawn()[0]
+    errors = {"truth": Error(value=1e-9, tier="C"), "account": Error(), "wrong": Error(value=1e-3, tier="C")}
+    ended = Tried(outcome=Outcome.FINISHED.value)
+    words = {text: _verdict(spec, ended, error, 1e-6, 1e-9, [])[0] for text, error in errors.items()}
+    assert words == {"truth": Word.WITHIN, "account": Word.LEDGER, "wrong": Word.OUTSIDE}

@@ -15,7 +15,8 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word, exit_code, judge, limit_for
 
 LIMIT = Limit(metric="position", value=1e-3, why="because")
-KNOWN = replace(LIMIT, known="it is known to do that")
+KNOWN = replace(LIMIT, known="it is known to do that", known_size=1.0)
+UNMEASURED = replace(KNOWN, known_size=math.inf)
 CLAIM = Claim(metric="contacts", expected=3.0, tier=Tier.B, source="a figure")
 
 
@@ -27,6 +28,8 @@ CLAIM = Claim(metric="contacts", expected=3.0, tier=Tier.B, source="a figure")
         (1e-2, LIMIT, None, Word.OUTSIDE),
         (-1e-2, LIMIT, None, Word.OUTSIDE),
         (1e-2, KNOWN, None, Word.EXPECTED),
+        (1.1, KNOWN, None, Word.OUTSIDE),
+        (1e-2, UNMEASURED, None, Word.INFO),
         (1e-4, KNOWN, None, Word.WITHIN),
         (math.nan, LIMIT, None, Word.OUTSIDE),
         (math.inf, KNOWN, None, Word.OUTSIDE),
@@ -86,9 +89,10 @@ def word(rows, metric: str) -> str:
 def test_the_truth_is_within_and_named_in_every_row(case: Case, motion: Trajectory) -> None:
     rows = compare(case, [Entry(engine="fake", profile="good", run=motion)])
     assert word(rows, "position") == Word.WITHIN
+    assert word(rows, "truth") == Word.WITHIN
     assert exit_code(rows["verdict"]) == 0
     assert set(rows["tier"]) == {Tier.A.value}
-    assert rows["command"].str.endswith("--engine fake:good").all()
+    assert rows["command"][rows["engine"] == "fake"].str.endswith("--engine fake:good").all()
 
 
 def test_a_wrong_run_is_outside(case: Case, motion: Trajectory) -> None:
@@ -113,8 +117,8 @@ def test_a_run_that_did_not_finish_is_outside_with_advice(case: Case, motion: Tr
 
 def test_a_skipped_engine_is_a_row_with_its_sentence(case: Case) -> None:
     rows = compare(case, [Entry(engine="absent", profile="*", skipped="It is not installed.")])
-    assert rows["verdict"].tolist() == [Word.SKIPPED]
-    assert rows["why"].tolist() == ["It is not installed."]
+    assert rows["verdict"][rows["engine"] == "absent"].tolist() == [Word.SKIPPED]
+    assert rows["why"][0] == "It is not installed."
     assert exit_code(rows["verdict"]) == 0
 
 
@@ -147,13 +151,15 @@ def test_other_physics_fails_the_audit_and_is_not_compared(
     rows = audit({**PHYSICS, key: value}, PHYSICS, case)
     assert [row.quantity for row in rows if not row.ok] == [key]
     table = compare(case, [Entry(engine="fake", profile="other", run=motion, audit=rows)])
-    assert table["metric"].tolist() == ["finished", "audit"]
+    assert table["metric"][table["engine"] == "fake"].tolist() == ["finished", "audit"]
     assert word(table, "audit") == Word.OUTSIDE
     assert key in table["why"][1]
 
 
-def test_what_an_engine_does_not_show_is_not_held_against_it(case: Case) -> None:
-    rows = audit({k: v for k, v in PHYSICS.items() if k != "H"}, PHYSICS, case)
+def test_what_an_engine_does_not_show_is_wrong_unless_its_contract_says_so(case: Case) -> None:
+    mine = {k: v for k, v in PHYSICS.items() if k != "H"}
+    assert [row.quantity for row in audit(mine, PHYSICS, case) if not row.ok] == ["H"]
+    rows = audit(mine, PHYSICS, case, {"H": "a reason"})
     assert all(row.ok for row in rows)
     assert next(row for row in rows if row.quantity == "H").mine == "not shown"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 
 from crossbody.cases import _peer_limits
@@ -76,9 +75,6 @@ _TOUCHING: Bounds = {
     "energy_integrator": (1e-6, _LOCATED),
     "position": (1e-5, _RESTING),
 }
-_SIZES = {"pattern_distance": 1.0, "pattern_simultaneous": 1.0, "energy_drift": 5.0, "balls_out": 5.0}
-"""How far another rule takes an engine from this one's truth: about twice what was measured (crossbody run)."""
-
 _DISCRETISATION: Mapping[tuple[str, str], tuple[float, str]] = {
     ("mujoco", "matched"): (1e-4, "Runge-Kutta 4 with located events, twenty steps a contact, then straight lines"),
     ("pinocchio", "law"): (2e-5, "relative tolerance of 1e-10, in many short arcs where balls touch"),
@@ -114,11 +110,8 @@ def _bounds(variant: str, rule: str, gap: float) -> Bounds:
 def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
     for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
-        for (engine, profile), known in _OTHERS[rule].items():
-            size = _SIZES.get(metric, math.inf)
-            yield Limit(
-                metric=metric, value=value, engine=engine, profile=profile, why=why, known=known, known_size=size
-            )
+    for (engine, profile), known in _OTHERS[rule].items():
+        yield Limit(metric="*", engine=engine, profile=profile, known=known)
     yield Limit(metric="momentum", value=1e-10, why=_KEPT)
     if variant == "sliders":
         yield from _peer_limits.sliders(bounds)
@@ -126,5 +119,5 @@ def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
             yield Limit(metric="position (discretisation)", value=value, engine=engine, profile=profile, why=why)
         yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")
     for (engine, profile), known in {**_OTHERS[rule], ("pinocchio", "impulse"): IMPACT}.items():
-        yield Limit(metric="audit", value=0.0, engine=engine, profile=profile, known=known)
-    yield Limit(metric="audit", value=0.0, engine="pinocchio", profile="impulse_simultaneous", known=IMPACT)
+        yield Limit(metric="audit", engine=engine, profile=profile, known=known)
+    yield Limit(metric="audit", engine="pinocchio", profile="impulse_simultaneous", known=IMPACT)

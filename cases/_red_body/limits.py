@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 
 from crossbody.cases._case import Claim, Limit
@@ -39,7 +38,6 @@ _CLAIMS: Bounds = {
     "foot_lam": (1e-6, "the slab stands still"),
     "wall_lam": (0.0, "a row that is never touched has no multiplier"),
     "peak_lam3": (1e-3, "the peak is at the touch, which is located"),
-    "peak_lam4": (0.5, "read between the samples of a pulse of some forty steps"),
     "collision_impulse": (1e-8, _TOLERANCE),
 }
 """Judged where the case claims a number."""
@@ -50,6 +48,9 @@ _MATCHED_BOUNDS: Bounds = {
     "energy_drift": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
     "lam_impulse": (1e-4, "samples at every step of 39 us"),
     "foot_lam": (1e-3, "the engine's own solver leaves this much of lam"),
+    "gap_error": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
+    "velocity": (1e-4, "Runge-Kutta 4 with located events at 39 us"),
+    "lam_impulse_path": (1e-4, "samples at every step of 39 us"),
 }
 """What MuJoCo's fixed step costs where it follows the case's law."""
 
@@ -64,26 +65,6 @@ _KNOWN: dict[str, Mapping[tuple[str, str], str]] = {
     },
 }  # fmt: skip
 """Variant -> engines that follow other equations than the case."""
-_IMPACT_SIZES = {
-    "position": 0.11, "event_times": 7e-3, "energy_drift": 1.2, "lam_impulse": 0.9, "peak_lam3": 1300.0,
-    "peak_lam4": 430.0,
-}  # fmt: skip
-_REAL_TIME_SIZES = {"position": 0.11, "event_times": 7e-3, "energy_drift": 1.5, "lam_impulse": 0.7, "foot_lam": 2e-3}
-_SIZES: dict[tuple[str, str], Mapping[str, float]] = {
-    ("mujoco", "matched"): _REAL_TIME_SIZES,
-    ("mujoco", "default"): {
-        "position": 0.6, "event_times": 4e-3, "energy_drift": 1.7, "lam_impulse": 0.4, "foot_lam": 0.05,
-        "mode_order": 5.0, "peak_lam3": 1246.0, "peak_lam4": 427.0,
-    },
-    ("pinocchio", "law"): _REAL_TIME_SIZES,
-    ("pinocchio", "impulse"): _IMPACT_SIZES,
-    ("pinocchio", "impulse_simultaneous"): _IMPACT_SIZES,
-    ("pinocchio", "admm"): {
-        "position": 0.12, "event_times": 0.13, "energy_drift": 1.2, "lam_impulse": 0.7, "mode_order": 5.0,
-        "peak_lam3": 1246.0, "peak_lam4": 830.0,
-    },
-}  # fmt: skip
-"""How far these equations take an engine at the default parameters: about twice what `crossbody run red_body` shows."""
 _OTHER_PHYSICS = (
     ("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", RIGID), ("pinocchio", "impulse_simultaneous", RIGID),
     ("pinocchio", "admm", RIGID),
@@ -101,13 +82,9 @@ def limits(variant: str, claims: Iterable[Claim]) -> tuple[Limit, ...]:
 def _all(variant: str, bounds: Bounds) -> Iterator[Limit]:
     for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
-        for (engine, profile), known in _KNOWN[variant].items():
-            size = _SIZES.get((engine, profile), {}).get(metric, math.inf)
-            yield Limit(
-                metric=metric, value=value, engine=engine, profile=profile, why=why, known=known, known_size=size
-            )
-        if variant == "resolved" and metric in _MATCHED_BOUNDS:
-            value, why = _MATCHED_BOUNDS[metric]
-            yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=why)
+    for metric, (value, why) in _MATCHED_BOUNDS.items() if variant == "resolved" else ():
+        yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=why)
+    for (engine, profile), known in _KNOWN[variant].items():
+        yield Limit(metric="*", engine=engine, profile=profile, known=known)
     for engine, profile, known in _OTHER_PHYSICS:
-        yield Limit(metric="audit", value=0.0, engine=engine, profile=profile, known=known)
+        yield Limit(metric="audit", engine=engine, profile=profile, known=known)

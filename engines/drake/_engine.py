@@ -15,7 +15,7 @@ from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajector
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _settings
 from crossbody.engines._line import Line, followed, law_name, line
-from crossbody.engines._peer import PeerRun, ended, sampled, why_not
+from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
 from crossbody.engines.drake._plant import offsets, plant
 from crossbody.engines.drake._symbolic import system
 
@@ -148,6 +148,7 @@ class Drake:
         "own integrator (Runge-Kutta 3) and accuracy (1e-4)",
         "default": "a discrete MultibodyPlant with steps of 1 ms and point contact with the law's stiffness",
     }
+    hidden = HIDDEN
     versions: Mapping[str, str] = {"drake": version("drake")}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 

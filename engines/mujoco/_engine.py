@@ -71,6 +71,10 @@ class Mujoco:
     }
     versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
     orders: Mapping[str, float] = {"matched": 4.0, "default": 1.0}
+    hidden: Mapping[str, Mapping[str, str]] = {
+        "*": {"ledger": "MuJoCo's steps keep no account of the work of its forces."},
+        "default": {"H": "The obvious model's contacts are pairs of shapes, with frames of their own."},
+    }
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without a model here cannot be run."""

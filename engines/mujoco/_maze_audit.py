@@ -81,4 +81,8 @@ def _shown(
         "v0": case.v0,
         "M": M,
         "bias": bias,
+        "hidden": {
+            "H": "The chain's rows are exact on their faces, and the audit's states lie elsewhere.",
+            "lam": "Rows depend on where the ball is: no state has all of them on at once.",
+        },
     }

@@ -115,6 +115,7 @@ class Pinocchio:
     }
     versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": sksundae.__version__}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    hidden: Mapping[str, Mapping[str, str]] = {"*": {"ledger": "These runs keep no account of the work of their rows."}}
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""

@@ -112,4 +112,5 @@ def audit(case: Case, law: MazeLaw) -> dict[str, Any]:
         "M": M,
         "bias": bias,
         "H": H,
+        "hidden": {"lam": "Rows depend on where the ball is: no state has all of them on at once."},
     }

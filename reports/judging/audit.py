@@ -1,11 +1,11 @@
-"""The parity audit of spec 5.3: whether the same physics reached every engine.
+"""The parity audit: whether the same physics reached every engine.
 
 Numbers are laid side by side; M, bias, H and lam are evaluated at the same random states where an engine shows them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -31,7 +31,8 @@ class AuditRow:
     Attributes:
         quantity: what is compared.
         mine, theirs: the values in words; "20 states" for a function.
-        difference: largest difference over the largest value; NaN if the engine does not show it.
+        difference: largest difference over the largest value; NaN if the engine's contract says that it does not show
+            it, infinite if it should.
         tolerance: how much is the same physics.
     """
 
@@ -43,7 +44,7 @@ class AuditRow:
 
     @property
     def ok(self) -> bool:
-        """Whether it is the same; what is not shown is not held against an engine."""
+        """Whether it is the same; what the contract excuses is not held against an engine."""
         return np.isnan(self.difference) or self.difference <= self.tolerance
 
 
@@ -79,18 +80,17 @@ def states(case: Case, theirs: Mapping[str, Any] = MappingProxyType({})) -> list
 
     Args:
         case: the scene.
-        theirs: the reference's audit; where it shows gap(q) and H(q), several contacts are entered together.
+        theirs: the reference's audit with gap(q) and H(q), by which contacts are entered; without them each coordinate
+            is taken for a gap of its own.
     """
     draw = np.random.default_rng(SEED)
     n = len(case.q0)
     if len(case.law.a0) and not case.law.unilateral.any():
         return [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, n)) for _ in range(STATES)]
-    if len(case.law.a0) > 1 and "gap" in theirs:
+    if len(case.law.a0) and "gap" in theirs:
         return [_entered(case, theirs["gap"], theirs["H"], draw) for _ in range(STATES)]
     reach = 1e-2 * np.maximum(np.abs(case.q0), 1e-3)
-    return [
-        (-reach * draw.uniform(0.01, 1.0, len(case.q0)), -draw.uniform(0.0, 1.0, len(case.v0))) for _ in range(STATES)
-    ]
+    return [(-reach * draw.uniform(0.01, 1.0, n), -draw.uniform(0.0, 1.0, n)) for _ in range(STATES)]
 
 
 def _entered(case: Case, gap: Any, H: Any, draw: np.random.Generator) -> tuple[Floats, Floats]:
@@ -103,39 +103,50 @@ def _entered(case: Case, gap: Any, H: Any, draw: np.random.Generator) -> tuple[F
     return q, np.linalg.lstsq(H(q), rates)[0]
 
 
-def _numbers(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[AuditRow]:
-    return [
-        AuditRow(
-            quantity=key,
-            mine=_words(mine[key]) if key in mine else "not shown",
-            theirs=_words(theirs[key]),
-            difference=difference(mine[key], theirs[key]) if key in mine else np.nan,
-            tolerance=TOLERANCE,
-        )
-        for key in NUMBERS
-        if key in theirs
-    ]
+def _row(
+    key: str, mine: Mapping[str, Any], shown: str, theirs: str, value: float, hidden: Mapping[str, str]
+) -> AuditRow:
+    """One row; what is not shown is excused by the engine's contract or infinitely far off."""
+    if key not in mine:
+        shown, value = ("not shown", np.nan) if key in hidden else ("not shown, and not excused", np.inf)
+    tolerance = LAM_TOLERANCE if key == "lam" else TOLERANCE
+    return AuditRow(quantity=key, mine=shown, theirs=theirs, difference=value, tolerance=tolerance)
 
 
-def _function(key: str, mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case) -> AuditRow:
+def _numbers(mine: Mapping[str, Any], theirs: Mapping[str, Any], hidden: Mapping[str, str]) -> Iterator[AuditRow]:
+    for key in NUMBERS:
+        if key in theirs:
+            shown = (_words(mine[key]), difference(mine[key], theirs[key])) if key in mine else ("", np.nan)
+            yield _row(key, mine, shown[0], _words(theirs[key]), shown[1], hidden)
+
+
+def _function(
+    key: str, mine: Mapping[str, Any], theirs: Mapping[str, Any], at: Sequence[tuple[Floats, Floats]],
+    hidden: Mapping[str, str],
+) -> AuditRow:  # fmt: skip
     worst = np.nan
     if key in mine:
-        arguments = [(q,) if key in ("M", "H") else (q, v) for q, v in states(case, theirs)]
+        arguments = [(q,) if key in ("M", "H") else (q, v) for q, v in at]
         values = [(mine[key](*a), theirs[key](*a)) for a in arguments]
         known = [pair for pair in values if np.isfinite(_flat(pair[1])).all()]  # dependent rows have no one lam
         if known:
             a, b = (np.concatenate([_flat(pair[i]) for pair in known]) for i in (0, 1))
             worst = difference(a, b)
-    return AuditRow(
-        quantity=key,
-        mine=f"{STATES} states" if key in mine else "not shown",
-        theirs=f"{STATES} states",
-        difference=worst,
-        tolerance=LAM_TOLERANCE if key == "lam" else TOLERANCE,
-    )
+    return _row(key, mine, f"{STATES} states", f"{STATES} states", worst, hidden)
 
 
-def audit(mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case) -> tuple[AuditRow, ...]:
-    """Compare what `Run.audit()` of an engine shows with the reference's."""
-    functions = (_function(key, mine, theirs, case) for key in FUNCTIONS if key in theirs)
-    return (*_numbers(mine, theirs), *functions)
+def audit(
+    mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case, hidden: Mapping[str, str] = MappingProxyType({})
+) -> tuple[AuditRow, ...]:
+    """Compare what `Run.audit()` of an engine shows with the reference's.
+
+    Args:
+        mine: of the engine; it may name itself what it hides.
+        theirs: of the reference; what it lacks is not asked for.
+        case: the scene.
+        hidden: quantity -> why the engine does not show it (`crossbody.engines.hidden`).
+    """
+    hidden = {**hidden, **mine.get("hidden", {})}
+    at = states(case, theirs)
+    functions = (_function(key, mine, theirs, at, hidden) for key in FUNCTIONS if key in theirs)
+    return (*_numbers(mine, theirs, hidden), *functions)

@@ -3,22 +3,43 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from crossbody.cases import Case, InvalidValue, Trajectory
+from crossbody.cases import Case, Claim, InvalidValue, Limit, Tier, Trajectory, UnknownName
 from crossbody.cases._arguments import instance, shown
 from crossbody.cases._arrays import Floats
+from crossbody.cases._defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.truth import Truth, truth_of
-from crossbody.reports.judging.verdict import Verdict, Word, judge, limit_for
+from crossbody.reports.judging.stored import Deviations, deviations, words
+from crossbody.reports.judging.truth import Truth, from_run, truth_of
+from crossbody.reports.judging.verdict import (
+    Regression,
+    Verdict,
+    Word,
+    band,
+    deviation,
+    explained,
+    judge,
+    limit_for,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from crossbody.engines import Run
+
+TRUTH = "truth"
+"""Engine and metric of the row that judges the truth itself."""
+SPLIT = ("position", "event_times")
+"""Errors that are told apart into model and discretisation."""
+PARTS = ("model", "discretisation")
+FLOOR = 0.5
+"""A number is judged where at least this part of the time for which the truth must be trusted was compared."""
+BY_EVENTS = ("event_times", "restitution_error")
+"""Metrics that match events with the truth's, as far as that is trusted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +55,8 @@ class Entry:
         refined: the same engine with a much finer step or tolerance, to tell model from discretisation.
         stepped: ends of the run's own steps, s, where `run` was asked for other instants; None where they are its own.
         own: truth of the equations that the engine really integrates; None where they are the case's own.
+        hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
+        crashed: what it threw, where it did not come back with an outcome.
     """
 
     engine: str
@@ -45,6 +68,8 @@ class Entry:
     refined: Trajectory | None = None
     stepped: Floats | None = None
     own: Truth | None = None
+    hidden: Mapping[str, str] = field(default_factory=dict)
+    crashed: str = ""
 
 
 def compare(
@@ -59,7 +84,10 @@ def compare(
         command: what reproduces the table, for its rows.
 
     Returns:
-        One row per run and metric, columns as in `Verdict`.
+        One row per run and metric, and one for the truth, columns as in `Verdict`.
+
+    Raises:
+        UnknownName: if a claim or limit names a metric that does not exist.
     """
     instance("case", case, Case, "a Case, as crossbody.cases.load returns it")
     if truth is not None:
@@ -71,8 +99,15 @@ def compare(
         if not isinstance(run, Entry) and not callable(getattr(run, "run", None)):
             raise InvalidValue(f"runs holds {shown(run)}; each must be what an engine's prepare returns, or an Entry.")
     truth = truth_of(case) if truth is None else truth
-    rows = [row for run in runs for row in verdicts(case, _entry(run), truth, command)]
-    return table(rows)
+    entries = [_entry(run) for run in runs]
+    return table(judged(case, entries, truth, command))
+
+
+def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> list[Verdict]:
+    """Every row of one case: those of every run, the truth's own, and a word on claims that judged nothing."""
+    check_names(case)
+    rows = [row for entry in entries for row in verdicts(case, entry, truth, command)]
+    return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command)]
 
 
 def table(rows: Iterable[Verdict]) -> pd.DataFrame:
@@ -80,14 +115,66 @@ def table(rows: Iterable[Verdict]) -> pd.DataFrame:
     return pd.DataFrame([row.row() for row in rows], columns=list(Verdict.__dataclass_fields__))
 
 
+def check_names(case: Case) -> None:
+    """Say which names in claims and limits do not exist.
+
+    Raises:
+        UnknownName: for a metric or an engine that does not exist; the valid ones are listed.
+        InvalidValue: for a limit that is negative or not a number.
+    """
+    from crossbody import engines
+
+    known = {*metrics.names(), "audit", "*", *(f"{name} ({part})" for name in SPLIT for part in PARTS)}
+    for kind, named in (("claims", case.claims), ("limits", case.limits)):
+        for name in (each.metric for each in named):
+            if name not in known:
+                raise UnknownName(f"metric (in {kind} of {case.label})", name, known)
+    for limit in case.limits:
+        if limit.engine not in ("*", *engines.names()):
+            raise UnknownName(f"engine (in limits of {case.label})", limit.engine, engines.names())
+        if not (limit.value >= 0.0 and limit.known_size >= 0.0):
+            raise InvalidValue(f"{case.label}: the limit of {limit.metric} is {limit.value}; it must be at least 0.")
+
+
 def _entry(run: Entry | Run) -> Entry:
     if isinstance(run, Entry):
         return run
-    return Entry(engine=run.engine, profile=run.profile, settings=run.settings, run=run.run())
+    from crossbody import engines
+
+    hidden = engines.hidden(engines.load(run.engine), run.profile) if run.engine in engines.names() else {}
+    return Entry(engine=run.engine, profile=run.profile, settings=run.settings, run=run.run(), hidden=hidden)
 
 
-def _words(settings: Mapping[str, Any]) -> str:
-    return " ".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in settings.items())
+def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
+    """Whether the sources of a truth agree as far as they must; none for a truth that has one source and was given."""
+    if math.isnan(truth.allowed):
+        return []
+    until = case.t_end if case.chaos is None else min(case.chaos.until, case.t_end)
+    value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
+    short = truth.trusted < until
+    told = [truth.source] if case.chaos is None else [f"Chaos: {case.chaos.why}.", truth.source]
+    if short:
+        told.append(f"It must be trusted to {until:.4g} s.")
+    return [Verdict(
+        case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",
+        limit=truth.allowed, tier=truth.tier.value, why=" ".join(told), command=command,
+        verdict=Word.WITHIN if value <= truth.allowed and not short else Word.OUTSIDE,
+        compared=min(truth.trusted / case.t_end, 1.0),
+    )]  # fmt: skip
+
+
+def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict]:
+    """A claim that judged no run, although some were compared."""
+    seen = {row.metric for row in rows}
+    if not any(row.metric == "position" for row in rows):
+        return
+    for claim in case.claims:
+        if claim.metric not in seen:
+            yield Verdict(
+                case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=claim.metric, value=math.nan,
+                expected=claim.expected, unit="", tier=claim.tier.value, verdict=Word.OUTSIDE, command=command,
+                why=f"The claim judged no run: {claim.source}.",
+            )  # fmt: skip
 
 
 class _Judge:
@@ -95,49 +182,60 @@ class _Judge:
 
     def __init__(self, case: Case, entry: Entry, truth: Truth, command: str) -> None:
         self.case, self.entry, self.truth = case, entry, truth
-        self.claims = {claim.metric: claim for claim in case.claims}
+        self.claims: Mapping[str, Claim] = {claim.metric: claim for claim in case.claims}
+        self.limits = limits_of(case)
+        self.stored: Deviations = deviations(case, entry)
         self.command = f"{command} --engine {entry.engine}:{entry.profile}"
+
+    def limit(self, metric: str) -> Limit | None:
+        """The limit that judges this run."""
+        return limit_for(self.limits, metric, self.entry.engine, self.entry.profile)
 
     def row(self, metric: str, value: float, unit: str, verdict: Word, why: str, **more: Any) -> Verdict:
         return Verdict(
             case=self.case.name, variant=self.case.variant, engine=self.entry.engine, profile=self.entry.profile,
             metric=metric, value=value, unit=unit, verdict=verdict, why=why, command=self.command,
-            settings=_words(self.entry.settings), **({"tier": self.truth.tier.value} | more),
+            settings=words(self.entry.settings), **({"tier": self.truth.tier.value} | more),
         )  # fmt: skip
 
-    def judged(self, metric: str, value: float, unit: str) -> Verdict:
-        claim = self.claims.get(metric)
-        limit = limit_for(self.case.limits, metric, self.entry.engine, self.entry.profile)
-        word, why = judge(value, limit, claim)
+    def judged(self, metric: str, value: float, unit: str, against: Truth, compared: float) -> Verdict:
+        """One number: its word by physics and method, and by the stored run."""
+        claim, limit, stored = self.claims.get(metric), self.limit(metric), self.stored.get(metric)
+        word, why = judge(value, limit, claim, stored)
+        until = 1.0 if self.case.chaos is None else min(1.0, self.case.chaos.until / self.case.t_end)
+        if compared < FLOOR * until and word in (Word.WITHIN, Word.EXPECTED):
+            word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon alone: {against.source}"
+        most = band(stored, limit)
+        kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST
         return self.row(
-            metric, value, unit, word, why,
+            metric, value, unit, word, why or (against.source if against is not self.truth else ""),
             expected=math.nan if claim is None else claim.expected,
             limit=limit.value if limit else math.nan if claim is None else 0.0,
+            tier=against.tier.value if claim is None else claim.tier.value,
+            compared=compared, band=most, regression="" if math.isnan(most) else kept,
+        )  # fmt: skip
+
+    def missing(self, metric: str, unit: str, why: str, needs: str) -> Verdict:
+        """A number that is asked for and that the run does not have: a claim, or what the truth has."""
+        claim, limit, stored = self.claims.get(metric), self.limit(metric), self.stored.get(metric)
+        expected = math.nan if claim is None else claim.expected
+        if needs in self.entry.hidden:
+            return self.row(metric, math.nan, unit, Word.INFO, self.entry.hidden[needs], expected=expected)
+        known = "" if limit is None else limit.known
+        word = Word.EXPECTED if known and stored is not None and math.isnan(stored) else Word.OUTSIDE
+        if claim is not None:
+            why += f" {claim.expected:g} claimed: {claim.source}."
+        return self.row(
+            metric, math.nan, unit, word, known if word is Word.EXPECTED else why, expected=expected,
             tier=self.truth.tier.value if claim is None else claim.tier.value,
         )  # fmt: skip
-
-    def part(self, metric: str, value: float, unit: str, against: Truth) -> Verdict:
-        """One part of an error, judged where the case limits that part, against its own truth."""
-        limit = limit_for(self.case.limits, metric, self.entry.engine, self.entry.profile)
-        word, why = judge(value, limit, None)
-        return self.row(
-            metric, value, unit, word, why or against.source,
-            limit=limit.value if limit else math.nan, tier=against.tier.value,
-        )  # fmt: skip
-
-    def missing(self, metric: str, unit: str) -> Verdict:
-        """A claimed number that the run does not have, for example the fifth exit of a ball that left twice."""
-        claim = self.claims[metric]
-        limit = limit_for(self.case.limits, metric, self.entry.engine, self.entry.profile)
-        known = "" if limit is None else limit.known
-        word = Word.EXPECTED if known else Word.OUTSIDE
-        why = known or f"The run has no such number; {claim.expected:g} claimed: {claim.source}."
-        return self.row(metric, math.nan, unit, word, why, expected=claim.expected, tier=claim.tier.value)
 
 
 def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdict]:
     """Every row of one run."""
     judge_ = _Judge(case, entry, truth, command)
+    if entry.crashed:
+        return [judge_.row("run", math.nan, "", Word.CRASHED, entry.crashed)]
     if entry.run is None:
         return [judge_.row("run", math.nan, "", Word.SKIPPED, entry.skipped)]
     rows = [_outcome(judge_, entry.run)]
@@ -145,7 +243,21 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
         rows.append(_audit(judge_))
         if rows[-1].verdict == Word.OUTSIDE:
             return rows
+    if not len(entry.run.t):
+        return rows
     return [*rows, *_measured(judge_, entry.run, truth), *_split(judge_)]
+
+
+def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
+    """Metric -> deviation of every judged number of a run, to be stored; NaN for one that it does not have."""
+    rows = verdicts(case, entry, truth, "")
+    claims = {claim.metric: claim for claim in case.claims}
+    found = {
+        row.metric: deviation(row.value, claims.get(row.metric))
+        for row in rows
+        if row.metric not in ("finished", "audit") and not (math.isnan(row.limit) and not math.isnan(row.value))
+    }
+    return found | {f"audit {row.quantity}": row.difference for row in entry.audit if not row.ok}
 
 
 def _outcome(judge_: _Judge, run: Trajectory) -> Verdict:
@@ -161,10 +273,10 @@ def _audit(judge_: _Judge) -> Verdict:
     """A failed audit is a result, not a comparison: unless it is a known property, no metric follows it."""
     failed = [row for row in judge_.entry.audit if not row.ok]
     shown = [row.difference for row in judge_.entry.audit if not math.isnan(row.difference)]
-    limit = limit_for(judge_.case.limits, "audit", judge_.entry.engine, judge_.entry.profile)
+    limit = judge_.limit("audit")
     if not failed:
         word, why = Word.WITHIN, "the same physics as the reference"
-    elif limit is not None and limit.known:
+    elif limit is not None and limit.known and all(_is_known(judge_, limit, row) for row in failed):
         word, why = Word.EXPECTED, limit.known
     else:
         word, why = Word.OUTSIDE, "Not compared: " + ", ".join(row.quantity for row in failed) + " differ."
@@ -174,38 +286,74 @@ def _audit(judge_: _Judge) -> Verdict:
     return judge_.row("audit", value, "1", word, why, limit=tolerance, tier="")
 
 
-def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterable[Verdict]:
+def _is_known(judge_: _Judge, limit: Limit, row: AuditRow) -> bool:
+    """Whether a stored run differed in the same quantity by as much; without one, the property explains all."""
+    if not judge_.stored:
+        return True
+    stored = judge_.stored.get(f"audit {row.quantity}", 0.0)
+    sizes = explained(limit, stored)
+    return stored == row.difference or (sizes is not None and sizes[0] <= row.difference <= sizes[1])
+
+
+def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict]:
     for name in metrics.names():
         metric = metrics.load(name)
-        limited = limit_for(judge_.case.limits, name, judge_.entry.engine, judge_.entry.profile)
-        if metric.CLAIMED and name not in judge_.claims and limited is None:
+        wanted = name in judge_.claims or judge_.limit(name) is not None
+        if metric.CLAIMED and not wanted:
             continue
-        value = metric.measure(truth, run, judge_.case)
-        if value is not None:
-            yield judge_.judged(name, value, metric.UNIT)
-        elif name in judge_.claims:
-            yield judge_.missing(name, metric.UNIT)
+        value, compared = _value(metric, name, truth, run, judge_.case)
+        needs = getattr(metric, "NEEDS", "")
+        excused = (
+            value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
+        )
+        if value is not None and not excused:
+            yield judge_.judged(name, value, metric.UNIT, truth, compared)
+        elif excused and not wanted:
+            continue
+        elif name in judge_.claims or (wanted and _shown(metric, truth, judge_.case)):
+            why = (
+                "The run has no such number, the truth has."
+                if name not in judge_.claims
+                else "There is no such number."
+            )
+            yield judge_.missing(name, metric.UNIT, why, needs)
 
 
-def _split(judge_: _Judge) -> Iterable[Verdict]:
+def _shown(metric: metrics.Metric, truth: Truth, case: Case) -> bool:
+    """Whether the truth itself has that number."""
+    return metric.measure(truth, truth.trajectory, case) is not None
+
+
+def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, case: Case) -> tuple[float | None, float]:
+    """The number, and the part of the horizon over which the truth was asked for it (1 if it was not)."""
+    until = [math.inf]
+
+    def at(times: Floats) -> Trajectory:
+        until.append(float(times[-1]) if len(times) else 0.0)
+        return truth.at(times)
+
+    value = metric.measure(replace(truth, at=at), run, case)
+    if name in BY_EVENTS:
+        until.append(truth.trusted)
+    return value, min(min(until) / case.t_end, 1.0)
+
+
+def _split(judge_: _Judge) -> Iterator[Verdict]:
     """Discretisation error apart from model error (refined against the truth).
 
     Discretisation is the run against the truth of the equations that the engine follows, or against its refined self.
     """
-    from crossbody.cases import Tier
-    from crossbody.reports.judging.truth import from_run
-
     entry = judge_.entry
     if entry.refined is None or entry.run is None:
         return
-    sides = [("model", judge_.truth, entry.refined)]
+    sides = [(PARTS[0], judge_.truth, entry.refined)]
     if entry.own is not None:
-        sides.append(("discretisation", entry.own, entry.run))
+        sides.append((PARTS[1], entry.own, entry.run))
     elif "dt" in entry.settings:  # a tolerance is refined to rounding: what is left is the model error alone
-        sides.append(("discretisation", from_run(entry.refined, Tier.D, "the same engine refined"), entry.run))
-    for name in ("position", "event_times"):
+        sides.append((PARTS[1], from_run(entry.refined, Tier.D, "the same engine refined"), entry.run))
+    for name in SPLIT:
         metric = metrics.load(name)
         for label, against, run in sides:
-            value = metric.measure(against, run, judge_.case)
+            value, compared = _value(metric, name, against, run, judge_.case)
             if value is not None:
-                yield judge_.part(f"{name} ({label})", value, metric.UNIT, against)
+                yield judge_.judged(f"{name} ({label})", value, metric.UNIT, against, compared)

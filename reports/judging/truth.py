@@ -20,6 +20,11 @@ SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
+AGREES = 1e5
+"""Largest disagreement of the two, in units of the looser tolerance: errors add up and grow over thousands of steps. It
+is never more than `PARTED`."""
+GROWN = 1e3
+"""A growth rate is read from where the two part by so many roundings of the largest coordinate."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +38,9 @@ class Truth:
         at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
         agreement: metric -> how far the two sources of tier C are apart; empty for the others.
         trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
+        parted: when the two sources part, s; infinite if they never do.
+        allowed: largest disagreement of the two sources, relative; NaN where there is one source alone.
+        growth: rate at which the two part, 1/s; NaN unless they do.
     """
 
     tier: Tier
@@ -41,6 +49,9 @@ class Truth:
     at: Callable[[Floats], Trajectory]
     agreement: dict[str, float]
     trusted: float = math.inf
+    parted: float = math.inf
+    allowed: float = math.nan
+    growth: float = math.nan
 
 
 def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
@@ -71,18 +82,26 @@ def truth_of(case: Case) -> Truth:
     Raises:
         CrossbodyError: if the reference cannot run the case.
     """
+    from crossbody.engines._equations import builder
+
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
         return _integrated(case, _tight(case), "cvode" if case.fsm == "level" else "compiled")
     motion = case.closed_form
     first = motion(np.zeros(1))
-    return Truth(
+    truth = Truth(
         tier=Tier.A,
         source="closed form of every arc",
         trajectory=motion(sample_times(first, case.t_end)),
         at=motion,
         agreement={},
     )
+    if builder(case.mechanism) is None:
+        return truth
+    second = _tight(case)
+    told = _held_against(truth, second, case, case.tight)
+    # A closed form is not cut short by what is held against it.
+    return replace(told, trusted=math.inf, parted=math.inf, agreement=_agreement(truth, second, case))
 
 
 def cache_of_one(function: Callable[[Floats], Trajectory]) -> Callable[[Floats], Trajectory]:
@@ -137,15 +156,14 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
 
     dense = at(sample_times(first, case.t_end))
     tier = Tier.D if other == "compiled" else Tier.C
-    second = reference.prepare(case, other, rtol=SECOND * case.tight).run()
-    truth = Truth(tier=tier, source="", trajectory=dense, at=at, agreement={})
-    truth = replace(truth, trusted=_trusted(truth, second))
-    found = _agreement(truth, second, case)
-    said = ", ".join(f"{name} {value:.1e}" for name, value in found.items())
-    source = f"compiled reference at rtol {case.tight:g}, {other} at {SECOND * case.tight:g} agrees: {said}"
-    if truth.trusted < case.t_end:
-        source += f"; compared until they part at t = {truth.trusted:.4g} s"
-    return _rechecked(replace(truth, source=source, agreement=found), case)
+    loose = SECOND * case.tight
+    second = reference.prepare(case, other, rtol=loose).run()
+    truth = _held_against(Truth(tier=tier, source="", trajectory=dense, at=at, agreement={}), second, case, loose)
+    said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
+    source = f"compiled reference at rtol {case.tight:g}, {other} at {loose:g} agrees: {said}"
+    if truth.parted < case.t_end:
+        source += f"; they part at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
+    return _rechecked(replace(truth, source=source), case)
 
 
 def _rechecked(truth: Truth, case: Case) -> Truth:
@@ -160,14 +178,38 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
     return replace(truth, source=truth.source + told, trusted=min(truth.trusted, first.t))
 
 
-def _trusted(truth: Truth, second: Trajectory) -> float:
-    """When two runs part by more than `PARTED` of the largest coordinate, s; infinite if they never do."""
+def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
+    """The truth with what a second source says of it: agreement, until when, and how fast they part if they do."""
+    t, off = _apart(truth, second)
+    parted = off > PARTED
+    trusted = math.inf if second.outcome.ok else float(second.t[-1]) if len(second.t) else 0.0
+    growth = math.nan
+    if parted.any():
+        trusted, growth = float(t[np.argmax(parted)]), _growth(t, off)
+    agreed = trusted
+    if case.chaos is not None:  # what is worse known than the declared time is not compared either
+        agreed = min(trusted, case.chaos.until)
+    agreement = _agreement(replace(truth, trusted=agreed), second, case)
+    allowed = PARTED if case.chaos is not None else min(AGREES * rtol, PARTED)
+    return replace(truth, trusted=agreed, parted=trusted, allowed=allowed, growth=growth, agreement=agreement)
+
+
+def _apart(truth: Truth, second: Trajectory) -> tuple[Floats, Floats]:
+    """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
     from crossbody.reports.metrics._align import aligned
 
     inside, exact = aligned(truth, second)
-    scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0))
-    off = np.max(np.abs(second.q[inside] - exact.q), axis=1, initial=0.0) > PARTED * scale
-    return float(second.t[inside][np.argmax(off)]) if off.any() else math.inf
+    scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0)) or 1.0
+    return second.t[inside], np.max(np.abs(second.q[inside] - exact.q), axis=1, initial=0.0) / scale
+
+
+def _growth(t: Floats, off: Floats) -> float:
+    """Slope of ln(largest distance so far), 1/s, between rounding and the largest distance; infinite for a jump."""
+    worst = np.maximum.accumulate(off)
+    rising = (worst > GROWN * np.finfo(float).eps) & (worst <= PARTED)
+    if rising.sum() < 2 or np.ptp(t[rising]) == 0.0:
+        return math.inf
+    return float(np.polyfit(t[rising], np.log(worst[rising]), 1)[0])
 
 
 def with_both_sides(run: Trajectory, natural: Trajectory) -> Trajectory:

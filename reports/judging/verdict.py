@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from crossbody.cases import Claim, Limit
+
+FACTOR = 2.0
+"""A known property takes an engine between a FACTOR-th of what a stored run gave and FACTOR times it."""
+BAND = 10.0
+"""A number that was right may become so many times what a stored run gave before it counts as lost."""
+ROUNDING = 1e-12
+"""Below this, in the unit of a metric, numbers differ from one machine to the next."""
 
 
 class Word(StrEnum):
@@ -18,7 +25,16 @@ class Word(StrEnum):
     OUTSIDE = "outside"
     EXPECTED = "expected-outside"
     INFO = "not judged"
+    LEDGER = "ledger only"
     SKIPPED = "skipped"
+    CRASHED = "crashed"
+
+
+class Regression(StrEnum):
+    """What is said of one number beside that of a stored run of this version; empty where none is stored."""
+
+    KEPT = "kept"
+    LOST = "lost"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,12 +45,16 @@ class Verdict:
         case, variant, engine, profile, metric: which number of which run.
         value: the number, in `unit`; NaN if there is none.
         expected: what the case claims; NaN if it claims nothing (then 0 is meant, if there is a limit).
-        limit: largest distance from that; NaN where nothing is judged.
+        limit: largest distance from that which physics and method allow; NaN where nothing is judged.
         tier: how the truth is known.
         verdict: the word.
         why: reason of the limit, known property of the engine, or what was claimed by whom.
         command: what reproduces the row.
         settings: of the engine, in words.
+        compared: part of the horizon over which it was measured.
+        band: largest distance from `expected` that is no regression, ten times what a stored run of this version gave;
+            NaN where none is stored.
+        regression: "kept" or "lost" by that band; empty without one.
     """
 
     case: str
@@ -51,22 +71,55 @@ class Verdict:
     why: str = ""
     command: str = ""
     settings: str = ""
+    compared: float = 1.0
+    band: float = math.nan
+    regression: str = ""
 
     def row(self) -> dict[str, Any]:
         """As plain values."""
-        return asdict(self) | {"verdict": self.verdict.value}
+        return asdict(self) | {"verdict": self.verdict.value, "regression": str(self.regression)}
 
 
-def limit_for(limits: Iterable[Limit], metric: str, engine: str, profile: str) -> Limit | None:
-    """The limit that speaks most precisely of a run; of equals the last."""
-    covering = [x for x in limits if x.metric == metric and x.covers(engine, profile)]
-    return max(reversed(covering), key=lambda x: (x.engine != "*") + (x.profile != "*"), default=None)
+def limit_for(limits: Sequence[Limit], metric: str, engine: str, profile: str) -> Limit | None:
+    """The limit that speaks most precisely of a run, of equals the last; with the property that shows in any metric."""
+
+    def precise(wanted: str) -> Limit | None:
+        covering = [x for x in limits if x.metric == wanted and x.covers(engine, profile)]
+        return max(reversed(covering), key=lambda x: (x.engine != "*") + (x.profile != "*"), default=None)
+
+    found, known = precise(metric), precise("*")
+    if found is None or known is None or found.known:
+        return found
+    return replace(found, known=known.known)
 
 
-def judge(value: float, limit: Limit | None, claim: Claim | None) -> tuple[Word, str]:
+def deviation(value: float, claim: Claim | None) -> float:
+    """Distance of a number from what is claimed of it, or from 0."""
+    return abs(value - (0.0 if claim is None else claim.expected))
+
+
+def explained(limit: Limit, stored: float | None) -> tuple[float, float] | None:
+    """How far a known property takes an engine, at least and at most; None where nobody has measured it.
+
+    Args:
+        limit: with the property.
+        stored: deviation of a stored run with the same parameters and settings; None where there is none.
+    """
+    if stored is not None:
+        return stored / FACTOR, stored * FACTOR
+    return (0.0, limit.known_size) if math.isfinite(limit.known_size) else None
+
+
+def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float | None = None) -> tuple[Word, str]:
     """The word and the reason for one number.
 
     A claim without a limit must come out exactly. What is not finite is outside, even where nothing is judged.
+
+    Args:
+        value: the number.
+        limit: what is allowed; None for nothing, or where nothing is judged.
+        claim: what must come out; None for 0.
+        stored: deviation of a stored run with the same parameters and settings; None where there is none.
     """
     if not math.isfinite(value):
         return Word.OUTSIDE, "The value is not finite."
@@ -75,16 +128,28 @@ def judge(value: float, limit: Limit | None, claim: Claim | None) -> tuple[Word,
     allowed = 0.0 if limit is None else limit.value
     said = "" if claim is None else f"{claim.expected:g} claimed: {claim.source}. "
     why = "" if limit is None else limit.why
-    deviation = abs(value - (0.0 if claim is None else claim.expected))
-    if deviation <= allowed:
+    off = deviation(value, claim)
+    if off <= allowed:
         return Word.WITHIN, (said + why).strip()
-    if limit is not None and limit.known and deviation <= limit.known_size:
+    if limit is None or not limit.known:
+        return Word.OUTSIDE, (said + why).strip()
+    sizes = explained(limit, stored)
+    if sizes is None:
+        return Word.INFO, f"Known, but nobody has measured how far it goes here: {limit.known}"
+    least, most = sizes
+    if least <= off <= most:
         return Word.EXPECTED, limit.known
-    if limit is not None and limit.known:
-        why = f"Beyond {limit.known_size:g}, which a known property explains: {limit.known}"
-    return Word.OUTSIDE, (said + why).strip()
+    return Word.OUTSIDE, f"{said}A known property explains {least:.3g} to {most:.3g}: {limit.known}"
+
+
+def band(stored: float | None, limit: Limit | None) -> float:
+    """Largest deviation that is no regression; NaN without a stored run, 0 for what must come out exactly."""
+    if stored is None or not math.isfinite(stored):
+        return math.nan
+    exact = limit is None or limit.value == 0.0
+    return BAND * stored if exact else max(BAND * stored, ROUNDING)
 
 
 def exit_code(words: Iterable[str]) -> int:
-    """0 if nothing is outside (a known deviation counts as fine), else 1."""
-    return int(any(word == Word.OUTSIDE for word in words))
+    """0 if nothing is outside or crashed (a known deviation counts as fine), else 1."""
+    return int(any(word in (Word.OUTSIDE, Word.CRASHED) for word in words))

@@ -4,7 +4,10 @@ A metric is a module with a docstring whose first line says what it measures, an
 
     UNIT                            SI unit, "1" for a ratio or a count
     CLAIMED                         True: measured only where the case claims or limits it
-    measure(truth, run, case)       the number; None where the run cannot tell (no ledger, no contact, ...)
+    measure(truth, run, case)       the number; None where there is none (no contact, another mechanism, ...), NaN where
+                                    the run does not show what it needs
+
+and, if it needs a signal that an engine may withhold (`crossbody.engines._contract`), NEEDS, its name.
 """
 
 from __future__ import annotations

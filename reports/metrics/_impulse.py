@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases._trajectory import Event, Trajectory
 
 SAME = 1e-7
 """Part of the horizon within which a sample and a collision are at one instant."""
+
+
+def away(exact: Trajectory, instants: Sequence[float], t_end: float) -> NDArray[np.bool_]:
+    """Samples of a truth (n,) that do not stand at one of the instants, where a sample does not say on which side."""
+    nearest = [np.abs(exact.t - t) for t in instants]
+    return np.min(nearest, axis=0) > SAME * t_end if nearest else np.ones(len(exact.t), dtype=bool)
 
 
 def cumulative(run: Trajectory, t: Floats | None = None) -> Floats:

@@ -28,11 +28,11 @@ def touch(run: Trajectory, case: Case, side: str) -> float | None:
     return min((c.touch for c in contacts(run) if c.row == row), default=None)
 
 
-def imbalance(run: Trajectory, case: Case) -> Floats | None:
-    """lam_L - lam_R of every sample (n,), N."""
+def imbalance(lam: Floats, case: Case) -> Floats | None:
+    """lam_L - lam_R of multipliers (n, nc), N, at every sample (n,)."""
     if not is_soft(case):
         return None
-    left, right = (run.lam[:, case.contacts.index(side)] for side in SIDES)
+    left, right = (lam[:, case.contacts.index(side)] for side in SIDES)
     difference: Floats = left - right
     return difference
 

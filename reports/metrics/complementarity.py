@@ -5,6 +5,7 @@ Recomputed from lam, gap and mode, never an engine's own flag.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+NEEDS = "lam"
 
 
 def _open(truth: Truth, run: Trajectory) -> NDArray[np.bool_]:
@@ -31,10 +33,12 @@ def _open(truth: Truth, run: Trajectory) -> NDArray[np.bool_]:
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max of -lam and of |lam| on open unilateral rows, over max |lam|; None where lam is not known."""
+    """Max of -lam and of |lam| on open unilateral rows, over max |lam|; NaN where lam is not known."""
     rows = case.law.unilateral
-    if np.isnan(run.lam).any() or not rows.any():
+    if not rows.any():
         return None
+    if np.isnan(run.lam).any():
+        return math.nan
     lam = run.lam[:, rows]
     scale = float(np.max(np.abs(lam), initial=0.0))
     acting = np.abs(lam[_open(truth, run)[:, rows]])

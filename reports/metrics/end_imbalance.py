@@ -16,5 +16,5 @@ CLAIMED = True
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """|lam_L - lam_R| of the last sample, N."""
-    difference = imbalance(run, case)
+    difference = imbalance(run.lam, case)
     return None if difference is None else abs(float(difference[-1]))

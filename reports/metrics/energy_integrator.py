@@ -5,6 +5,7 @@ What is left of E(t) - E(0) after the work of the inputs, of every multiplier an
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,13 +16,16 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+NEEDS = "ledger"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |E - E(0) - input + dissipated - work of all rows| / max T of the truth; None without a ledger."""
+    """Max |E - E(0) - input + dissipated - work of all rows| / max T of the truth; NaN without an account."""
     scale = float(truth.trajectory.energy[:, 0].max())
-    if run.ledger is None or scale == 0.0:
+    if scale == 0.0:
         return None
+    if run.ledger is None:
+        return math.nan
     book = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
     change = run.total_energy - run.total_energy[0]
     return float(np.max(np.abs(change - (book - book[0])))) / scale

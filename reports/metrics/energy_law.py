@@ -5,6 +5,7 @@ From the run's own account of the work of every multiplier (spec 1.4): above zer
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,12 +16,15 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+NEEDS = "ledger"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """max(0, max over t of the work of all rows) / max T of the truth; None without a ledger."""
+    """max(0, max over t of the work of all rows) / max T of the truth; NaN without an account."""
     scale = float(truth.trajectory.energy[:, 0].max())
     rows = case.law.unilateral
-    if run.ledger is None or scale == 0.0 or not rows.any():
+    if scale == 0.0 or not rows.any():
         return None
+    if run.ledger is None:
+        return math.nan
     return float(np.max(run.ledger.contact[:, rows].sum(axis=1), initial=0.0)) / scale

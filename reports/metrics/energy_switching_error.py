@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from crossbody.reports.metrics._switching import made, parted
@@ -12,16 +13,19 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+NEEDS = "ledger"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """|sum of jumps - work of all rows| / max T of the truth.
 
-    None with damping, whose work is not in the formula; while rows still press, whose energy comes back; and without a
-    ledger.
+    None with damping, whose work is not in the formula, and while rows still press, whose energy comes back; NaN
+    without an account.
     """
     scale = float(truth.trajectory.energy[:, 0].max())
     jumps = made(run, case)
-    if jumps is None or case.law.a1.any() or run.ledger is None or scale == 0.0 or not parted(run):
+    if jumps is None or case.law.a1.any() or scale == 0.0 or not parted(run):
         return None
+    if run.ledger is None:
+        return math.nan
     return abs(jumps - float(run.ledger.contact[-1].sum())) / scale

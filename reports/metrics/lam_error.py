@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,15 +15,18 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+NEEDS = "lam"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |lam - lam_truth| over max |lam_truth|; None where a row can open, or where lam is not known.
+    """Max |lam - lam_truth| over max |lam_truth|; None where a row can open, NaN where lam is not known.
 
     Where an instant stands twice lam jumps: its two sides are compared each with its own.
     """
-    if case.law.unilateral.any() or np.isnan(run.lam).any():
+    if case.law.unilateral.any():
         return None
+    if np.isnan(run.lam).any():
+        return math.nan
     inside, exact = aligned(truth, run)
     scale = float(np.max(np.abs(exact.lam), initial=0.0))
     return float(np.max(np.abs(run.lam[inside] - exact.lam), initial=0.0)) / scale if scale else None

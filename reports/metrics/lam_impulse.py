@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,17 +16,20 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+NEEDS = "lam"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over rows of |INT lam dt - INT lam_truth dt| / INT |lam_truth| dt; None where lam is not known.
+    """Max over rows of |INT lam dt - INT lam_truth dt| / INT |lam_truth| dt; NaN where lam is not known.
 
     Both integrals take the same samples by the same rule, so that the error of the rule cancels. Collisions that take
     no time have no lam and do not count: beside them a compliant truth has samples too few for its own integral.
     """
     inside, exact = aligned(truth, run)
-    if np.isnan(run.lam).any() or not inside.any():
+    if not inside.any():
         return None
+    if np.isnan(run.lam).any():
+        return math.nan
     mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
     scale = float(np.max(np.abs(theirs), initial=0.0))
     return float(np.max(np.abs(mine - theirs))) / scale if scale else None

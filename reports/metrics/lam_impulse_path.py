@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._impulse import cumulative
+from crossbody.reports.metrics._impulse import with_collisions
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -15,13 +16,20 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+NEEDS = "lam"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse; None where lam is not known."""
+    """Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time included.
+
+    NaN where lam is not known; None where nothing presses; N s where only the run's does.
+    """
     inside, exact = aligned(truth, run)
-    if np.isnan(run.lam).any() or not inside.any():
+    if not inside.any():
         return None
-    theirs = cumulative(exact)
+    if np.isnan(run.lam).any():
+        return math.nan
+    theirs = with_collisions(exact, truth.trajectory.events)
     scale = float(np.max(np.abs(theirs), initial=0.0))
-    return float(np.max(np.abs(cumulative(run)[inside] - theirs))) / scale if scale else None
+    off = float(np.max(np.abs(with_collisions(run, run.events)[inside] - theirs), initial=0.0))
+    return off / scale if scale else off or None

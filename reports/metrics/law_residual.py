@@ -1,6 +1,6 @@
 """Multipliers against the case's law at the run's own states, over the largest.
 
-The KKT residual of spec 1.1, recomputed by us from q and v:
+The residual of the law (docs/explanation, contact law), recomputed by us from q and v:
 
     (H M^-1 H^T) lam = -(H M^-1 f + H'v + a1 h' + a0 h + a2 h^3)
 
@@ -10,70 +10,67 @@ law from one that follows this one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._contacts import CLOSED
+from crossbody.reports.metrics._equations import equations, finite, spread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from crossbody.cases import Case, Trajectory
+    from crossbody.reference import System
     from crossbody.reports.judging.truth import Truth
 
 UNIT = "1"
 CLAIMED = False
-SAMPLES = 400
-
-
-def _equations(case: Case) -> Any:
-    """The mechanism's equations, or None if the reference has none."""
-    from crossbody.cases import CaseUnsupported
-    from crossbody.engines import load, names
-
-    if "reference" not in names():
-        return None
-    try:
-        prepared: Any = load("reference").prepare(case, "compiled")
-    except CaseUnsupported:
-        return None
-    return prepared.system
+NEEDS = "lam"
 
 
 def multipliers(
-    system: Any, case: Case, t: float, q: Floats, v: Floats, rows: NDArray[np.intp], fast: NDArray[np.bool_]
+    system: System, case: Case, t: float, q: Floats, v: Floats, rows: NDArray[np.intp], fast: NDArray[np.bool_]
 ) -> Floats:
     """Lam (len(rows),) that the law asks for at one state with those rows active, `fast` with those of COLLISION."""
-    M, f = system.terms(q, v, t=t)
+    M, f = system.terms(q, v, u=_held(case, t), t=t)
     H, h, Hdv = (part[rows] for part in system.constraint(q, v))
     law = case.law
     a0, a1 = (np.where(fast, b, a)[rows] for a, b in ((law.a0, law.b0), (law.a1, law.b1)))
     a2 = np.where(fast, 0.0, law.a2)[rows]
     wanted = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
     inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
-    found: Floats = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
-    return found
+    found = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
+    return np.asarray(found, dtype=np.float64)
+
+
+def _held(case: Case, t: float) -> Floats | None:
+    """The inputs (nu,) at an instant that is none of their own."""
+    if case.inputs is None:
+        return None
+    at = int(np.searchsorted(case.inputs.times, t, side="right")) - 1
+    return np.asarray(case.inputs.values[at] if at >= 0 else np.zeros(case.inputs.values.shape[1]))
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples.
+    """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples; NaN where lam is not known.
 
-    None where lam is not known, and where inputs or discrete variables act that a row of the run does not show.
+    None where nothing closes, and where a controller or discrete variables act that a row of the run does not show.
     """
-    if case.inputs is not None:
-        return None
-    closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
-    some = np.flatnonzero(closed.any(axis=1))
-    if not len(some) or np.isnan(run.lam).any():
-        return None
-    system = _equations(case)
+    system = equations(case)
     if system is None or system.control is not None or system.switch is not None:
         return None
+    if np.isnan(run.lam).any() or not finite(run):
+        return math.nan
+    closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
+    told = np.asarray(closed.any(axis=1))
+    if case.inputs is not None:  # where they jump, a sample does not say on which side it stands
+        told &= ~np.isin(run.t, case.inputs.times)
     worst, scale = 0.0, 0.0
-    for i in some[:: max(1, len(some) // SAMPLES)]:
+    for i in spread(run, told):
         rows = np.flatnonzero(closed[i])
         lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION)
         worst = max(worst, float(np.max(np.abs(run.lam[i, rows] - lam))))

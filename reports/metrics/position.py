@@ -20,12 +20,12 @@ STILL = 1e-9
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over samples and coordinates of |q - q_truth| / max |q_truth|; None where nothing moves."""
+    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests."""
     inside, exact = aligned(truth, run)
     scale = _scale(truth.trajectory, case)
-    if not inside.any() or not scale.all():
+    if not inside.any():
         return None
-    return float(np.max(np.abs(run.q[inside] - exact.q) / scale))
+    return float(np.max(np.abs(run.q[inside] - exact.q) / np.where(scale > 0.0, scale, 1.0)))
 
 
 def _scale(exact: Trajectory, case: Case) -> Floats:

@@ -10,7 +10,7 @@ from typing import Any
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages.html import number
 
-WORST = (Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
+WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
 KEY = ("finished", "audit", "position", "velocity", "event_times", "lam_impulse", "energy_drift", "energy_integrator")
 """Metrics that stand first in the table of a case."""

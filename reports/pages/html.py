@@ -23,7 +23,10 @@ TEMPLATES = Path(__file__).parent / "templates"
 PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
 PARTS = ("page.js", "plots.js", "player.js")
 """The pages' own script, in this order."""
-SIGNS = {"within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·", "skipped": "-"}
+SIGNS = {
+    "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·", "ledger only": "∑", "skipped": "-",
+    "crashed": "!",
+}  # fmt: skip
 """A verdict is told by sign and word besides its colour."""
 MOST = 2000
 """Rows of a table that a page shows; the file beside it has all."""

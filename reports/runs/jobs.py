@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,6 +14,7 @@ from crossbody import cases, engines
 from crossbody.cases import (
     Case,
     CaseUnsupported,
+    CrossbodyError,
     EngineUnavailable,
     InvalidValue,
     Outcome,
@@ -21,7 +23,7 @@ from crossbody.cases import (
     Value,
 )
 from crossbody.reports.judging.audit import AuditRow, audit
-from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.comparison import Entry, check_names
 from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
 from crossbody.reports.runs import watch
 
@@ -133,6 +135,7 @@ def run_case(
         UnknownName: for a setting that none of them knows.
     """
     asked = dict(settings or {}) | ({} if rtol is None else {"rtol": rtol})
+    check_names(case)
     label = f"{case.label}: truth"
     tell(label)
     watch.limited(label, TRUTHS * limit)
@@ -175,13 +178,25 @@ def _reference_audit(case: Case) -> Mapping[str, Any]:
 
 
 def _entry(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
+    """The run of one engine; whatever it throws is a row of its own, so that the others are judged all the same."""
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
-        prepared = prepare(case, pick, asked)
+        return _ran(case, pick, asked, reference)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
-    rows: tuple[AuditRow, ...] = audit(prepared.audit(), reference, case) if reference else ()
+    except CrossbodyError:  # wrong use of ours
+        raise
+    except Exception as error:
+        place = "".join(traceback.format_tb(error.__traceback__)[-1:]).strip().splitlines()[0]
+        return Entry(engine=pick.engine, profile=pick.profile, crashed=f"{type(error).__name__}: {error} ({place})")
+
+
+def _ran(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
+    prepared = prepare(case, pick, asked)
+    shown = prepared.audit()
+    hidden = {**engines.hidden(engines.load(pick.engine), prepared.profile), **shown.get("hidden", {})}
+    rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     natural: Trajectory = prepared.run()
     return Entry(
         engine=pick.engine,
@@ -191,6 +206,7 @@ def _entry(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mappin
         stepped=natural.t,
         audit=rows,
         refined=_refined(case, pick, prepared.settings),
+        hidden=hidden,
         own=None if (followed := getattr(prepared, "follows", None)) is None else law_of(followed),
     )
 

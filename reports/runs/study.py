@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
-from crossbody.reports.judging.comparison import Entry, table, verdicts
+from crossbody.reports.judging.comparison import Entry, judged, table
 from crossbody.reports.judging.truth import Truth
 from crossbody.reports.judging.verdict import Verdict
 from crossbody.reports.metrics._align import aligned
@@ -33,8 +33,7 @@ def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> pd.Data
     return table(
         row
         for result in results
-        for entry in result.entries
-        for row in verdicts(result.case, entry, result.truth, commands[result.case.label])
+        for row in judged(result.case, result.entries, result.truth, commands[result.case.label])
     )
 
 

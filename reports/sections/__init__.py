@@ -13,6 +13,8 @@ later. What it must know besides stands in the `provenance` of its tables, since
 
 from __future__ import annotations
 
+import json
+from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol, cast
 
@@ -45,10 +47,29 @@ def load(name: str) -> Study:
 
 
 def shown(name: str, out: Path) -> tuple[Section, ...]:
-    """Sections of a study in a folder; where its tables are not what this version writes, one that says so."""
+    """Sections of a study in a folder; one that says so where another version wrote its tables.
+
+    A fault in making a section from tables of this version stays loud.
+    """
     study = load(name)
     try:
         return study.sections(out)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
-        told = f"Another version of crossbody wrote these tables ({error} is not as expected): run the study again."
+        wrote, mine = _written_by(out), version("crossbody")
+        told = (
+            f"These tables cannot be shown ({type(error).__name__}: {error}), though this version wrote them: they "
+            "were changed, or it is a fault of crossbody. Run the study again; report it if it stays."
+            if wrote == mine
+            else f"Another version of crossbody wrote these tables ({wrote or 'unknown'}; {error} is not as "
+            "expected): run the study again."
+        )
         return (Section(name=name, title=study.TITLE, text=told),)
+
+
+def _written_by(out: Path) -> str:
+    """Version of crossbody in the provenance of a folder; empty where it is not told."""
+    try:
+        told = json.loads((out / "provenance.json").read_text(encoding="utf-8"))
+        return str(told["versions"]["crossbody"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""

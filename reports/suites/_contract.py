@@ -52,8 +52,8 @@ class Family:
         fixed: the same in every run.
         scene: from what was drawn and fixed to the case's parameters; the same names if not given.
         ladder: of tolerances and steps, a further axis of the grid.
-        second: every how many runs the independent integrator is asked too (tier C), 0 for never; it is not needed
-            where the case has a closed form.
+        second: every how many runs the independent integrator is asked whatever it costs (tier C), and of the others
+            wherever the run took few steps; 0 for never: it is not needed where the case has a closed form.
         limit: largest error of the reference against a truth of tier A to C at its default tolerance; on a rung of a
             ladder it grows with the tolerance. Its energy account may leave ten times as much open.
         finishes: whether the reference has to reach the horizon in each of them.

@@ -25,6 +25,9 @@ RTOL = 1e-9
 """Of the reference, if nothing is said."""
 ACCOUNT = 10.0
 """The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
+AFFORD, SHARE = 1_000, 0.2
+"""The independent integrator is asked for every run of at most so many steps, and gets such a part of its time: it
+takes some ten times the steps, each through Python. Where that is not enough the energy account alone judges."""
 REFUSED, SKIPPED, EXCEPTION, CRASHED = "refused", "skipped", "exception", "crashed"
 """Ends of a run that never began, or that should not be: the words beside those of `Outcome`."""
 
@@ -118,7 +121,11 @@ def _error(spec: Spec, tried: Tried) -> Error:
     run, case = tried.run, tried.case
     if run is None or case is None or not run.outcome.ok or tried.broken or unsound(run, case, spec.engine):
         return Error()
-    second = (10 * spec.max_steps, 3.0 * spec.time_limit) if spec.second else None
+    second = None
+    if spec.second:
+        second = (10 * spec.max_steps, 3.0 * spec.time_limit)
+    elif spec.afford and run.steps <= AFFORD:
+        second = (100 * AFFORD, SHARE * spec.time_limit)
     asked = Asked(limit=limit(spec, tried.settings), near=lambda: _beside(spec, case, tried.settings), second=second)
     try:
         return error(case, run, asked)
@@ -197,8 +204,9 @@ def _verdict(spec: Spec, tried: Tried, error: Error, most: float, open_: float, 
         return Word.OUTSIDE, error.why or f"error {error.value:.2e}"
     if reference and open_ > ACCOUNT * most:
         return Word.OUTSIDE, f"the energy account leaves {open_:.2e} open"
-    judged = reference and (error.tier or not math.isnan(open_))
-    return (Word.WITHIN if judged else Word.INFO), error.why
+    if reference and error.tier and not math.isnan(error.value):
+        return Word.WITHIN, error.why
+    return (Word.LEDGER if reference and not math.isnan(open_) else Word.INFO), error.why
 
 
 def crashed(spec: Spec, why: str) -> dict[str, Any]:

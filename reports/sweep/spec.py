@@ -22,7 +22,8 @@ class Spec:
         rung: of the ladder, -1 for the engine's own default.
         ladder: tolerances beside steps.
         seed: of this run.
-        second: whether the independent integrator is asked too.
+        second: whether the independent integrator is asked whatever it costs.
+        afford: whether it is asked where the run took few steps.
         limit: largest error and energy residual of the reference.
         finishes: whether the reference has to reach the horizon.
         ends: whether only the end state is asked for.
@@ -41,6 +42,7 @@ class Spec:
     ladder: Ladder | None
     seed: int
     second: bool
+    afford: bool
     limit: float
     finishes: bool
     ends: bool

@@ -13,7 +13,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.engines import Run
-from crossbody.reports.judging.comparison import Entry, verdicts
+from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
 from crossbody.reports.judging.truth import Truth, truth_of
 from crossbody.reports.judging.verdict import Verdict
 from crossbody.reports.runs import jobs
@@ -71,7 +71,10 @@ class Bench:
         """Metric -> verdict; "run" alone, with its sentence, where there is no run."""
         if (scene, pick) not in self._verdicts:
             entry = self.entry(scene, pick)
-            rows = verdicts(self.case(scene), entry, self.truth(scene), repeat(scene))
+            asked = (self.case(scene), self.truth(scene), repeat(scene))
+            rows = verdicts(asked[0], entry, *asked[1:])
+            if entry.run is not None:
+                rows += truth_row(*asked)
             self._verdicts[scene, pick] = {row.metric: row for row in rows}
         return self._verdicts[scene, pick]
 

@@ -9,13 +9,14 @@ from typing import Any
 import pytest
 
 from crossbody.cases import Case, CrossbodyError
+from crossbody.cases._defaults import limits_of
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.testing import plugin
 from crossbody.reports.testing._bench import Bench
 from crossbody.reports.testing._parameters import Named, Scene, picks, scenes
 
-ALWAYS = ("finished", "audit")
+ALWAYS = ("finished", "audit", "truth")
 RUN = "run"
 TOLD = ("case", "variant", "engine", "profile", "metric", "verdict", "value", "unit", "expected", "limit", "tier")
 
@@ -62,7 +63,8 @@ def judged(case: Case, pick: Pick) -> tuple[str, ...]:
     """Metrics that are judged for an engine; one that is not installed has one test, to say so."""
     if pick.skipped:
         return (RUN,)
-    limited = (limit.metric for limit in case.limits if limit.covers(pick.engine, pick.profile))
+    covering = (limit.metric for limit in limits_of(case) if limit.covers(pick.engine, pick.profile))
+    limited = (metric for metric in covering if metric != "*")
     return tuple(dict.fromkeys((*ALWAYS, *(claim.metric for claim in case.claims), *limited)))
 
 
@@ -83,7 +85,7 @@ class OneLimit(pytest.Item):
             pytest.skip(row.why)
         if row.verdict == Word.EXPECTED:
             pytest.xfail(f"{_number(row)}. {row.why}")
-        if row.verdict == Word.OUTSIDE:
+        if row.verdict in (Word.OUTSIDE, Word.CRASHED):
             raise Outside(f"{_number(row)}. {row.why}\n{row.command}")
 
     def _row(self, bench: Bench) -> Verdict:

@@ -1,0 +1,32 @@
+"""Gaps against the truth's on matched arcs, over the largest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.reports.metrics._align import aligned
+from crossbody.reports.metrics._impulse import away
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.judging.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max |gap - gap_truth| / max |gap_truth| over samples and unilateral rows; None without such a row.
+
+    Where a discrete variable changes a gap may jump: those instants are left out.
+    """
+    rows = case.law.unilateral
+    inside, exact = aligned(truth, run)
+    if not rows.any() or not inside.any():
+        return None
+    smooth = away(exact, [switch.t for switch in truth.trajectory.switches], case.t_end)
+    off = float(np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], initial=0.0))
+    scale = float(np.max(np.abs(truth.trajectory.gap[:, rows])))
+    return off / scale if scale else off

@@ -1,0 +1,201 @@
+"""Faults planted in recorded runs: each must be outside, whatever the engine is known for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crossbody.cases import Case, Claim, InvalidValue, Limit, Outcome, Tier, Trajectory, UnknownName, load
+from crossbody.cases._arrays import Floats
+from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.truth import Truth, _held_against, truth_of
+from crossbody.reports.judging.verdict import Word
+from crossbody.reports.metrics._contacts import CLOSED
+from crossbody.reports.runs import jobs
+
+Fault = Callable[[Trajectory], Trajectory]
+Recorded = dict[tuple[str, str], tuple[Case, Truth, dict[str, Entry]]]
+SCENES = (("bouncing_ball", "listing"), ("newtons_cradle", "sliders"))
+ENGINES = ("reference:compiled", "mujoco:matched", "pinocchio:law")
+RIGHT = (Word.WITHIN, Word.EXPECTED, Word.INFO, Word.SKIPPED)
+
+
+def _silent(run: Trajectory) -> Trajectory:
+    """All multipliers unknown."""
+    return replace(run, lam=np.full_like(run.lam, np.nan))
+
+
+def _forces(run: Trajectory) -> Trajectory:
+    """Every force twice as large, those of collisions in no time among them."""
+    return replace(run, lam=2.0 * run.lam, events=tuple(replace(e, impulse=2.0 * e.impulse) for e in run.events))
+
+
+def _never_released(run: Trajectory) -> Trajectory:
+    return replace(run, events=tuple(e for e in run.events if not (e.before in CLOSED and e.after not in CLOSED)))
+
+
+def _late(run: Trajectory) -> Trajectory:
+    return replace(run, events=tuple(replace(e, t=e.t + 1e-3 * run.t[-1]) for e in run.events))
+
+
+def _one_touch_less(run: Trajectory) -> Trajectory:
+    last = max(i for i, e in enumerate(run.events) if e.after in CLOSED)
+    return replace(run, events=run.events[:last])
+
+
+FAULTS: dict[str, Fault] = {
+    "every force doubled": _forces,
+    "force unknown": _silent,
+    "velocity 10 % large": lambda run: replace(run, v=1.1 * run.v),
+    "gap halved": lambda run: replace(run, gap=0.5 * run.gap),
+    "kinetic energy 2 % large": lambda run: replace(run, energy=run.energy * np.array([1.02, 1.0])),
+    "position drifts": lambda run: replace(run, q=run.q * (1.0 + 0.01 * run.t / run.t[-1])[:, None]),
+    "releases ignored": _never_released,
+    "diverged": lambda run: replace(run, outcome=Outcome.DIVERGED),
+    "not a number": lambda run: replace(run, q=np.where(run.t[:, None] > 0.9 * run.t[-1], np.nan, run.q)),
+}
+OF_THE_REFERENCE: dict[str, Fault] = {
+    "late events": _late,
+    "a touch less": _one_touch_less,
+    "kinetic energy 1e-5 large": lambda run: replace(run, energy=run.energy * np.array([1.0 + 1e-5, 1.0])),
+    "velocity 1e-4 large": lambda run: replace(run, v=(1.0 + 1e-4) * run.v),
+    "position 1e-5 off": lambda run: replace(run, q=run.q + 1e-5),
+    "dissipation left out of the account": lambda run: replace(run, ledger=replace(
+        run.ledger, contact=run.ledger.contact + 1e-4 * run.t[:, None])),
+}  # fmt: skip
+"""Too small to be seen where an engine is known to deviate, and seen where it is not."""
+
+
+@pytest.fixture(scope="module")
+def recorded() -> Recorded:
+    """Cases, their truths and their runs, made once for all faults."""
+    found = {}
+    for name, variant in SCENES:
+        case = load(name, variant)
+        result = jobs.run_case(case, jobs.picks(ENGINES))
+        found[name, variant] = (case, result.truth, {f"{e.engine}:{e.profile}": e for e in result.entries})
+    return found
+
+
+def _outside(case: Case, entry: Entry, truth: Truth) -> list[str]:
+    return [row.metric for row in judged(case, [entry], truth, "crossbody run") if row.verdict not in RIGHT]
+
+
+@pytest.mark.parametrize("who", ENGINES)
+@pytest.mark.parametrize("scene", SCENES, ids=":".join)
+def test_what_was_recorded_is_not_outside(recorded: Recorded, scene: tuple[str, str], who: str) -> None:
+    case, truth, entries = recorded[scene]
+    assert _outside(case, entries[who], truth) == []
+
+
+@pytest.mark.parametrize("who", ENGINES)
+@pytest.mark.parametrize("scene", SCENES, ids=":".join)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_outside_in_every_engine(recorded: Recorded, fault: str, scene: tuple[str, str], who: str) -> None:
+    case, truth, entries = recorded[scene]
+    entry = entries[who]
+    assert entry.run is not None
+    assert _outside(case, replace(entry, run=FAULTS[fault](entry.run)), truth)
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=":".join)
+@pytest.mark.parametrize("fault", OF_THE_REFERENCE)
+def test_a_small_fault_of_the_reference_is_outside(recorded: Recorded, fault: str, scene: tuple[str, str]) -> None:
+    case, truth, entries = recorded[scene]
+    entry = entries["reference:compiled"]
+    assert entry.run is not None
+    assert _outside(case, replace(entry, run=OF_THE_REFERENCE[fault](entry.run)), truth)
+
+
+def test_a_truth_that_drifts_is_outside(recorded: Recorded) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+    second = entries["reference:cvode"].run if "reference:cvode" in entries else entries["reference:compiled"].run
+    assert second is not None
+
+    def at(times: Floats) -> Trajectory:
+        exact = truth.at(times)
+        return replace(exact, q=exact.q * (1.0 + 0.01 * times)[:, None])
+
+    wrong = _held_against(replace(truth, at=at), second, case, 1e-12)
+    assert "truth" in _outside(case, entries["pinocchio:law"], wrong)
+
+
+def test_what_was_compared_over_a_small_part_is_not_judged(recorded: Recorded) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+    short = replace(truth, trusted=0.1 * case.t_end)
+    rows = {row.metric: row for row in judged(case, [entries["reference:compiled"]], short, "crossbody run")}
+    assert rows["truth"].verdict == Word.OUTSIDE
+    assert rows["position"].verdict == Word.INFO
+    assert rows["position"].compared == pytest.approx(0.1, abs=0.01)
+    assert rows["energy_integrator"].verdict == Word.WITHIN
+
+
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_a_known_deviation_that_changes_is_outside(recorded: Recorded, factor: float) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+    entry, run = entries["mujoco:matched"], entries["mujoco:matched"].run
+    assert run is not None
+    assert "lam_impulse_path" in {r.metric for r in judged(case, [entry], truth, "") if r.verdict == Word.EXPECTED}
+    lam = run.lam * factor
+    assert "lam_impulse_path" in _outside(case, replace(entry, run=replace(run, lam=lam)), truth)
+
+
+def test_a_known_deviation_without_a_measured_size_is_not_judged(recorded: Recorded) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+    entry = replace(entries["mujoco:matched"], settings={"dt": 1e-4})
+    rows = {row.metric: row.verdict for row in judged(case, [entry], truth, "")}
+    assert rows["energy_drift"] == Word.INFO
+
+
+def test_a_claimed_number_that_is_missing_is_outside(recorded: Recorded) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+    claim = Claim(metric="fifth_exit", expected=4.0, tier=Tier.B, source="a figure")
+    claimed = replace(case, claims=(*case.claims, claim))
+    for entry in entries.values():
+        assert "fifth_exit" in _outside(claimed, entry, truth)
+
+
+def test_a_claim_that_judged_nothing_is_reported(recorded: Recorded) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+    claim = Claim(metric="ring_changes", expected=4.0, tier=Tier.B, source="another mechanism")
+    rows = judged(replace(case, claims=(*case.claims, claim)), [entries["reference:compiled"]], truth, "")
+    assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == ["ring_changes"]
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"limits": (Limit(metric="kontakts", value=1.0),)}, UnknownName),
+        ({"limits": (Limit(metric="position", value=1.0, engine="referense"),)}, UnknownName),
+        ({"limits": (Limit(metric="position", value=-1.0),)}, InvalidValue),
+        ({"claims": (Claim(metric="kontakts", expected=1.0, tier=Tier.A, source=""),)}, UnknownName),
+    ],
+)
+def test_names_in_claims_and_limits_exist(change: dict[str, object], error: type[Exception]) -> None:
+    case = replace(load("bouncing_ball", "linear"), **change)  # type: ignore[arg-type]
+    with pytest.raises(error, match=r"kontakts|referense|-1"):
+        judged(case, [], truth_of(case), "")
+
+
+def test_an_engine_that_throws_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    from crossbody import engines
+
+    case = load("bouncing_ball", "linear")
+    reference = engines.load("reference")
+    real = type(reference).prepare
+
+    def prepare(self: object, case: Case, profile: str = "matched", **settings: object) -> object:
+        if profile == "cvode":
+            raise ZeroDivisionError("planted")
+        return real(reference, case, profile, **settings)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(type(reference), "prepare", prepare)
+    result = jobs.run_case(case, jobs.picks(["reference:cvode", "reference:compiled"]))
+    rows = judged(case, result.entries, result.truth, "")
+    crashed = [row for row in rows if row.verdict == Word.CRASHED]
+    assert [(row.profile, row.metric) for row in crashed] == [("cvode", "run")]
+    assert "ZeroDivisionError: planted" in crashed[0].why
+    assert any(row.profile == "compiled" and row.metric == "position" for row in rows)
