@@ -123,7 +123,7 @@ def test_a_fault_of_ours_has_a_code_and_a_file_of_its_own(tmp_path: Path) -> Non
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_an_interrupt_at_any_instant_stops_and_loses_nothing(tmp_path: Path, count: int) -> None:
     rng, out = random.Random(11), tmp_path / "out"
     (tmp_path / "keep").mkdir()
