@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from crossbody.hw.checks.clock import First, Floats, Rows
@@ -15,6 +14,7 @@ TURN = 2.0 * np.pi
 CHUNK = 8192  # samples that are judged together, wherever blocks are cut
 EDGE = 2  # steps at the beginning and the end that are not judged: there are no neighbours on both sides
 REST = 0.3  # rad that a step may differ from its neighbours after whole turns are taken off
+ALIKE = 1.0  # rad that its neighbours may differ from one another: a motion, and no noise
 OUT = 8.0  # times the neighbours' own differences, and the noise, that a step must stand out
 STEPS = 4.0  # of the encoder's grid
 COARSEST = TURN / 100.0  # rad: no encoder's grid, where a single step tells nothing about it
@@ -58,26 +58,35 @@ def find_jumps(times: Floats, values: Floats, rotates: bool, noise: float | None
         return none, noise or 0.0
     steps, clock = np.diff(values), np.diff(times)
     usual = float(np.median(clock))
-    windows = sliding_window_view(steps, 2 * EDGE + 1)
-    around = windows[:, [0, 1, 3, 4]]
-    middle, low, high = windows[:, EDGE], around.min(1), around.max(1)
-    even = sliding_window_view(clock, 2 * EDGE + 1).max(1) <= LATE * usual
-    second = np.abs(middle - 0.5 * (around[:, 1] + around[:, 2]))
-    noise = float(np.quantile(second, NOISE)) if noise is None else noise
+    # About the place where it wraps, a noisy angle does so several times: neighbours count without their turns.
+    plain = np.where(np.abs(steps) > 0.5 * TURN, steps - TURN * np.sign(steps), steps) if rotates else steps
+    far, near, folded, next_, last = (plain[i : len(steps) - 2 * EDGE + i] for i in range(2 * EDGE + 1))
+    middle = steps[EDGE : len(steps) - EDGE]
+    low = np.minimum(np.minimum(far, near), np.minimum(next_, last))
+    high = np.maximum(np.maximum(far, near), np.maximum(next_, last))
+    second = np.abs(folded - 0.5 * (near + next_))
+    if noise is None:
+        at = int(NOISE * (len(second) - 1))
+        noise = float(np.partition(second, at)[at])
     moved = np.abs(steps[steps != 0.0])
     grid = min(float(moved.min(initial=np.inf)), COARSEST if rotates else np.inf)
-    least = np.maximum(OUT * np.maximum(high - low, noise), STEPS * grid)
-    turns = np.zeros(len(middle), np.int64)
-    if rotates and usual > 0.0:
-        with np.errstate(invalid="ignore", over="ignore"):
-            wanted = np.median(around, axis=1) * clock[EDGE : len(clock) - EDGE] / usual
-            whole = np.rint((middle - wanted) / TURN)
-            fits = np.abs(middle - TURN * whole - wanted) < REST
-        turns[fits & (np.abs(wanted) < 0.5 * TURN)] = whole[fits & (np.abs(wanted) < 0.5 * TURN)].astype(np.int64)
     excess = np.where(middle > high, middle - high, np.minimum(middle - low, 0.0))
-    found = np.flatnonzero((turns != 0) | (even & (np.abs(excess) > least)))
-    size = np.where(turns[found] != 0, TURN * turns[found], excess[found])
-    return Jumps(at=found + EDGE + 1, turns=turns[found], size=size), noise
+    out = np.abs(excess) > np.maximum(OUT * np.maximum(high - low, noise), STEPS * grid)
+    found = np.flatnonzero(out | (np.abs(middle) > 0.5 * TURN) if rotates else out)
+    turns = np.zeros(len(found), np.int64)
+    if not len(found):
+        return none, noise
+    long = np.stack([clock[found + i] for i in range(2 * EDGE + 1)]).max(0) > LATE * usual
+    if rotates and usual > 0.0:
+        inner = (far + near + next_ + last - low - high)[found] / 2.0  # the median of four
+        wanted = inner * clock[found + EDGE] / usual
+        whole = np.rint((middle[found] - wanted) / TURN)
+        fits = (np.abs(middle[found] - TURN * whole - wanted) < REST) & (np.abs(wanted) < 0.5 * TURN)
+        turns = np.where(fits & (np.abs(whole) == 1.0) & ((high - low)[found] < ALIKE), whole, 0.0).astype(np.int64)
+    kept = (turns != 0) | (out[found] & ~long)
+    found, turns = found[kept], turns[kept]
+    size = np.where(turns != 0, TURN * turns, excess[found])
+    return Jumps(at=found + EDGE + 1, turns=turns, size=size), noise
 
 
 class JumpCheck:
@@ -117,7 +126,8 @@ class JumpCheck:
 
     def _look(self, rows: Rows, times: Floats, values: Floats) -> None:
         few = self._noise is not None and len(values) < FEWEST
-        found, self._noise = find_jumps(times, values, self._unit == "rad", self._noise if few else None)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is that large has a check that tells it
+            found, self._noise = find_jumps(times, values, self._unit == "rad", self._noise if few else None)
         hit = np.zeros(len(values), np.bool_)
         hit[found.at[found.turns != 0]] = True
         self._wraps.see(hit, rows, times)
