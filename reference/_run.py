@@ -155,7 +155,8 @@ class CompiledRun:
         """What was recorded, as a Trajectory."""
         n, nc = self.system.n, self.system.nc
         state = self.state[0]
-        rows = self.buffers["out"][: self._finite_rows()]
+        broken = outcome is Outcome.NOT_FINITE
+        rows = self.buffers["out"][: self._finite_rows() if broken else int(state["rows"])]
         cuts = np.cumsum([1, n, n, nc, nc, 2])
         t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
         return Trajectory(
