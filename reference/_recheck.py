@@ -132,7 +132,9 @@ class _Recheck:
         fast = np.asarray(system.b0) > 0.0
         self.frozen = frozenset() if collisions == "resolved" else frozenset(np.flatnonzero(fast).tolist())
         self.near = _near(run, rtol)
-        self.inputs_t, self.inputs_u = ((), ()) if inputs is None else (np.asarray(part, float) for part in inputs)
+        times, values = ((), ()) if inputs is None else inputs
+        self.inputs_t: Floats = np.asarray(times, dtype=np.float64)
+        self.inputs_u: Floats = np.asarray(values, dtype=np.float64)
         self.speed = np.abs([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)]).max(axis=0)
 
     def between(self) -> Iterator[Violation]:
@@ -156,7 +158,8 @@ class _Recheck:
         # A single row at an event shows the state before it.
         behind = np.concatenate([[True], t[1:] == t[:-1]]) | ~np.isin(t, [e.t for e in self.run.events])
         same = np.all(mode[1:] == mode[:-1], axis=1)
-        return (t[1:] > t[:-1]) & ~inside & same & behind[:-1]
+        smooth: NDArray[np.bool_] = (t[1:] > t[:-1]) & ~inside & same & behind[:-1]
+        return smooth
 
     def _held(self, times: Any) -> NDArray[np.intp]:
         """The last of `times` at or before each row, -1 for none."""

@@ -167,7 +167,8 @@ class CompiledRun:
         """What was recorded, as a Trajectory."""
         n, nc = self.system.n, self.system.nc
         state = self.state[0]
-        rows = self.buffers["out"][: self._finite_rows()]
+        broken = outcome is Outcome.NOT_FINITE
+        rows = self.buffers["out"][: self._finite_rows() if broken else int(state["rows"])]
         if not len(rows):  # it ended before its first row, or none was asked for: the start is known at least
             rows = np.concatenate([start_row(self.system, *np.split(self.start_state, 2)), np.zeros(self.nz)])[None]
             self.buffers["modes"][0] = self._modes

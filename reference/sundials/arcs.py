@@ -34,11 +34,11 @@ CHUNK = 500  # internal steps between two looks at the clock
 TOO_MUCH_WORK = -1
 ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
 STALLED, DAMPED = 200, 0.3  # steps bound by stability; damping ratio: beyond both the arc is stiff
-UNWATCHED = 1e6  # in units of a multiplier's size: errors of lam are those of the motion, times a0 or over the step
+UNWATCHED = 1e6  # in units of a multiplier's size: at index 2 errors of lam are errors of the motion over the step
+LOOSE = 1e3  # the same at index 1, where they are those of the motion times a0: they must not steer the step
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 FAR = 1e30  # beyond this a motion has diverged
 SAME_INSTANT = 8.0 * ULP
-ROUNDING = 4.0 * ULP  # of the largest value
 NOISY = 64.0  # rounding of a multiplier along a step, in units of its bound at the start
 MOST_TERMS = 5  # of the guards of one row
 
@@ -79,8 +79,6 @@ class Scene:
         self.nz, self.scale = nz, scale
         self.looks = Evaluator(equations, MOST_TERMS * len(machine.rows) + discrete.guards, nz)
         self.work = self.looks.work
-        self.largest = np.zeros(2 * equations.system.n)
-        """Largest q and v at the ends of IDA's steps."""
 
     @property
     def steps(self) -> int:
@@ -281,8 +279,9 @@ class IdaArc(Arc):
 
         share, size = SHARE * self.options.rtol, np.where(view.size > 0.0, view.size, 1.0)
         own = self._tolerances()
-        motion = np.maximum(own[: 2 * n], ROUNDING * self.scene.largest)  # a speed at its turn is known no better
-        atol = np.concatenate([motion, share * size * UNWATCHED, np.full(nb, UNWATCHED), own[2 * n :]])
+        atol = np.concatenate(
+            [own[: 2 * n], share * size * (UNWATCHED if self.rigid else LOOSE), np.full(nb, UNWATCHED), own[2 * n :]]
+        )
         solver = IDA(
             residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), first_step=self._first_step(),
             **self.common,
@@ -292,12 +291,6 @@ class IdaArc(Arc):
         y = np.concatenate([start.q, start.v, view.lam, zero, start.z])
         solver.init_step(start.t, y, np.concatenate([start.v, view.vd, np.zeros(nc), zero, powers]))
         return solver, y
-
-    def step(self, stop: float) -> tuple[State, Fired]:
-        """As every arc; what the motion has reached bounds how well it can be known."""
-        state, fired = super().step(stop)
-        np.maximum(self.scene.largest, np.abs(self.y1[: 2 * self.n]), out=self.scene.largest)
-        return state, fired
 
     def _first_step(self) -> float:
         """0 to let IDA guess; at index 2 its guess is so short that it sees rounding over the step and nothing else."""

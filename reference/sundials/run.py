@@ -27,7 +27,6 @@ from crossbody.reference.sundials.level_machine import LevelMachine, View
 from crossbody.reference.sundials.quiet import quiet
 
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
-AGAIN = (Outcome.NOT_FINITE, Outcome.STEP_TOO_SMALL)  # a fresh start at order one also gets past a weight near zero
 ROUNDS = 100  # of rows and discrete variables that switch each other at one instant
 STILL = 200  # steps in a row, each within rounding of the time
 ON_THE_MANIFOLD = 1e-6
@@ -186,7 +185,7 @@ class SundialsRun:
         try:
             state, fired = arc.step(stop)
         except Ended as end:
-            if end.outcome not in AGAIN or self.retries >= RETRIES:
+            if end.outcome is not Outcome.NOT_FINITE or self.retries >= RETRIES:
                 raise
             self.retries += 1
             return None
