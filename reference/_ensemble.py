@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases._arguments import instance
 from crossbody.cases._arrays import frozen
+from crossbody.reference._check import check_once
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import Options, checked
 from crossbody.reference._program import address
@@ -76,7 +77,7 @@ def ensemble(
         options: as in `Options`, without samples and events: nothing is recorded on the way.
 
     Raises:
-        SceneError: for an array of another shape.
+        SceneError: for an array of another shape, or if a kernel is wrong at the first start (`System.check`).
         UnknownName: for a parameter or constant that the system does not have.
         InvalidValue: for an option or a number of threads outside its range.
     """
@@ -86,6 +87,7 @@ def ensemble(
     count = threads or len(os.sched_getaffinity(0))
     if not 1 <= count <= 1024:
         raise InvalidValue(f"threads is {threads}; valid: 1 to 1024.")
+    check_once(system, job.starts[0, : system.n], job.starts[0, system.n :], t_end)
     spaces: SimpleQueue[CompiledRun] = SimpleQueue()
     for _ in range(count):
         spaces.put(_space(system, job, settings))

@@ -11,6 +11,7 @@ from crossbody.cases import SceneError, UnknownName
 from crossbody.cases._arrays import frozen
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
+from crossbody.reference.linear._analytic import check_analytic
 from crossbody.reference.linear._derivatives import Derivatives, Point, derivatives
 from crossbody.reference.linear._model import LinearModel
 
@@ -74,7 +75,8 @@ def point(
     """Where to linearise, checked.
 
     Raises:
-        SceneError: for a state of another shape, rows that do not exist, or rows that collide without being on.
+        SceneError: for a state of another shape, rows that do not exist, rows that collide without being on, or
+            kernels that are not analytic.
     """
     rows = np.flatnonzero(np.asarray(system.unilateral) == 0) if active is None else np.asarray(active, dtype=np.int64)
     if np.any(rows < 0) or np.any(rows >= system.nc) or len(np.unique(rows)) != len(rows):
@@ -84,11 +86,11 @@ def point(
     alpha = np.array(system.alpha)
     alpha[list(colliding)] = system.beta[list(colliding)]
     inputs: Floats = np.array(frozen("linearise", "u", np.zeros(system.inputs) if u is None else u, (system.inputs,)))
+    q, v = system.checked_state("q", q), system.checked_state("v", np.zeros(system.n) if v is None else v)
+    check_analytic(system, t, q, v, inputs)
     return Point(
-        system=system, t=t, q=system.checked_state("q", q),
-        v=system.checked_state("v", np.zeros(system.n) if v is None else v), u=inputs, active=rows.astype(np.int64),
-        alpha=alpha if len(colliding) else None,
-    )  # fmt: skip
+        system=system, t=t, q=q, v=v, u=inputs, active=rows.astype(np.int64), alpha=alpha if len(colliding) else None
+    )
 
 
 def _outputs(
