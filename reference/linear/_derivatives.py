@@ -157,9 +157,18 @@ def derivatives(at: Point) -> Derivatives:
         if k < 2 * n:
             slopes[:, k] = gaps(at, q, v).imag / STEP
     solved = -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
-    size = np.abs(np.linalg.inv(K)) @ np.abs(columns)
     return Derivatives(
         vd=vd, lam=lam, vd_x=solved[:n, : 2 * n], vd_u=solved[:n, 2 * n :], lam_x=solved[n:, : 2 * n],
         lam_u=solved[n:, 2 * n :], gap_x=slopes[:nc], rate_x=slopes[nc:],
-        size=size[:n],
+        size=_sizes(K, np.abs(columns), n),
     )  # fmt: skip
+
+
+def _sizes(K: Floats, columns: Floats, n: int) -> Floats:
+    """Sizes (n, ...) of the terms of -K^-1 columns: what moves freely, and what the rows take back of it."""
+    inverse, H = np.linalg.inv(K[:n, :n]), K[n:, :n]
+    pushed = inverse @ H.T
+    free = np.abs(inverse) @ columns[:n]
+    taken = np.abs(pushed @ np.linalg.inv(H @ pushed)) @ (np.abs(H) @ free + columns[n:])
+    sizes: Floats = free + taken
+    return sizes
