@@ -76,7 +76,7 @@ def _stuck(seed: int, kind: str) -> None:
     steps = np.diff(q[row - 60 : row + 1])
     if np.abs(steps[-10:].sum()) <= 10.0 * motion.grid or abs(steps[-10:].mean()) < 0.7 * np.abs(steps).max():
         return  # it does not move there, or comes to rest
-    if motion.v[row + length] == 0.0:
+    if np.abs(motion.v[row + length : row + length + 60]).min() < 0.05 * np.abs(motion.v).max():
         return  # it goes on with a rest, which begins with a jump then
     q[row : row + length] = q[row]
     found = [f for f in findings(motion, q) if f.check == "stuck"]
