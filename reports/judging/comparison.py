@@ -123,15 +123,17 @@ def check_names(case: Case) -> None:
         InvalidValue: for a limit that is negative or not a number.
     """
     from crossbody import engines
+    from crossbody.cases import _registry
 
     known = {*metrics.names(), "audit", "*", *(f"{name} ({part})" for name in SPLIT for part in PARTS)}
     for kind, named in (("claims", case.claims), ("limits", case.limits)):
         for name in (each.metric for each in named):
             if name not in known:
                 raise UnknownName(f"metric (in {kind} of {case.label})", name, known)
+    installed = {*engines.names(), *_registry.own_names(list(engines.__path__))}
     for limit in case.limits:
-        if limit.engine not in ("*", *engines.names()):
-            raise UnknownName(f"engine (in limits of {case.label})", limit.engine, engines.names())
+        if limit.engine not in ("*", *installed):
+            raise UnknownName(f"engine (in limits of {case.label})", limit.engine, installed)
         if not (limit.value >= 0.0 and limit.known_size >= 0.0):
             raise InvalidValue(f"{case.label}: the limit of {limit.metric} is {limit.value}; it must be at least 0.")
 
