@@ -171,8 +171,9 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         return code
     s.steps += 1
     s.implicit_steps += s.method == IMPLICIT
-    if events.scan(K, s, m, w, b.mode) != 0:
-        return ILL_POSED
+    code = events.scan(K, s, m, w, b.mode)
+    if code != 0:
+        return int(code)
     fired = s.theta <= 1.0
     at_stop = s.t_old + s.hs >= s.stop - 4.0 * ULP * abs(s.stop)
     t = s.t_old + s.theta * s.hs if fired else (s.stop if at_stop else s.t_old + s.hs)

@@ -27,6 +27,7 @@ from crossbody.reference.core.layout import (
     COLLISION_SEPARATION,
     CONTACT,
     EDGE,
+    EXACT,
     FREE,
     ILL_POSED,
     LEVEL,
@@ -120,6 +121,8 @@ def multiplier_if_active(
                 lam = w.la[j]
     mode[i] = before
     activate(s, m, w, mode)
+    if s.method == EXACT and s.na > 0:  # the arc stands on the factor of its own rows
+        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL)
     return float(lam)
 
 
