@@ -19,7 +19,7 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes, Floats
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, clear, is_active, scatter
-from crossbody.reference.core.algebra import ULP, all_finite
+from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
 from crossbody.reference.core.layout import (
     BALLISTIC,
@@ -73,14 +73,41 @@ def _from_state(s: Any, w: Work, i: int) -> float:
 
 
 @inlined
+def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
+    """What the law of a row that came to rest makes of a gap that counts as closed and a rate that counts as none.
+
+    Frozen collisions leave such a row with any of both, so that its multiplier says less than this about what presses.
+    """
+    if s.frozen == 0 or not m.beta[i, 0] > 0.0:
+        return 0.0
+    return float(w.law[i, 0] * s.touch + w.law[i, 1] * slow(s))
+
+
+@inlined
 def noise(s: Any, m: Model, w: Work) -> None:
-    """What rounding of the state and of the sums can make of each multiplier."""
+    """What rounding of the state and of the sums, and what collisions left, can make of each multiplier."""
+    largest = 0.0
     for j in range(s.na):
         i = w.idx[j]
         G = 0.0
         for c in range(m.span[i, 0], m.span[i, 1]):
             G += w.H[j, c] * w.X[j, c]
         w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i)) / G
+        w.r[j] = _left_over(s, m, w, i)
+        largest = max(largest, w.r[j])
+    if largest > 0.0:
+        _spread_left_over(s, w)
+
+
+@inlined
+def _spread_left_over(s: Any, w: Work) -> None:
+    """Add to every row's noise the most that G^-1 r can be in it, whatever the signs: r in w.r; Cauchy and Schwarz."""
+    solve_schur(w.G, s.na, w.reach, w.r, w.Hdv)
+    size2 = 0.0
+    for j in range(s.na):
+        size2 += w.r[j] * w.Hdv[j]
+    for j in range(s.na):
+        w.noise[w.idx[j]] += np.sqrt(size2 * inverse_diagonal(w.G, s.na, w.reach, j, w.scale))
 
 
 @inlined
@@ -147,7 +174,7 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
         spring = (a0 + a2 * h * h) * h
         push += a1 * rate + spring
         size += a1 * abs(rate) + abs(spring)
-    return bool(-(push + w.Hdv[j]) > ROUNDING * size + _from_state(s, w, i))
+    return bool(-(push + w.Hdv[j]) > ROUNDING * size + _from_state(s, w, i) + _left_over(s, m, w, i))
 
 
 @inlined
