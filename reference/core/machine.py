@@ -153,6 +153,23 @@ def multiplier_if_active(
     return float(lam)
 
 
+@compiled
+def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """Square of what row i's joining or leaving the active rows changes v' by, in the norm of M: lam^2 / (G^-1)_ii."""
+    before = mode[i]
+    if not is_active(before):
+        mode[i] = active_mode(s, m, i)
+    activate(s, m, w, mode)
+    size = 0.0
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL) == 0:
+        for j in range(s.na):
+            if w.idx[j] == i:
+                size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
+    mode[i] = before
+    activate(s, m, w, mode)
+    return float(size)
+
+
 @inlined
 def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool:
     """Whether lam of row i would be positive: the rest of its law is negative with the others as they are.
