@@ -186,8 +186,9 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         return code
     s.steps += 1
     s.implicit_steps += s.method == IMPLICIT
-    if events.scan(K, s, m, w, b.mode) != 0:
-        return ILL_POSED
+    code = events.scan(K, s, m, w, b.mode)
+    if code != 0:
+        return int(code)
     if s.ng > 0 and not all_finite(w.guards[NODES - 1]):
         return NOT_FINITE
     fired = s.theta <= 1.0

@@ -19,7 +19,7 @@ from crossbody.reference.core.layout import Model, Work
 STAGES = 4
 LAST = np.int64(STAGES - 1)
 _A = np.array([[0.0, 0.0, 0.0], [1 / 2, 0.0, 0.0], [0.0, 3 / 4, 0.0], [2 / 9, 1 / 3, 4 / 9]])
-_C = np.array([0.0, 1 / 2, 3 / 4, 1.0])
+C = np.array([0.0, 1 / 2, 3 / 4, 1.0])
 _E = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
 
 
@@ -48,9 +48,9 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     begin_watch(K, s, m, w)
     for stage in range(1, STAGES):
         _advance(w.y, w.k, stage, h, w.ys)
-        if derivative(K, s, m, w, s.t + _C[stage] * h, w.ys, stage) != 0:
+        if derivative(K, s, m, w, s.t + C[stage] * h, w.ys, stage) != 0:
             return -1.0
-        watch_multipliers(s, w)
+        watch_multipliers(s, w, stage)
     copy(w.ys, w.y1)
     if s.ledger:
         _advance(w.z, w.kz, STAGES - 1, h, w.z1)

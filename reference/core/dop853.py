@@ -79,43 +79,30 @@ def _error(s: Any, w: Work, h: float) -> float:
 
 @inlined
 def begin_watch(K: Any, s: Any, m: Model, w: Work) -> None:
-    """Extremes of multipliers and gaps over the step, as far as its start tells."""
-    for i in range(s.nc):
-        w.lo[i] = w.hi[i] = w.lam0[i]
-        w.gap_lo[i] = w.gap_hi[i] = w.gaps[0, i]
+    """Guards of the discrete variables at the start of the step."""
     if s.ng > 0:
-        K.watch(s.t, w.y[: s.n], w.y[s.n :], m.p, w.guard)
-        for i in range(s.ng):
-            w.guard_lo[i] = w.guard_hi[i] = w.guard[i]
+        K.watch(s.t, w.y[: s.n], w.y[s.n :], m.p, w.guards[0])
 
 
 @inlined
-def watch_guards(K: Any, s: Any, m: Model, w: Work, t: float) -> None:
-    """Take the discrete variables' guards at a stage into the extremes."""
-    K.watch(t, w.ys[: s.n], w.ys[s.n :], m.p, w.guard)
-    for i in range(s.ng):
-        w.guard_lo[i] = min(w.guard_lo[i], w.guard[i])
-        w.guard_hi[i] = max(w.guard_hi[i], w.guard[i])
+def watch_guards(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
+    """Keep the discrete variables' guards at a stage."""
+    K.watch(t, w.ys[: s.n], w.ys[s.n :], m.p, w.guard_at[place])
 
 
 @inlined
-def watch_multipliers(s: Any, w: Work) -> None:
-    """Take the multipliers at a stage into the extremes: a free filter for events."""
-    lo, hi, la, idx = w.lo, w.hi, w.la, w.idx
+def watch_multipliers(s: Any, w: Work, stage: int) -> None:
+    """Keep the multipliers at a stage: a free filter for events."""
+    lam_at, la, idx = w.lam_at, w.la, w.idx
     for j in range(s.na):
-        i = idx[j]
-        lo[i] = min(lo[i], la[j])
-        hi[i] = max(hi[i], la[j])
+        lam_at[stage, idx[j]] = la[j]
 
 
 @inlined
-def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float) -> None:
-    """Take the gaps at a stage into the extremes."""
+def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
+    """Keep the gaps at a stage."""
     s.guards += 1
-    K.gaps(t, w.ys[: s.n], w.ys[s.n :], m.p, w.gap, w.rate)
-    for i in range(s.nc):
-        w.gap_lo[i] = min(w.gap_lo[i], w.gap[i])
-        w.gap_hi[i] = max(w.gap_hi[i], w.gap[i])
+    K.gaps(t, w.ys[: s.n], w.ys[s.n :], m.p, w.gap_at[place], w.rate)
 
 
 @compiled
@@ -127,12 +114,12 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
         t = s.t + C[stage] * h
         if derivative(K, s, m, w, t, w.ys, stage) != 0:
             return -1.0
-        watch_multipliers(s, w)
+        watch_multipliers(s, w, stage)
         if stage == 4 or stage == 8 or stage == 10:
             if s.na < s.nc:
-                watch_gaps(K, s, m, w, t)
+                watch_gaps(K, s, m, w, t, stage // 4 + stage // 10 - 1)
             if s.ng > 0:
-                watch_guards(K, s, m, w, t)
+                watch_guards(K, s, m, w, t, stage // 4 + stage // 10 - 1)
     _combine(w.y, w.k, STAGES, h, w.y1)
     if s.ledger:
         _combine(w.z, w.kz, STAGES, h, w.z1)

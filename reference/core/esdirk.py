@@ -205,11 +205,11 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
             s.full_jacobian = 1
             s.have_jacobian = 0
             return np.inf
-        watch_multipliers(s, w)
-        if s.na < s.nc:
-            watch_gaps(K, s, m, w, s.t + C[stage] * h)
-        if s.ng > 0:
-            watch_guards(K, s, m, w, s.t + C[stage] * h)
+        watch_multipliers(s, w, stage)
+        if s.na < s.nc and 2 <= stage <= 4:
+            watch_gaps(K, s, m, w, s.t + C[stage] * h, stage - 2)
+        if s.ng > 0 and 2 <= stage <= 4:
+            watch_guards(K, s, m, w, s.t + C[stage] * h, stage - 2)
     w.y1[:] = w.ys
     for i in range(s.nz):
         w.z1[i] = w.z[i]

@@ -8,23 +8,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
-from crossbody.reference.core import dense
+from crossbody.reference.core import bogacki, dense, dop853_table, esdirk
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
-from crossbody.reference.core.crossings import (
-    NEAR,
-    at_node,
-    by_nodes,
-    dip,
-    free_flight,
-    handed_over,
-    leave,
-    release,
-    touch,
-    touch_inside,
-)
+from crossbody.reference.core.flight import free_flight
 from crossbody.reference.core.guards import (
     CATCH,
     HANDOVER,
@@ -35,58 +26,68 @@ from crossbody.reference.core.guards import (
     SWITCH,
     TOUCH,
     TOUCH_INSIDE,
+    at_node,
     root,
 )
 from crossbody.reference.core.layout import (
     BALLISTIC,
+    BETWEEN,
     COLLISION,
     CONTACT,
     EDGE,
     EXACT,
+    EXPLICIT,
     FREE,
+    ILL_POSED,
+    IMPLICIT,
     LEVEL,
     NEVER,
     NODES,
+    NOT_FINITE,
+    SHORT,
     Model,
     Work,
 )
 from crossbody.reference.core.machine import active_mode, released_mode
+from crossbody.reference.core.search import first_below
+
+# What values at the stages say about the whole step (linear programming over all polynomials of a degree).
+STAGES_RANGE = 1.7  # degree 6 within a range at the stages of DOP853: how many times the range it may leave it by
+STAGES_OFF = 4.0  # the same, of what is off a parabola: 3.02 for degree 6, of ESDIRK 1.98 for degree 4
+GAPS_OFF = 0.2  # twice the most that x^2 (1 - x)^2 times a parabola of 1 at the three stages comes to
 
 
 @inlined
 def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """Earliest switching of row i under the level and the memoryless machine; its guard in kind[i]."""
+    other = NONE
     if mode[i] == FREE:
-        inside = w.gaps[0, i] <= s.touch
-        w.kind[i] = TOUCH_INSIDE if inside else TOUCH
-        return touch_inside(K, s, m, w, mode, i) if inside else touch(K, s, m, w, mode, i)
-    if is_active(mode[i]):
-        w.kind[i] = RELEASE
-        place = release(K, s, m, w, mode, i)
-        other = NEVER
+        kind = TOUCH_INSIDE if w.gaps[0, i] <= s.touch else TOUCH
+    elif is_active(mode[i]):
+        kind = RELEASE
         if s.fsm != LEVEL:
-            other = leave(K, s, m, w, mode, i)
+            other = LEAVE
         elif mode[i] == COLLISION:
-            other = handed_over(K, s, m, w, mode, i)
-        if other < place:
-            w.kind[i] = LEAVE if s.fsm != LEVEL else HANDOVER
-            return other
-        return place
-    w.kind[i] = LEAVE
-    place = leave(K, s, m, w, mode, i)
-    kind = CATCH if s.fsm == LEVEL else PRESS
-    if s.frozen and m.beta[i, 0] > 0.0:
-        kind = TOUCH_INSIDE  # it collides at once, whatever presses it
-    other = by_nodes(K, s, m, w, mode, kind, i)
-    if other < place:
-        w.kind[i] = kind
-        return other
+            other = HANDOVER
+    else:
+        kind = LEAVE
+        other = CATCH if s.fsm == LEVEL else PRESS
+        if s.frozen and m.beta[i, 0] > 0.0:
+            other = TOUCH_INSIDE  # it collides at once, whatever presses it
+    w.kind[i] = kind
+    place = first_below(K, s, m, w, mode, kind, i)
+    if other != NONE:
+        second = first_below(K, s, m, w, mode, other, i)
+        if not second >= place:  # NaN too
+            w.kind[i] = other
+            return second
     return place
 
 
 @inlined
 def _first_edge(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """The edge machine looks at the step's ends only, and only for what becomes true."""
+    w.bands[:] = 0.0
     last = NODES - 1
     h0, h1, r0, r1 = w.gaps[0, i], w.gaps[last, i], w.rates[0, i], w.rates[last, i]
     if mode[i] == FREE and h0 > 0.0 >= h1:
@@ -105,27 +106,99 @@ def _first_edge(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float
 
 
 @inlined
-def _near(low: float, high: float) -> bool:
-    """Whether a value that was seen between low and high can have come to zero."""
-    return bool(not low > NEAR * (high - low))
+def _stays_clear(start: float, middle: float, end: float, place: float, off: float) -> bool:
+    """Whether a function is positive in the step: the parabola through three of its values, less what it may be off."""
+    turn = (middle - (1.0 - place) ** 2 * start - place**2 * end) / (2.0 * place * (1.0 - place))
+    least, bend = min(start, end), start - 2.0 * turn + end
+    if turn < least and bend > 0.0:
+        least = start - (turn - start) ** 2 / bend if 0.0 <= start - turn <= bend else turn
+    return bool(least > STAGES_OFF * off)
+
+
+@inlined
+def _presses_on(s: Any, w: Work, i: int) -> bool:
+    """Whether the multiplier of an active row stays positive, as far as the stages tell."""
+    last, middle = NODES - 1, 9 if s.method == EXPLICIT else 1
+    start, end = w.lams[0, i], w.lams[last, i]
+    low, high = min(start, end), max(start, end)
+    for stage in range(1, s.end):
+        low, high = min(low, w.lam_at[stage, i]), max(high, w.lam_at[stage, i])
+    if not low > 0.0 or low > STAGES_RANGE * (high - low):
+        return bool(low > 0.0)
+    off, half = 0.0, w.lam_at[middle, i]
+    for stage in range(1, s.end):
+        c = _stage_place(s, stage)
+        off = max(off, abs(w.lam_at[stage, i] - _parabola(start, half, end, _stage_place(s, middle), c)))
+    return _stays_clear(start, half, end, _stage_place(s, middle), off)
+
+
+@inlined
+def _parabola(start: float, middle: float, end: float, place: float, c: float) -> float:
+    """Value at c of the parabola through three values, of which the second stands at `place`."""
+    return float(
+        start * (c - place) * (c - 1.0) / place
+        + middle * c * (c - 1.0) / (place * (place - 1.0))
+        + end * c * (c - place) / (1.0 - place)
+    )
+
+
+@inlined
+def _stage_place(s: Any, stage: int) -> float:
+    """Where a stage of the method stands in the step."""
+    if s.method == EXPLICIT:
+        return float(dop853_table.C[stage])
+    return float(esdirk.C[stage]) if s.method == IMPLICIT else float(bogacki.C[stage])
+
+
+@inlined
+def _between(s: Any, place: int) -> float:
+    """Where the stage stands at which gaps and guards were looked at."""
+    if s.method == EXPLICIT:
+        return _stage_place(s, 4 * place + 4 - 2 * (place // 2))
+    return _stage_place(s, place + 2)
+
+
+@inlined
+def _stays_open(s: Any, w: Work, i: int) -> bool:
+    """Whether a gap stays positive: the cubic through its ends and slopes, less what three stages are off it.
+
+    What is off is x^2 (1 - x)^2 times a parabola, if the gap has degree six.
+    """
+    last = NODES - 1
+    h0, h1 = w.gaps[0, i], w.gaps[last, i]
+    c0, c1 = h0 + s.hs / 3.0 * w.rates[0, i], h1 - s.hs / 3.0 * w.rates[last, i]
+    low = min(h0, h1, c0, c1)
+    if not low > 0.0 or s.method == SHORT:
+        return bool(low > max(h0, h1, c0, c1) - low)
+    off = 0.0
+    for place in range(BETWEEN):
+        c = _between(s, place)
+        d = 1.0 - c
+        cubic = d * d * (d * h0 + 3.0 * c * c0) + c * c * (3.0 * d * c1 + c * h1)
+        off = max(off, abs(w.gap_at[place, i] - cubic) / (c * d) ** 2)
+    return bool(low > GAPS_OFF * off)
 
 
 @inlined
 def _watched(s: Any, w: Work, mode: Bytes, i: int) -> bool:
-    """Whether a row can switch in this step: its gap, or its multiplier, came near zero against what it varied.
+    """Whether a row may switch in this step, by bounds from what the stages have evaluated anyway."""
+    if s.method == EXACT or s.fsm != LEVEL or (mode[i] != FREE and mode[i] != CONTACT):
+        return True
+    return not (_stays_open(s, w, i) if mode[i] == FREE else _presses_on(s, w, i))
 
-    It is judged by the extremes at the stages.
-    """
+
+@inlined
+def _switch_watched(s: Any, w: Work, i: int) -> bool:
+    """Whether the guard of a discrete variable may fire in this step."""
     if s.method == EXACT:
         return True
-    if s.fsm != LEVEL or (mode[i] != FREE and mode[i] != CONTACT):
-        return True
-    last = NODES - 1
-    if mode[i] == FREE:
-        low, high, end = w.gap_lo[i], w.gap_hi[i], w.gaps[last, i]
-    else:
-        low, high, end = w.lo[i], w.hi[i], w.lams[last, i]
-    return _near(min(low, end), max(high, end))
+    start, end = w.guards[0, i], w.guards[NODES - 1, i]
+    if s.method == SHORT:
+        return not min(start, end) > abs(end - start)
+    off, half, middle = 0.0, w.guard_at[1, i], _between(s, 1)
+    for place in range(BETWEEN):
+        off = max(off, abs(w.guard_at[place, i] - _parabola(start, half, end, middle, _between(s, place))))
+    return not _stays_clear(start, half, end, middle, off)
 
 
 @inlined
@@ -146,40 +219,24 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
 
 
 @inlined
-def _first_switch(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
-    """First fall to zero of a discrete variable's guard; one that starts below zero is not armed until it has risen."""
-    for node in range(NODES - 1):
-        a, b = at_node(node), at_node(node + 1)
-        ga, gb = w.guards[node, i], w.guards[node + 1, i]
-        if ga > 0.0 and not gb > 0.0:
-            return root(K, s, m, w, mode, SWITCH, i, a, ga, b, gb)
-        if node + 2 < NODES and ga > 0.0 and gb > 0.0:
-            place, value = dip(K, s, m, w, mode, SWITCH, i, node, ga, gb, w.guards[node + 2, i])
-            if value < 0.0:
-                left, g_left = (a, ga) if place <= b else (b, gb)
-                return root(K, s, m, w, mode, SWITCH, i, left, g_left, place, value)
-    return NEVER
-
-
-@inlined
 def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
-    """Take the discrete variables' guards into s.theta; 1 if ill posed."""
+    """Take the discrete variables' guards into s.theta; 0 or a negative code."""
     watched = False
     K.watch(s.t_old + s.hs, w.y1[: s.n], w.y1[s.n :], m.p, w.guards[NODES - 1])
     for i in range(s.ng):
-        end = w.guards[NODES - 1, i]
-        low, high = min(w.guard_lo[i], end), max(w.guard_hi[i], end)
         w.guard_hit[i] = NEVER
-        watched = watched or s.method == EXACT or _near(low, high)
+        watched = watched or _switch_watched(s, w, i)
     if not watched:
         return 0
     if dense.prepare(K, s, m, w) != 0:
-        return 1
+        return ILL_POSED
     for node in range(NODES - 1):
         dense.state(s, m, w, at_node(node), w.ys)
         K.watch(s.t_old + at_node(node) * s.hs, w.ys[: s.n], w.ys[s.n :], m.p, w.guards[node])
     for i in range(s.ng):
-        w.guard_hit[i] = _first_switch(K, s, m, w, mode, i)
+        w.guard_hit[i] = first_below(K, s, m, w, mode, SWITCH, i)
+        if np.isnan(w.guard_hit[i]):
+            return NOT_FINITE
         s.theta = min(s.theta, w.guard_hit[i])
     return 0
 
@@ -197,10 +254,12 @@ def _all_free(s: Any, m: Model, mode: Bytes) -> bool:
 
 @compiled
 def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
-    """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 1 if ill posed."""
+    """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 0 or a negative code."""
     s.theta = NEVER
-    if s.ng > 0 and _scan_switches(K, s, m, w, mode) != 0:
-        return 1
+    if s.ng > 0:
+        code = _scan_switches(K, s, m, w, mode)
+        if code != 0:
+            return int(code)
     any_gap, any_multiplier = False, False
     hit, kind, unilateral, follows = w.hit, w.kind, m.unilateral, m.follows
     for i in range(s.nc):
@@ -223,13 +282,15 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             _tie(s, w)
         return 0
     if dense.prepare(K, s, m, w) != 0 or _fill_nodes(K, s, m, w, any_multiplier) != 0:
-        return 1
+        return ILL_POSED
     for i in range(s.nc):
         if w.hit[i] == 1.0:
             if s.fsm == EDGE:
                 w.hit[i] = _first_edge(K, s, m, w, mode, i)
             else:
                 w.hit[i] = _first(K, s, m, w, mode, i)
+            if np.isnan(w.hit[i]):
+                return NOT_FINITE
             s.theta = min(s.theta, w.hit[i])
     if s.theta <= 1.0:
         _tie(s, w)

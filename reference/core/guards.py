@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes
+from crossbody.reference._kinds import Array, Bytes
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.layout import MEMORYLESS, Model, Work
+from crossbody.reference.core.layout import MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, slow
 
-# Guards: each is positive until it fires.
-NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, RATE, RATE_DOWN, SWITCH = np.arange(11)
-HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT (spec 1.2)
+# Guards: each fires where all of its functions are below zero.
+NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH = np.arange(9)
+FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1])
+HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
 
 
 @inlined
@@ -31,25 +32,22 @@ def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
 
 
 @inlined
-def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
+def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> None:
     """Elastic part c |h'| + b0 |h| less eps lam_i / (G^-1)_ii: positive while the elastic part of lam still counts.
 
     c is b1, but at least sqrt(b0): with b1 alone a weakly damped collision would be spent at each passage of h
-    through zero, one without damping at its touch.
+    through zero, one without damping at its touch. With either sign for either absolute value it is four smooth
+    functions, of which the largest counts.
     """
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], GENERAL) != 0:
-        return np.nan
-    for j in range(s.na):
-        if w.idx[j] == i:
-            elastic = max(w.law[i, 1], np.sqrt(w.law[i, 0])) * abs(w.hda[j]) + w.law[i, 0] * abs(w.ha[j])
-            return float(elastic - HANDOVER_PART * w.la[j] / inverse_diagonal(w.G, s.na, w.reach, j, w.scale))
-    return np.nan
-
-
-@inlined
-def dead_band(s: Any, w: Work, i: int) -> float:
-    """What a multiplier may fall below zero before a row without memory, which may press again at once, lets go."""
-    return float(w.noise[i]) if s.fsm == MEMORYLESS else 0.0
+    elastic, spring, inertial = np.nan, 0.0, 0.0
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], GENERAL) == 0:
+        for j in range(s.na):
+            if w.idx[j] == i:
+                elastic = max(w.law[i, 1], np.sqrt(w.law[i, 0])) * w.hda[j]
+                spring = w.law[i, 0] * w.ha[j]
+                inertial = HANDOVER_PART * w.la[j] / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
+    w.parts[0], w.parts[1] = elastic + spring - inertial, elastic - spring - inertial
+    w.parts[2], w.parts[3] = spring - elastic - inertial, -elastic - spring - inertial
 
 
 @inlined
@@ -58,9 +56,25 @@ def rise(s: Any) -> float:
     return float(s.touch) if s.fsm == MEMORYLESS else 0.0
 
 
+@inlined
+def arm(s: Any, w: Work, kind: int, i: int) -> None:
+    """Where the functions of a guard count as zero: at zero if they start clearly off it, else beyond what is noise.
+
+    A rate, or a multiplier, that starts as zero but for rounding would fire on it. One that was clear of it is located
+    at its true zero.
+    """
+    w.bands[:] = 0.0
+    if kind == RELEASE and (s.fsm == MEMORYLESS or abs(w.lams[0, i]) <= w.noise[i]):
+        w.bands[0] = w.noise[i]  # a row without memory may press again at once
+    elif kind == TOUCH_INSIDE and abs(w.rates[0, i]) <= slow(s):
+        w.bands[1] = slow(s)
+    elif kind == CATCH and abs(w.rates[0, i]) <= slow(s):
+        w.bands[0] = slow(s)
+
+
 @compiled
-def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> float:
-    """Value of one guard at the part theta of the step."""
+def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> None:
+    """The functions of one guard at the part theta of the step, into w.parts."""
     s.guards += 1
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
@@ -68,29 +82,105 @@ def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, the
     if kind in (RELEASE, HANDOVER):
         dense.put_on_rows(K, s, m, w, theta, w.ys)
     if kind == RELEASE:
-        return _multiplier(K, s, m, w, i, t) + dead_band(s, w, i)
-    if kind == HANDOVER:
-        return _handover(K, s, m, w, i, t)
-    if kind == SWITCH:
+        w.parts[0] = _multiplier(K, s, m, w, i, t)
+    elif kind == HANDOVER:
+        _handover(K, s, m, w, i, t)
+    elif kind == SWITCH:
         K.watch(t, q, v, m.p, w.guard)
-        return float(w.guard[i])
-    if kind == PRESS:
+        w.parts[0] = w.guard[i]
+    elif kind == PRESS:
         lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
-        return float(w.noise[i] - lam)
-    K.gaps(t, q, v, m.p, w.gap, w.rate)
-    h, rate = w.gap[i], w.rate[i]
-    if kind == TOUCH:
-        return float(h)
-    if kind == LEAVE:
-        return float(rise(s) - h)
-    if kind == RATE:
-        return float(-rate)
-    if kind == RATE_DOWN:
-        return float(rate)
-    closing = rate + slow(s)
-    if kind == TOUCH_INSIDE:
-        return float(max(h - s.touch, closing))
-    return float(max(closing, -multiplier_if_active(K, s, m, w, mode, i, t, q, v)))
+        w.parts[0] = w.noise[i] - lam
+    else:
+        K.gaps(t, q, v, m.p, w.gap, w.rate)
+        h, rate = w.gap[i], w.rate[i]
+        if kind == TOUCH:
+            w.parts[0] = h
+        elif kind == LEAVE:
+            w.parts[0] = rise(s) - h
+        elif kind == TOUCH_INSIDE:
+            w.parts[0], w.parts[1] = h - s.touch, rate
+        else:
+            w.parts[0] = rate
+            w.parts[1] = -multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+    for j in range(FUNCTIONS[kind]):
+        w.parts[j] += w.bands[j]
+
+
+@inlined
+def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> float:
+    """Value of one guard at the part theta of the step: positive until it fires."""
+    functions(K, s, m, w, mode, kind, i, theta)
+    return largest(w, FUNCTIONS[kind])
+
+
+@inlined
+def largest(w: Work, count: int) -> float:
+    """The largest of a guard's functions."""
+    value = w.parts[0]
+    for j in range(1, count):
+        value = max(value, w.parts[j])
+    return float(value)
+
+
+@inlined
+def _rounding(s: Any, w: Work) -> float:
+    """What rounding of the positions makes of a gap."""
+    largest = 0.0
+    for a in range(s.n):
+        largest = max(largest, abs(w.y[a]))
+    return 8.0 * ULP * largest
+
+
+@inlined
+def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, row: Array) -> float:
+    """A guard's functions at the nodes, and in w.tiny what rounding makes of them.
+
+    Returns:
+        The first function's derivative over the rate of the gap; 0 if it is none of the gap.
+    """
+    arm(s, w, kind, i)
+    w.tiny[:] = 0.0
+    scale = 0.0
+    if kind in (TOUCH, TOUCH_INSIDE, LEAVE):
+        scale = -s.hs if kind == LEAVE else s.hs
+        w.tiny[0], w.tiny[1] = _rounding(s, w), 8.0 * ULP * s.speed
+    elif kind == RELEASE:
+        w.tiny[0] = w.noise[i]
+    elif kind == CATCH:
+        w.tiny[0] = 8.0 * ULP * s.speed
+    for node in range(NODES):
+        if kind in (TOUCH, TOUCH_INSIDE):
+            row[node] = w.gaps[node, i] - (s.touch if kind == TOUCH_INSIDE else 0.0)
+            row[NODES + node] = w.rates[node, i] + w.bands[1]
+        elif kind == LEAVE:
+            row[node] = rise(s) - w.gaps[node, i]
+        elif kind == RELEASE:
+            row[node] = w.lams[node, i] + w.bands[0]
+        elif kind == SWITCH:
+            row[node] = w.guards[node, i]
+        else:
+            functions(K, s, m, w, mode, kind, i, at_node(node))
+            for j in range(FUNCTIONS[kind]):
+                row[j * NODES + node] = w.parts[j]
+    if kind != SWITCH:  # it may stay below zero after it has fired, and fires again once it has risen
+        _lift(row, FUNCTIONS[kind])
+    return float(scale)
+
+
+@inlined
+def _lift(row: Array, count: int) -> None:
+    """Let a guard that starts below zero start at zero: it fires if it falls from there."""
+    most = 0
+    for j in range(1, count):
+        most = j if row[j * NODES] > row[most * NODES] else most
+    row[most * NODES] = max(row[most * NODES], 0.0)
+
+
+@inlined
+def at_node(node: int) -> float:
+    """Place of a node in the step, 0 to 1."""
+    return node / (NODES - 1.0)
 
 
 @compiled

@@ -23,6 +23,10 @@ EXPLICIT, IMPLICIT, EXACT, SHORT = 0, 1, 2, 3
 FREE, CONTACT, BALLISTIC, COLLISION, COLLISION_SEPARATION, BILATERAL = 0, 1, 2, 3, 4, 5
 
 NODES = 5  # a step is watched at its ends and at three points between
+STAGES_MOST = 12  # of any method, the start counted
+BETWEEN = 3  # stages at which gaps and guards are looked at
+WINDOW_LEVELS = 26  # times that a step is halved in search of an event, and once: a dip as narrow is rounding
+FUNCTIONS_MOST = 4  # that make up one guard
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
 STATE = np.dtype(
@@ -184,10 +188,8 @@ class Work:
     no_law: Floats2  # (nc, 3) zeros: the rows' law taken away
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
-    lo: Floats  # least and largest multiplier seen at the stages
-    hi: Floats
-    gap_lo: Floats  # the same of every gap, at three of the stages
-    gap_hi: Floats
+    lam_at: Floats2  # (12, nc) multipliers at the stages, 0 left out
+    gap_at: Floats2  # (3, nc) gaps at three of the stages
     gap: Floats
     rate: Floats
     gaps: Floats2  # (5, nc) at the nodes of the step
@@ -203,10 +205,13 @@ class Work:
     g: Floats
     discrete: Floats  # (nd,) discrete variables before a switch
     guard: Floats  # (ng,) guards of the discrete variables
-    guard_lo: Floats
-    guard_hi: Floats
+    guard_at: Floats2  # (3, ng) at three of the stages
     guards: Floats2  # (5, ng) at the nodes of the step
     guard_hit: Floats
+    window: Floats2  # (26, 24) intervals of a search, each half of the one before: functions at five places, bounds
+    parts: Floats  # (4,) functions of a guard
+    bands: Floats  # (4,) below which they count as zero
+    tiny: Floats  # (4,) closer than which they are not told apart
     idx: Index  # active rows
     reach: Index  # first column of each row of the Schur complement's factor
     ends: Index  # largest column past an active row and all before it
@@ -232,7 +237,10 @@ def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: i
         **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
-        **dict.fromkeys(("guard", "guard_lo", "guard_hi", "guard_hit"), (ng,)),
+        "lam_at": (STAGES_MOST, nc), "gap_at": (BETWEEN, nc), "guard_at": (BETWEEN, ng),
+        "window": (WINDOW_LEVELS, FUNCTIONS_MOST * (NODES + 1)),
+        **dict.fromkeys(("parts", "bands", "tiny"), (FUNCTIONS_MOST,)),
+        **dict.fromkeys(("guard", "guard_hit"), (ng,)),
         "guards": (NODES, ng), "discrete": (nd,),
     }  # fmt: skip
     types = {"Index": np.int64, "Bytes": np.int8}

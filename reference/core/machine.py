@@ -19,7 +19,7 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes, Floats
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, clear, is_active, scatter
-from crossbody.reference.core.algebra import ULP, all_finite
+from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
 from crossbody.reference.core.layout import (
     BALLISTIC,
@@ -27,6 +27,7 @@ from crossbody.reference.core.layout import (
     COLLISION_SEPARATION,
     CONTACT,
     EDGE,
+    EXACT,
     FREE,
     ILL_POSED,
     LEVEL,
@@ -72,14 +73,41 @@ def _from_state(s: Any, w: Work, i: int) -> float:
 
 
 @inlined
+def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
+    """What the law of a row that came to rest makes of a gap that counts as closed and a rate that counts as none.
+
+    Frozen collisions leave such a row with any of both, so that its multiplier says less than this about what presses.
+    """
+    if s.frozen == 0 or not m.beta[i, 0] > 0.0:
+        return 0.0
+    return float(w.law[i, 0] * s.touch + w.law[i, 1] * slow(s))
+
+
+@inlined
 def noise(s: Any, m: Model, w: Work) -> None:
-    """What rounding of the state and of the sums can make of each multiplier."""
+    """What rounding of the state and of the sums, and what collisions left, can make of each multiplier."""
+    largest = 0.0
     for j in range(s.na):
         i = w.idx[j]
         G = 0.0
         for c in range(m.span[i, 0], m.span[i, 1]):
             G += w.H[j, c] * w.X[j, c]
         w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i)) / G
+        w.r[j] = _left_over(s, m, w, i)
+        largest = max(largest, w.r[j])
+    if largest > 0.0:
+        _spread_left_over(s, w)
+
+
+@inlined
+def _spread_left_over(s: Any, w: Work) -> None:
+    """Add to every row's noise the most that G^-1 r can be in it, whatever the signs: r in w.r; Cauchy and Schwarz."""
+    solve_schur(w.G, s.na, w.reach, w.r, w.Hdv)
+    size2 = 0.0
+    for j in range(s.na):
+        size2 += w.r[j] * w.Hdv[j]
+    for j in range(s.na):
+        w.noise[w.idx[j]] += np.sqrt(size2 * inverse_diagonal(w.G, s.na, w.reach, j, w.scale))
 
 
 @inlined
@@ -120,7 +148,26 @@ def multiplier_if_active(
                 lam = w.la[j]
     mode[i] = before
     activate(s, m, w, mode)
+    if s.method == EXACT and s.na > 0:  # the arc stands on the factor of its own rows
+        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL)
     return float(lam)
+
+
+@compiled
+def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
+    """Square of what row i's joining or leaving the active rows changes v' by, in the norm of M: lam^2 / (G^-1)_ii."""
+    before = mode[i]
+    if not is_active(before):
+        mode[i] = active_mode(s, m, i)
+    activate(s, m, w, mode)
+    size = 0.0
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL) == 0:
+        for j in range(s.na):
+            if w.idx[j] == i:
+                size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
+    mode[i] = before
+    activate(s, m, w, mode)
+    return float(size)
 
 
 @inlined
@@ -144,7 +191,7 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
         spring = (a0 + a2 * h * h) * h
         push += a1 * rate + spring
         size += a1 * abs(rate) + abs(spring)
-    return bool(-(push + w.Hdv[j]) > ROUNDING * size + _from_state(s, w, i))
+    return bool(-(push + w.Hdv[j]) > ROUNDING * size + _from_state(s, w, i) + _left_over(s, m, w, i))
 
 
 @inlined

@@ -4,35 +4,76 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference._cache import compiled, inlined
-from crossbody.reference.core.acceleration import GENERAL, accelerate
+from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.collisions import collide
 from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
 from crossbody.reference.core.layout import EDGE, FREE, LEVEL, LOST, MEMORYLESS, MODE_CYCLE, Buffers, Model, Work
-from crossbody.reference.core.machine import evaluate, next_mode, noise
+from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
 TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
+SAME_CHANGE = 1e-9  # part by which a change of v' must be larger to count as such: rounding does not choose
 SWITCH_ROUNDS = 32  # switches that follow one another at one instant
 
 
 @inlined
+def _want(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
+    """Where every row belongs by the mode set as it stands, into w.struck; of a machine that pivots, the first alone.
+
+    The level machine's active rows come first: what the others ask for overwrites the noise of these. The others pivot
+    by least index, as a complementarity problem is solved.
+    """
+    level = s.fsm == LEVEL
+    for i in range(s.nc):
+        w.struck[i] = b.mode[i]
+    for turn in range(2 if level else 1):
+        for i in range(s.nc):
+            now = b.mode[i]
+            apart = level and now == FREE and w.gap[i] > s.touch  # most rows: they stay so
+            later = level and is_active(now) != (turn == 0)
+            if not apart and not later and m.unilateral[i] and m.follows[i] < 0:
+                w.struck[i] = next_mode(K, s, m, w, b.mode, i)
+                if not level and w.struck[i] != now:
+                    return
+
+
+@inlined
+def _keep_strongest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
+    """Of the rows that want to switch let one: any that only changes its name, else the one that changes v' most."""
+    strongest, most = -1, -1.0
+    for i in range(s.nc):
+        if w.struck[i] != b.mode[i]:
+            size = np.inf
+            if is_active(b.mode[i]) or is_active(w.struck[i]):
+                size = change_of_acceleration(K, s, m, w, b.mode, i)
+            if size > most * (1.0 + SAME_CHANGE) or strongest < 0:
+                strongest, most = i, size
+    for i in range(s.nc):
+        if i != strongest:
+            w.struck[i] = b.mode[i]
+
+
+@inlined
 def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Switch every row that wants to (only the first one once all together repeated); how many did."""
+    """Switch every row that wants to (only one once all together repeated); how many did.
+
+    All are judged before any is switched, so that the order of the rows does not matter.
+    """
     count = 0
     changed = b.history[len(b.history) - 1]
+    _want(K, s, m, w, b)
+    if s.one_by_one and s.fsm == LEVEL:
+        _keep_strongest(K, s, m, w, b)
     for i in range(s.nc):
-        apart = s.fsm == LEVEL and b.mode[i] == FREE and w.gap[i] > s.touch  # most rows: they stay so
-        if not apart and m.unilateral[i] and m.follows[i] < 0:
-            after = next_mode(K, s, m, w, b.mode, i)
-            if after != b.mode[i]:
-                move(s, b, i, after)
-                changed[i] = 1
-                count += 1
-                if s.one_by_one or s.fsm != LEVEL:
-                    break
+        if w.struck[i] != b.mode[i]:
+            move(s, b, i, w.struck[i])
+            changed[i] = 1
+            count += 1
     return count
 
 

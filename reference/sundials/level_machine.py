@@ -26,6 +26,7 @@ from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 SLOW, DEEP = 1e-9, 1e-9
 SAME_INSTANT = 8.0 * ULP
 SIDES = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))  # |x| + |y| <= z: so for each choice of signs
+SAME_CHANGE = 1e-9  # part by which a change of v' must be larger to count as such
 
 
 class Watch(IntEnum):
@@ -205,21 +206,19 @@ class LevelMachine:
         return view
 
     def _switch_rows(self, t: float, q: Floats, v: Floats) -> View:
-        """All rows together, and one at a time once a mode set has repeated."""
+        """All rows together, judged by one mode set; one at a time, the strongest, once a mode set has repeated."""
         changed: set[int] = set()
         self._repeats(t)
         while True:
             view = self.look(t, q, v)
-            count = 0
-            for i in self.rows:
-                after = self._wanted(i, view, t, q, v)
-                if after != self.modes[i]:
-                    self._switch(t, i, after)
-                    changed.add(i)
-                    count += 1
-                    if self._one_by_one:
-                        break
-            if count == 0:
+            wanted = {i: after for i in self.rows if (after := self._wanted(i, view, t, q, v)) != self.modes[i]}
+            if self._one_by_one and len(wanted) > 1:
+                strongest = self._strongest(wanted, t, q, v)
+                wanted = {strongest: wanted[strongest]}
+            for i, after in wanted.items():
+                self._switch(t, i, after)
+            changed.update(wanted)
+            if not wanted:
                 return view
             if self._repeats(t):
                 if self._one_by_one:
@@ -227,6 +226,32 @@ class LevelMachine:
                 self._one_by_one = True
                 self._seen.clear()
                 changed.clear()
+
+    def _strongest(self, wanted: dict[int, Mode], t: float, q: Floats, v: Floats) -> int:
+        """The row that changes v' most, first any that only changes its name: the order of rows does not choose."""
+        strongest, most = -1, -1.0
+        for i, after in wanted.items():
+            acts = self.modes[i] in ACTIVE or after in ACTIVE
+            size = self._change_of_acceleration(i, t, q, v) if acts else np.inf
+            if strongest < 0 or size > most * (1.0 + SAME_CHANGE):
+                strongest, most = i, size
+        return strongest
+
+    def _change_of_acceleration(self, i: int, t: float, q: Floats, v: Floats) -> float:
+        """Square of the difference that row i makes to v', in the norm of the mass matrix."""
+        found = []
+        for mode in (Mode.FREE, self.modes[i] if self.modes[i] in ACTIVE else self._active_mode(i)):
+            trial = list(self.modes)
+            trial[i] = mode
+            self._activate(trial)
+            try:
+                found.append(self.equations.accelerate(t, q, v)[0].copy())
+            except Ended:
+                return 0.0
+            finally:
+                self._activate(self.modes)
+        difference = found[1] - found[0]
+        return float(difference @ self.equations.terms(t, q, v)[0] @ difference)
 
     def fire(self, t: float, q: Floats, v: Floats, fired: Iterable[tuple[int, Watch]]) -> bool:
         """Apply what was located, never deciding it again from a value at round-off; whether anything switched."""
