@@ -34,6 +34,15 @@ def _slopes(K: Any, s: Any, m: Model, w: Work, t: float, y: Any, stage: int, lam
 
 
 @inlined
+def _highest(s: Any, w: Work, i: int) -> float:
+    """Largest multiplier of row i at the stages inside the step just taken by integration."""
+    high = w.lam_at[1, i]
+    for stage in range(2, s.end):
+        high = max(high, w.lam_at[stage, i])
+    return float(high)
+
+
+@inlined
 def _may_have_one(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> bool:
     """Whether any unilateral row may have a peak inside the step: by its stages, or by its slopes at the ends."""
     last, found, ends_high, starts_high = NODES - 1, False, False, False
@@ -41,7 +50,7 @@ def _may_have_one(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> bool:
         i = w.idx[j]
         w.peak[i] = NEVER
         if m.unilateral[i]:
-            inside = s.method == EXACT or w.hi[i] > max(w.lams[0, i], w.lams[last, i])
+            inside = s.method == EXACT or _highest(s, w, i) > max(w.lams[0, i], w.lams[last, i])
             w.peak[i] = 0.0 if inside else NEVER
             found = found or inside
             ends_high = ends_high or (not inside and w.lams[last, i] >= w.lams[0, i])
