@@ -29,7 +29,7 @@ CHILD = """
 import json, sys, time
 from pathlib import Path
 from crossbody import hw
-from crossbody.cases import LogFormatError
+from crossbody.cases import CrossbodyError
 
 def status(key):
     with open("/proc/self/status") as file:
@@ -48,7 +48,7 @@ for name in json.loads(sys.argv[1]):
             hw.read(path, columns, repair=("fill_dropped",))
         else:
             hw.survey(path)
-    except LogFormatError as error:
+    except CrossbodyError:
         told = ""
     print(json.dumps([name, told, status("VmHWM") - before, time.process_time() - begin]), flush=True)
 """
