@@ -227,8 +227,9 @@ class CompiledRun:
 
 
 def _books_everything(system: System) -> bool:
-    """Whether the system says what its energy is and what changes it; one without inputs may say nothing of power."""
-    return system.energy is not _none.energy and (system.power is not _none.power or system.inputs == 0)
+    """Whether the system says what its energy is and what changes it; one that nothing drives need not name a power."""
+    driven = system.inputs > 0 or system.switch is not None
+    return system.energy is not _none.energy and (system.power is not _none.power or not driven)
 
 
 def _dependence(system: System, active: Index, q: Floats, v: Floats) -> str:

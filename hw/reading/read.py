@@ -124,7 +124,8 @@ def read(
         InvalidValue: if the map tells runs apart and none was named, or the reverse; for repairs of a stored log.
     """
     path = Path(_arguments.path("log", path))
-    _arguments.real("limit", limit)
+    if limit is not None:
+        _arguments.real("limit", limit)
     if part is not None:
         _arguments.instance("part", part, int, "a whole number")
     if columns is not None and not isinstance(columns, Columns):
