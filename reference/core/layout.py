@@ -208,7 +208,7 @@ class Work:
     guard_at: Floats2  # (3, ng) at three of the stages
     guards: Floats2  # (5, ng) at the nodes of the step
     guard_hit: Floats
-    window: Floats2  # (26, 24) intervals of a search, each half of the one before: functions at five places, bounds
+    window: Floats2  # (26, 33) intervals of a search, each half of the one before: functions, bounds, slopes
     parts: Floats  # (4,) functions of a guard
     bands: Floats  # (4,) below which they count as zero
     tiny: Floats  # (4,) closer than which they are not told apart
@@ -238,7 +238,7 @@ def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: i
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
         "lam_at": (STAGES_MOST, nc), "gap_at": (BETWEEN, nc), "guard_at": (BETWEEN, ng),
-        "window": (WINDOW_LEVELS, FUNCTIONS_MOST * (NODES + 1)),
+        "window": (WINDOW_LEVELS, FUNCTIONS_MOST * (NODES + 2) + NODES),
         **dict.fromkeys(("parts", "bands", "tiny"), (FUNCTIONS_MOST,)),
         **dict.fromkeys(("guard", "guard_hit"), (ng,)),
         "guards": (NODES, ng), "discrete": (nd,),

@@ -9,12 +9,13 @@ encloses f; W vanishes at both ends, so a function that rises from zero is bound
 
     of a gap          known at the five places, where P' is compared with the rate; twice the largest bounds it for
                       degree seven, which a gap that is linear in q has on the dense output
-    of anything else  estimated by the decay of P's Chebyshev coefficients, on the whole step alone
-    in a half         measured where the half has its new places: an interval is halved as long as its bounds allow both
+    of anything else  estimated by the decay of P's Chebyshev coefficients on the whole step, and in a half by what was
+                      measured at its new places and how that has shrunk since the halving before
 
-An interval is left as soon as one function is bounded from below by zero; it holds the event if each function is below
-zero throughout or falls through zero once (its coefficients change sign once). Where the bounds are as close as the
-tolerance the polynomial is the function, and halving it evaluates nothing more: a pass closer than that is not decided.
+An interval is halved as long as its bounds allow both. It is left as soon as one function is bounded from below by
+zero; it holds the event if each function is below zero throughout or falls through zero once (its coefficients change
+sign once). Where the bounds are as close as rounding the polynomial is the function, and halving it evaluates nothing
+more: a pass closer than that is not decided.
 """
 
 from __future__ import annotations
@@ -56,8 +57,11 @@ FIFTH = 512.0  # leading coefficient of T5(2 x - 1)
 ABOVE, BELOW, FALLS, MIXED = 0, 1, 2, 3
 NOWHERE, HERE, HALVE = 0, 1, 2
 SAFETY = 2.0  # on a measured g
-FADING = 0.125  # part of an interval's g that its halves are held to have at least
-UNDECIDED = 0.1  # of the tolerance: bounds as close as this are taken for the function
+FIRST = 0.125  # part of g that is left in the first halves; then what was left before, but at least
+LEFT = 0.5**NODES  # what is left of it where the function is smooth
+BOUNDS = FUNCTIONS_MOST * NODES  # where in a line of the window they stand,
+MEASURED = BOUNDS + FUNCTIONS_MOST  # the g that was measured at the line's new places,
+RISES = MEASURED + FUNCTIONS_MOST  # and the slopes of a gap
 INTERVALS = 2000  # of one search; then halving ends, and places decide
 
 
@@ -65,7 +69,7 @@ INTERVALS = 2000  # of one search; then halving ends, and places decide
 def _sign(row: Array, j: int) -> int:
     """How function j of an interval lies to zero, as far as its bounds tell."""
     at = j * NODES
-    g = row[FUNCTIONS_MOST * NODES + j]
+    g = row[BOUNDS + j]
     fallen, again, lowest, highest = 0, False, 0, 0
     for k in range(NODES + 1):
         value = 0.0
@@ -108,29 +112,38 @@ def _decay(row: Array, at: int) -> float:
 
 
 @inlined
-def _from_rates(row: Array, at: int, rates: Array, scale: float) -> float:
-    """A bound on g from the slopes at the five places."""
+def _from_slopes(row: Array) -> float:
+    """A bound on g of a gap from its slopes at the five places."""
     most = 0.0
     for k in range(NODES):
         slope = 0.0
         for c in range(NODES):
-            slope += SLOPES[k, c] * row[at + c]
-        most = max(most, abs((scale * rates[k] - slope) / W_SLOPES[k]))
+            slope += SLOPES[k, c] * row[c]
+        most = max(most, abs((row[RISES + k] - slope) / W_SLOPES[k]))
     return float(SAFETY * most)
 
 
 @inlined
-def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int) -> None:
-    """The whole step: values at its nodes, bounds on g, and what is taken for zero."""
+def _bound(w: Work, row: Array, j: int, g: float) -> None:
+    """Keep the bound on g of function j; none where it is rounding."""
+    row[BOUNDS + j] = 0.0 if g * W_MOST <= w.tiny[j] else g
+
+
+@inlined
+def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int) -> float:
+    """The whole step: values at its nodes, bounds on g, what is taken for zero; the factor of the gap's rate."""
     row = w.window[0]
     scale = fill_step(K, s, m, w, mode, kind, i, row)
+    for c in range(NODES):
+        row[RISES + c] = scale * w.rates[c, i]
     for j in range(count):
         at, most = j * NODES, 0.0
         for c in range(NODES):
             most = max(most, abs(row[at + c]))
-        w.tiny[j] = max((UNDECIDED * s.rtol + 8.0 * ULP) * most, w.tiny[j])
-        g = _from_rates(row, at, w.rates[:, i], scale) if scale != 0.0 and j == 0 else _decay(row, at)
-        row[FUNCTIONS_MOST * NODES + j] = 0.0 if g * W_MOST <= w.tiny[j] else g
+        w.tiny[j] = max(8.0 * ULP * most, w.tiny[j])
+        row[MEASURED + j] = 0.0
+        _bound(w, row, j, _from_slopes(row) if scale != 0.0 and j == 0 else _decay(row, at))
+    return scale
 
 
 @inlined
@@ -139,39 +152,53 @@ def _opens(s: Any, w: Work, i: int) -> bool:
     row = w.window[0]
     for c in range(NODES):
         row[c] = w.rates[c, i]
-    row[FUNCTIONS_MOST * NODES] = _decay(row, 0)
+    row[BOUNDS] = _decay(row, 0)
     return _sign(row, 0) == ABOVE
 
 
 @inlined
-def _halve(
-    K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, level: int, place: int
-) -> None:  # fmt: skip
-    """Interval `place` of 2^level from the one around it: two new places."""
-    parent, row = w.window[level - 1], w.window[level]
-    half = place % 2
-    known, gs = True, FUNCTIONS_MOST * NODES
+def _inherit(parent: Array, row: Array, half: int, count: int) -> bool:
+    """Take over what the interval around knows of a half; whether its polynomials are the functions."""
+    known = True
     for j in range(count):
-        known = known and parent[gs + j] == 0.0
-        row[gs + j] = FADING * parent[gs + j]
+        known = known and parent[BOUNDS + j] == 0.0
+        row[MEASURED + j] = 0.0
         for c in range(3):
             row[j * NODES + 2 * c] = parent[j * NODES + 2 * half + c]
+    for c in range(3):
+        row[RISES + 2 * c] = 0.5 * parent[RISES + 2 * half + c]
+    return known
+
+
+@inlined
+def _halve(
+    K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, level: int, place: int, scale: float
+) -> None:  # fmt: skip
+    """Interval `place` of 2^level from the one around it: two new places.
+
+    How g shrinks is measured as well, since a function may be sharper than the step shows; of a gap the slopes tell.
+    """
+    parent, row, half = w.window[level - 1], w.window[level], place % 2
+    known = _inherit(parent, row, half, count)
     for c in range(2):
         at = 2 * half + c
         if not known:
             functions(K, s, m, w, mode, kind, i, (place + 0.25 + 0.5 * c) * 0.5**level)
+            row[RISES + 1 + 2 * c] = scale * 0.5**level * w.rate[i] if scale != 0.0 else 0.0
         for j in range(count):
             value = 0.0
             for b in range(NODES):
                 value += BETWEEN[at, b] * parent[j * NODES + b]
             if not known:
-                g = abs((w.parts[j] - value) / W_BETWEEN[at])
-                row[gs + j] = max(row[gs + j], SAFETY * g) if g == g else np.nan
+                row[MEASURED + j] = max(row[MEASURED + j], abs((w.parts[j] - value) / W_BETWEEN[at]))
                 value = w.parts[j]
             row[j * NODES + 1 + 2 * c] = value
     for j in range(count):
-        g = row[gs + j] * 0.5**NODES
-        row[gs + j] = 0.0 if g * W_MOST <= w.tiny[j] else g
+        left, before = FIRST, parent[MEASURED + j]
+        if before > 0.0:
+            left = min(max(row[MEASURED + j] / before, LEFT), 1.0)
+        g = _from_slopes(row) if scale != 0.0 and j == 0 else SAFETY * left * row[MEASURED + j]
+        _bound(w, row, j, 0.0 if known else g)
 
 
 @inlined
@@ -222,7 +249,7 @@ def first_below(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: in
     count = FUNCTIONS[kind]
     if kind == CATCH and _opens(s, w, i):
         return NEVER
-    _start(K, s, m, w, mode, kind, i, count)
+    scale = _start(K, s, m, w, mode, kind, i, count)
     level, place, seen = 0, 0, 0
     above = kind != SWITCH or w.window[0, 0] > 0.0
     while True:
@@ -244,4 +271,4 @@ def first_below(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: in
                 level, place = level - 1, place // 2
             if level == 0:
                 return NEVER
-        _halve(K, s, m, w, mode, kind, i, count, level, place)
+        _halve(K, s, m, w, mode, kind, i, count, level, place, scale)
