@@ -39,10 +39,10 @@ _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
 
 def start_row(system: System, q0: Floats, v0: Floats) -> Floats:
-    """The start as a row of a motion: t, q, v, gap, lam (0: none is known), energy (2,)."""
+    """The start as a row of a motion: t, q, v, gap, lam (NaN: none is known), energy (2,)."""
     energy = np.zeros(2)
     system.energy(q0, v0, np.array(system.p), energy)
-    return np.concatenate([[0.0], q0, v0, system.gap(q0, v0)[0], np.zeros(system.nc), energy])
+    return np.concatenate([[0.0], q0, v0, system.gap(q0, v0)[0], np.full(system.nc, np.nan), energy])
 
 
 class CompiledRun:

@@ -317,7 +317,8 @@ def test_a_ladder_ends_before_the_rung_that_takes_too_long(
         slow, "prepare", lambda case, profile, **s: SlowRun(case, profile, {"dt": 1e-3, "max_steps": 10**6} | s),
         raising=False,
     )  # fmt: skip
-    monkeypatch.setattr(engines, "load", lambda name: slow)
+    real = engines.load
+    monkeypatch.setattr(engines, "load", lambda name: slow if name == "fake" else real(name))
     case = cases.load("bouncing_ball", "linear", t_end=1.0)
     climbed = Ladder(case, Pick(engine="fake", profile="second"), Effort(longest=longest))
     found = []

@@ -30,7 +30,6 @@ from crossbody.reference.core.layout import (
     EXPLICIT,
     ILL_POSED,
     IMPLICIT,
-    INCONSISTENT,
     LOST,
     MODE_CYCLE,
     MORE,
@@ -200,12 +199,14 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         _remember_step(s, before)
         _move(s, w, t)
         code = _switch(K, s, m, w, b)
-        return INCONSISTENT if code == 0 and s.audited and not audit.closes_account(K, s, m, w) else code
+        return audit.account(K, s, m, w) if code == 0 and s.audited else code
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)
-    if s.audited and not audit.closes_account(K, s, m, w):
-        return INCONSISTENT
+    if s.audited:
+        code = audit.account(K, s, m, w)
+        if code != 0:
+            return code
     record.here(K, s, m, w, b.mode, b.out, b.modes)
     if s.method == EXPLICIT or s.method == IMPLICIT:
         choice.choose_method(s, w)

@@ -14,7 +14,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of
 from crossbody.reference.core.algebra import ULP
-from crossbody.reference.core.layout import Buffers, Model, Work
+from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
 
 CLOSE = 1e-9  # part of the terms behind a row's multiplier: rounding stays far below, and asks no further
 WRONG = 1e-6  # part of all terms of a row's law: more is no rounding, however ill-conditioned the rows are
@@ -92,8 +92,10 @@ def begin_account(K: Any, s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def closes_account(K: Any, s: Any, m: Model, w: Work) -> bool:
-    """Whether E(t) - E(0) = input - dissipated + work of all rows, within what the steps taken may have added.
+def account(K: Any, s: Any, m: Model, w: Work) -> int:
+    """Check E(t) - E(0) = input - dissipated + work of all rows, within what the steps taken may have added.
+
+    0, NOT_FINITE or INCONSISTENT.
 
     A step may move every coordinate by its tolerance. That changes the kinetic energy by at most 2 sqrt(T T'), T' that
     of the tolerances as velocities, and the potential energy by about rtol of its size.
@@ -109,4 +111,6 @@ def closes_account(K: Any, s: Any, m: Model, w: Work) -> bool:
     tolerance = s.rtol * s.energy_size + 2.0 * s.atol * np.sqrt(kinetic * s.energy_unit) + s.atol**2 * s.energy_unit
     s.energy_allowed += OPEN * np.sqrt(2.0 * n) * tolerance
     s.energy_open = kinetic + potential - s.energy_start - booked
-    return bool(abs(s.energy_open) <= s.energy_allowed)
+    if not np.isfinite(s.energy_open):
+        return NOT_FINITE
+    return 0 if abs(s.energy_open) <= s.energy_allowed else INCONSISTENT
