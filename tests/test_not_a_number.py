@@ -46,7 +46,9 @@ def _rate(t: float, q: Any, v: Any, p: Any, h: Any, hd: Any) -> None:
 @kernels.rows
 def _row(t: float, q: Any, v: Any, p: Any, w: Any, idx: Any, na: int, H: Any, h: Any, Hdv: Any) -> None:
     for j in range(na):
-        H[j, 0], h[j], Hdv[j] = 1.0, q[0], np.nan
+        H[j, 0], h[j], Hdv[j] = 1.0, q[0], 0.0
+        if q[0].real < LOW:
+            Hdv[j] = np.nan
 
 
 @kernels.energy
