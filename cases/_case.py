@@ -236,6 +236,8 @@ class Case:
         inputs: what acts from outside; None for nothing.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
+        consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
+            show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
         tight: tolerance at which the reference stands for the truth; larger where a stiff spring on a small mass makes
             rounding count before that (kp eps |q|/m against the tolerance of a velocity).
@@ -262,6 +264,7 @@ class Case:
     discrete: tuple[str, ...] = ()
     tight: float = 1e-13
     chaos: Chaos | None = None
+    consistent: bool = True
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:

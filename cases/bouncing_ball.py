@@ -135,5 +135,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         closed_form=Motion(ball, p["height"], -p["speed"], p["t_end"]) if linear else None,
         claims=claims,
         limits=limits(claims, bilateral, p["height"]),
+        consistent=not bilateral,  # its start is off the floor, and the law brings it down
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

@@ -103,6 +103,7 @@ class Reference:
             UnknownName: for a profile or setting that does not exist.
             CaseUnsupported: for a mechanism or a collision rule that is not there.
             InvalidValue: for a setting outside its range.
+            SceneError: for a kernel that is wrong, or a start off the rows that are always on (`Case.consistent`).
         """
         reason = self.why_not(case, profile)
         if reason is not None:
@@ -150,7 +151,9 @@ def _options(case: Case, solver: str, used: Mapping[str, Any]) -> Options:
     if given["fsm"] == OF_THE_CASE:
         given["fsm"] = case.fsm
     given["inputs"] = None if case.inputs is None else (case.inputs.times, case.inputs.values)
-    return Options(t_end=case.t_end, solver=solver, collisions=case.collisions, **given)
+    return Options(
+        t_end=case.t_end, solver=solver, collisions=case.collisions, consistent=case.consistent, **given
+    )  # fmt: skip
 
 
 def _provenance(used: Mapping[str, Any], options: Options) -> dict[str, Any]:

@@ -40,7 +40,36 @@ def debugging() -> bool:
     return os.environ.get("CROSSBODY_DEBUG", "") not in ("", "0")
 
 
-class Compiled(CPUDispatcher):  # type: ignore[misc]
+class Lean(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function that goes when nothing refers to it, and keeps no more than its machine code.
+
+    numba keeps every variable's type and value for `inspect_types`, in a list that outlives the function as long as
+    anything in it lives. A function that names kernels, and hangs on one of them, would hold itself.
+    """
+
+    def add_overload(self, cres: CompileResult) -> None:
+        """Take what was compiled."""
+        super().add_overload(cres._replace(type_annotation=""))
+
+
+def embedding(function: Callable[..., Any], signature: Any = None, *, nogil: bool = False) -> Any:
+    """Compile a function that names kernels as constants; it is not kept on disk.
+
+    Args:
+        function: in Python.
+        signature: compiled for at once; without it for that of the first call.
+        nogil: threads may run it side by side.
+    """
+    if numba_config.DISABLE_JIT:
+        return function
+    found = Lean(function, targetoptions={"nopython": True, "nogil": nogil})
+    if signature is not None:
+        found.compile(signature)
+        found.disable_compile()
+    return found
+
+
+class Compiled(Lean):
     """A function that is compiled when a signature is first asked for, or read back from the store.
 
     Args:

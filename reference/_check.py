@@ -13,18 +13,16 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.reference import kernels as kernel_types
 from crossbody.reference._guarded import GuardedCall, entry
-from crossbody.reference._kinds import Floats
+from crossbody.reference._kinds import Bytes, Floats
+from crossbody.reference._system import System, initial_modes
 from crossbody.reference.systems import _none
-
-if TYPE_CHECKING:
-    from crossbody.reference._system import System
 
 WIDTHS = (1e-3, 1e-4, 1e-5, 1e-6)  # of differences, in units of the coordinates
 AGREE = 1e-6  # part of the terms by which a difference may be off, beside what its widths tell
@@ -62,9 +60,9 @@ def check_kernels(
         SceneError: naming the kernel, the entry and both values.
     """
     draw = np.random.default_rng(seed)
-    p = _started(system, q0, v0)
+    p, _ = started(system, q0, v0)
     _check_filled(system, q0, v0, p)  # before any other call: what is written beyond an array must meet guard cells
-    first = _State(system, 0.0, q0, v0 + (1.0 + np.abs(v0)) * draw.standard_normal(system.n), p)
+    first = State(system, 0.0, q0, v0 + (1.0 + np.abs(v0)) * draw.standard_normal(system.n), p)
     _check_time(system, first, t_end, draw)
     seen = [first]
     for _ in range(states):
@@ -116,14 +114,14 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
             raise SceneError(f"Kernel rows gives {where} outside System.span, which is {np.asarray(s.span).tolist()}.")
 
 
-def _near(first: _State, v0: Floats, width: float, t_end: float, draw: Any) -> _State:
+def _near(first: State, v0: Floats, width: float, t_end: float, draw: Any) -> State:
     system, size = first.system, 1.0 + np.abs(first.q)
     q = first.q + width * size * draw.standard_normal(system.n)
     v = v0 + (1.0 + np.abs(v0)) * draw.standard_normal(system.n)
-    return _State(system, t_end * draw.uniform(), q, v, first.p)
+    return State(system, t_end * draw.uniform(), q, v, first.p)
 
 
-class _State:
+class State:
     """One state of a system and what its kernels give there."""
 
     def __init__(self, system: System, t: float, q: Floats, v: Floats, p: Floats) -> None:
@@ -154,6 +152,14 @@ class _State:
         h, hd = np.zeros(self.system.nc), np.zeros(self.system.nc)
         self.system.gaps(t, q, v, self.p, h, hd)
         return h, hd
+
+    def mass_matrix(self) -> Floats:
+        """M as one matrix (n, n)."""
+        k, n = self.system.mass_block, self.system.n
+        M = np.zeros((n, n))
+        for b in range(0, n, k):
+            M[b : b + k, b : b + k] = self.M[b : b + k]
+        return M
 
     def finite(self) -> bool:
         """Whether the state lies where the kernels are defined."""
@@ -266,19 +272,26 @@ class _State:
         return f" at t = {self.t:g} s, q = {self.q.tolist()}, v = {self.v.tolist()}"
 
 
-def _started(system: System, q: Floats, v: Floats) -> Floats:
-    """Parameters with the discrete state that `switch` gives them at the start."""
-    p, mode = np.array(system.p), np.zeros(system.nc, np.int8)
+def started(system: System, q: Floats, v: Floats, given: Floats | None = None) -> tuple[Floats, Bytes]:
+    """Return the parameters with their discrete state, and the modes of all rows, as `switch` leaves them at the start.
+
+    Args:
+        system: the mechanism.
+        q: positions (n,).
+        v: velocities (n,).
+        given: parameters before that; those of the system if not given.
+    """
+    p, mode = np.array(system.p if given is None else given), initial_modes(system)
     if system.switch is not None:
         constants = len(p) - np.size(system.discrete) - system.latched
         system.switch(0.0, q, v, p, mode, int(kernel_types.START))
-        changed = p[:constants] != np.asarray(system.p)[:constants]
+        changed = p[:constants] != np.asarray(system.p if given is None else given)[:constants]
         if np.any(changed):
             raise SceneError(f"Kernel switch writes {entry('p', changed)}, which is no discrete variable.")
-    return p
+    return p, mode
 
 
-def _compare(kernel: str, name: str, given: Floats, other: str, wanted: Floats, bound: Any, state: _State) -> None:
+def _compare(kernel: str, name: str, given: Floats, other: str, wanted: Floats, bound: Any, state: State) -> None:
     """Raise for the first entry that is off by more than the bound."""
     wrong = ~(np.abs(given - wanted) <= bound) & np.isfinite(wanted) & (bound < np.inf)
     if np.any(wrong):
@@ -294,7 +307,7 @@ def _best(function: Callable[[Floats], Floats], q: Floats, d: Floats, claimed: F
     return nearest
 
 
-def _check_constant(system: System, first: _State, other: _State) -> None:
+def _check_constant(system: System, first: State, other: State) -> None:
     """M, H and f are as constant as the system declares."""
     declared = "System.constant_mass" if system.constant_mass else "System.affine"
     if system.constant_mass or system.affine:
@@ -308,7 +321,7 @@ def _check_constant(system: System, first: _State, other: _State) -> None:
         _compare("dynamics", "f", other.f, text, first.f, EXACT * (np.abs(first.f).max() + 1e-300), other)
 
 
-def _check_time(system: System, first: _State, t_end: float, draw: Any) -> None:
+def _check_time(system: System, first: State, t_end: float, draw: Any) -> None:
     """Gaps depend on q alone: their second derivative has no term of a wall that moves by itself."""
     if not system.nc:
         return

@@ -7,23 +7,23 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import pairwise
 from queue import SimpleQueue
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases._arguments import instance
 from crossbody.cases._arrays import frozen
+from crossbody.reference._cache import embedding
 from crossbody.reference._check import check_once
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import Options, checked
-from crossbody.reference._program import address
+from crossbody.reference._program import address, kept_with_kernels
 from crossbody.reference._run import OUTCOMES, CompiledRun
+from crossbody.reference._start import check_starts
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core.layout import MORE, open_buffers, open_model, open_work
 
@@ -77,7 +77,8 @@ def ensemble(
         options: as in `Options`, without samples and events: nothing is recorded on the way.
 
     Raises:
-        SceneError: for an array of another shape, or if a kernel is wrong at the first start (`System.check`).
+        SceneError: for an array of another shape, if a kernel is wrong at the first start (`System.check`), or if a
+            start is off a row that is always on (`Options.consistent`).
         UnknownName: for a parameter or constant that the system does not have.
         InvalidValue: for an option or a number of threads outside its range.
     """
@@ -88,6 +89,7 @@ def ensemble(
     if not 1 <= count <= 1024:
         raise InvalidValue(f"threads is {threads}; valid: 1 to 1024.")
     check_once(system, job.starts[0, : system.n], job.starts[0, system.n :], t_end)
+    check_starts(system, job.starts, job.p, settings)
     spaces: SimpleQueue[CompiledRun] = SimpleQueue()
     for _ in range(count):
         spaces.put(_space(system, job, settings))
@@ -170,7 +172,7 @@ class _Job:
         )  # fmt: skip
 
 
-@cache
+@kept_with_kernels
 def _loop(functions: tuple[Any, ...]) -> Any:
     """The program over a range of runs, without the interpreter's lock."""
     advance = address()
@@ -199,4 +201,4 @@ def _loop(functions: tuple[Any, ...]) -> Any:
             out[r, 1:] = w.y
             counts[r, 0], counts[r, 1], counts[r, 2] = code, s.steps, s.events + s.dropped
 
-    return numba.njit(nogil=True)(runs)
+    return embedding(runs, nogil=True)

@@ -38,6 +38,9 @@ class Options:
         solver: "compiled", "ida" or "cvode".
         samples: times of the rows; None for every step and both sides of every event.
         inputs: (times, values) held from each time on; None for zero.
+        consistent: the start stands on the rows that are always on, h = 0 and H v = 0, up to 1000 times the tolerance
+            and rounding; one that does not is refused, and the nearest that does is offered (`System.project`). False
+            admits a start off its rows, which the law then brings back: h'' + a1 h' + a0 h + a2 h^3 = 0.
         ledger: keep the energy account.
         events: keep every event; without them (and with `samples`) memory does not grow with the number of bounces.
         shortcuts: closed-form arcs where the scene is affine.
@@ -57,6 +60,7 @@ class Options:
     solver: str = "compiled"
     samples: ArrayLike | None = None
     inputs: tuple[ArrayLike, ArrayLike] | None = None
+    consistent: bool = True
     ledger: bool = False
     events: bool = True
     shortcuts: bool = True
@@ -85,7 +89,7 @@ class Options:
         if math.isfinite(self.max_steps) and self.max_steps != int(self.max_steps):
             raise InvalidValue(f"max_steps is {self.max_steps!r}; it must be a whole number, or infinite.")
         within("time_limit", self.time_limit, 0.0, math.inf, open_low=True, infinite=True)
-        for name in ("ledger", "events", "shortcuts", "implicit"):
+        for name in ("consistent", "ledger", "events", "shortcuts", "implicit"):
             flag(name, getattr(self, name))
         if (
             not isinstance(self.index, (int, np.integer))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
+from sys import modules
 from typing import Any
 
 import numba
@@ -11,7 +12,7 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled
+from crossbody.reference._cache import compiled, embedding
 from crossbody.reference.core import advance as core
 from crossbody.reference.core._struct import TABLE
 from crossbody.reference.core.layout import STATE
@@ -58,7 +59,38 @@ def address() -> Address:
     return Address(program(), _signature())
 
 
-@cache
+KEPT = 16  # of what is built from one kernel: a few systems share it
+
+
+def kept_with_kernels(build: Callable[[tuple[Any, ...]], Any]) -> Callable[[tuple[Any, ...]], Any]:
+    """Keep what is built from a system's kernels as long as the kernels live, and no longer.
+
+    It holds the kernels, so that no weak reference would let them go: it hangs on one of them instead, one that is not
+    bound to a module for good, and goes with it.
+    """
+
+    @wraps(build)
+    def kept(functions: tuple[Any, ...]) -> Any:
+        owner = next((function for function in functions if not _permanent(function)), functions[0])
+        found: dict[Any, Any] = vars(owner).setdefault("kept", {})
+        key = (build.__module__, build.__name__, *map(id, functions))  # an id is a name as long as what has it lives
+        if key not in found:
+            built = build(functions)
+            while len(found) >= KEPT:
+                found.pop(next(iter(found)), None)
+            found[key] = built
+        return found[key]
+
+    return kept
+
+
+def _permanent(function: Any) -> bool:
+    """Whether a module holds it under its own name."""
+    home = modules.get(getattr(function, "__module__", None) or "")
+    return getattr(home, getattr(function, "__name__", ""), None) is function
+
+
+@kept_with_kernels
 def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """The program with one system's kernels built in.
 
@@ -72,4 +104,5 @@ def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
             dynamics, gaps, rows, energy, power, solve, control, watch, switch, state, model, work, buffers, budget
         )
 
-    return numba.njit([types.int64(_state(), TABLE, TABLE, TABLE, types.int64)])(call)  # type: ignore[no-any-return]
+    found: Callable[..., int] = embedding(call, types.int64(_state(), TABLE, TABLE, TABLE, types.int64))
+    return found

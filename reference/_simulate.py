@@ -10,6 +10,7 @@ from crossbody.cases import Trajectory
 from crossbody.cases._arguments import instance
 from crossbody.reference._check import check_once
 from crossbody.reference._options import Options, checked
+from crossbody.reference._start import check_start
 from crossbody.reference._system import System
 
 
@@ -21,13 +22,14 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
         q0: positions at the start (n,), finite.
         v0: velocities at the start (n,), finite.
         t_end: horizon, s, above 0.
-        options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples, ledger, ...
+        options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples, consistent, ledger, ...
 
     Returns:
         The motion. Numerical failure is its `outcome`, with place and state in `message`.
 
     Raises:
-        SceneError: if q0 or v0 has another shape or is not finite, or if a kernel is wrong there (`System.check`).
+        SceneError: if q0 or v0 has another shape or is not finite, if a kernel is wrong there (`System.check`), or if
+            the start is off a row that is always on (`Options.consistent`).
         InvalidValue, UnknownName: for an option outside what it admits.
     """
     run = prepare(system, q0, v0, checked(t_end, options))
@@ -40,6 +42,7 @@ def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> A
     instance("system", system, System, "a crossbody.reference.System")
     start = system.checked_state("q0", q0), system.checked_state("v0", v0)
     check_once(system, *start, options.t_end)
+    check_start(system, *start, options)
     if options.solver == "compiled":
         from crossbody.reference._run import CompiledRun
 

@@ -216,6 +216,26 @@ class System:
 
         check_kernels(self, *self._state(q, v), t_end=t_end, states=states)
 
+    def project(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats]:
+        """Put a state onto the rows that are always on, by the least change in the metric of M.
+
+        Positions by Newton's method, q - M^-1 H^T (H M^-1 H^T)^-1 h, until h = 0 up to rounding; velocities there,
+        v - M^-1 H^T (H M^-1 H^T)^-1 H v. Rows may depend on each other; one whose law has a1 alone holds no position.
+
+        Args:
+            q: positions (n,).
+            v: velocities (n,); zeros if not given.
+
+        Returns:
+            Positions (n,) and velocities (n,).
+
+        Raises:
+            SceneError: if no state on the rows is found from there.
+        """
+        from crossbody.reference._start import project
+
+        return project(self, *self._state(q, v))
+
     def checked_state(self, name: str, value: ArrayLike) -> Floats:
         """A copy of q0 or v0.
 

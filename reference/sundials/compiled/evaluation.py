@@ -15,14 +15,13 @@ from enum import IntEnum
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._cache import compiled, embedding, inlined
 from crossbody.reference._kinds import Array, Floats, Floats2, Index
-from crossbody.reference._program import Address
+from crossbody.reference._program import Address, kept_with_kernels
 from crossbody.reference._system import System
 from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
 
@@ -457,7 +456,7 @@ def _address() -> Address:
     return Address(compiled(evaluate, [signature]), signature)
 
 
-@cache
+@kept_with_kernels
 def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """`evaluate` with one system's kernels built in."""
     general = _address()
@@ -466,7 +465,8 @@ def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     def call(what, t, y, out, lines):  # type: ignore[no-untyped-def]
         return general(dynamics, gaps, rows, power, watch, what, t, y, out, lines)
 
-    return numba.njit([types.int64(*_ARGUMENTS)])(call)  # type: ignore[no-any-return]
+    found: Callable[..., int] = embedding(call, types.int64(*_ARGUMENTS))
+    return found
 
 
 def entry(system: System) -> Callable[..., int]:
