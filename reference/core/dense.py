@@ -76,7 +76,8 @@ def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> 
             i = w.idx[j]
             a0, a1 = w.law[i, 0], w.law[i, 1]
             h, hd = exact.linear_arc(a0, a1, w.gaps[0, i], w.rates[0, i], t)
-            w.r[j], w.hda[j] = h - w.ha[j], hd - w.hda[j]
+            # A law without a0 has no memory of a position: its gap may be anything, and only its rate is the law's.
+            w.r[j], w.hda[j] = h - w.ha[j] if a0 > 0.0 else 0.0, hd - w.hda[j]
             missing = max(missing, (a0 * abs(w.r[j]) + a1 * abs(w.hda[j])) / max(w.scale[j], 1e-300))
         if missing <= ARRIVED:
             return
