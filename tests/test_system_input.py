@@ -16,7 +16,7 @@ KERNELS = ball_kernels.KERNELS
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"n": 0}, ["System.n", "at least 1"]),
+        ({"n": 0}, ["System.n", "from 1"]),
         ({"mass_block": 2}, ["mass_block", "divide"]),
         ({"a1": [1.0, 2.0]}, ["System.a1", "(2,)", "(1,)"]),
         ({"a0": [np.nan]}, ["finite"]),
