@@ -70,6 +70,7 @@ def check_kernels(
     for state in seen:
         state.check_symmetric()
         state.check_rows(draw)
+    first.check_subsets(draw)
     first.check_positive()
     for state in seen[1:]:
         _check_constant(system, first, state)
@@ -211,6 +212,26 @@ class State:
             slope = _best(lambda x: self.rows(self.t, x, v)[0] @ v, q, v, self.Hdv)[i]
             self._wrong("rows", f"Hdv[{i}]", self.Hdv[i], "(d/dt H) v by differences", slope)
 
+    def check_subsets(self, draw: Any) -> None:
+        """Rows are those that `idx` asks for, in its order: a run asks for the active ones alone."""
+        s = self.system
+        if s.nc < 2:
+            return
+        there = (self.gap <= 0.0) | (self.rate != 0.0) | (s.switch is None)
+        for idx in (draw.permutation(s.nc), draw.permutation(s.nc)[: s.nc // 2], *np.arange(min(s.nc, 8))[:, None]):
+            na, given = len(idx), np.concatenate([idx, np.zeros(s.nc - len(idx), np.int64)]).astype(np.int64)
+            H, h, Hdv = np.zeros((s.nc, s.n)), np.zeros(s.nc), np.zeros(s.nc)
+            w = self.dynamics(self.t, self.q, self.v)[2] if s.scratch else np.zeros(0)
+            s.rows(self.t, self.q, self.v, self.p, w, given, na, H, h, Hdv)
+            ask = f"the same row when idx is {idx.tolist()}, in its place there,"
+            for name, alone, all_ in (("H", H, self.H), ("h", h, self.h), ("Hdv", Hdv, self.Hdv)):
+                bound = np.where(there, EXACT * (1.0 + np.abs(all_).max()), np.inf)
+                bound = bound if all_.ndim == 1 else bound[:, None] + np.zeros_like(all_)
+                seen = np.full_like(all_, np.inf)
+                seen[idx] = alone[:na]
+                bound[np.setdiff1d(np.arange(s.nc), idx)] = np.inf
+                _compare("rows", name, all_, ask, seen, bound, self)
+
     def _differs(self, function: Callable[[Floats], Floats], claimed: Floats, d: Floats, terms: Floats) -> Any:
         """Whether no difference of a function of q along d admits what is claimed for its derivative."""
         q = self.q
@@ -227,7 +248,10 @@ class State:
             for side in ((ahead - here) / width, (here - behind) / width):
                 kinked = np.abs(2.0 * here - ahead - behind) > AGREE**0.5 * width * (terms + np.abs(middle))
                 bent = kinked & (width == WIDTHS[-1])
-                wrong &= ~(bent & (np.abs(side - claimed) <= 1e-3 * (terms + np.abs(side))))
+                wrong &= ~(bent & (np.abs(side - claimed) <= 1e-3 * (terms + np.abs(side)) + 10.0 * width * size))
+            if last is not None:  # the limit that differences of second order tend to
+                error = (middle - last) / ((WIDTHS[0] / WIDTHS[1]) ** 2 - 1.0)
+                wrong &= ~(np.abs(middle + error - claimed) <= 2.0 * np.abs(error) * AGREE**0.25 + noise)
             last = middle
             wrong &= np.isfinite(middle)  # a state so far out that sums overflow tells nothing
             if not np.any(wrong):

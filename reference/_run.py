@@ -152,7 +152,11 @@ class CompiledRun:
     def _finite_rows(self) -> int:
         """Rows before the first one that holds NaN or infinity: energies and powers steer no step, but are told."""
         rows = self.buffers["out"][: int(self.state["rows"][0])]
-        good = np.isfinite(rows).all(axis=1)
+        told = np.ones(rows.shape[1], dtype=bool)
+        if self.system.energy is _none.energy:  # unknown, and said to be so by NaN
+            first = 1 + 2 * self.system.n + 2 * self.system.nc
+            told[first : first + 2] = False
+        good = np.isfinite(rows[:, told]).all(axis=1)
         return len(rows) if good.all() else int(np.argmin(good))
 
     def _grow(self, code: int) -> None:

@@ -17,6 +17,7 @@ from crossbody.reference.core.machine import multiplier_if_active, slow
 # Guards: each fires where all of its functions are below zero.
 NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH = np.arange(9)
 FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1])
+REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
 
 
@@ -90,7 +91,7 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
         w.parts[0] = w.guard[i]
     elif kind == PRESS:
         lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
-        w.parts[0] = w.noise[i] - lam
+        w.parts[0] = w.noise[i] - lam if lam > -np.inf else REDUNDANT
     else:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         h, rate = w.gap[i], w.rate[i]
@@ -102,7 +103,8 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
             w.parts[0], w.parts[1] = h - s.touch, rate
         else:
             w.parts[0] = rate
-            w.parts[1] = -multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+            lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+            w.parts[1] = -lam if lam > -np.inf else REDUNDANT
     for j in range(FUNCTIONS[kind]):
         w.parts[j] += w.bands[j]
 

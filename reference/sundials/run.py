@@ -25,6 +25,7 @@ from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.frozen_machine import FrozenMachine
 from crossbody.reference.sundials.level_machine import LevelMachine, View
 from crossbody.reference.sundials.quiet import quiet
+from crossbody.reference.systems import _none
 
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
 ROUNDS = 100  # of rows and discrete variables that switch each other at one instant
@@ -227,7 +228,8 @@ class SundialsRun:
     def _record(self, lam: Floats) -> None:
         s, e = self.state, self.equations
         gap, energy = e.gaps(s.t, s.q, s.v)[0].copy(), e.energy(s.q, s.v)
-        if not isfinite(gap.sum() + energy.sum()):
+        known = self.system.energy is not _none.energy
+        if not isfinite(gap.sum() + (energy.sum() if known else 0.0)):
             raise Ended(Outcome.NOT_FINITE)
         self.rows.append((s.t, s.q, s.v, gap, lam, energy, [int(m) for m in self.machine.modes], s.z))
 
