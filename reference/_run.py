@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
+from crossbody.reference._blame import not_finite
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
@@ -137,7 +138,7 @@ class CompiledRun:
                 if code == layout.DONE:
                     return Outcome.FINISHED if self._finite_rows() == self.state["rows"][0] else Outcome.NOT_FINITE
                 if code < 0:
-                    return OUTCOMES[code]
+                    return self._ended(code)
                 self._grow(code)
                 now = time.perf_counter()
                 if now - began > self.options.time_limit:
@@ -149,14 +150,19 @@ class CompiledRun:
         except KeyboardInterrupt:
             return Outcome.INTERRUPTED
 
+    def _ended(self, code: int) -> Outcome:
+        """The outcome of a code; an account that holds NaN is not open, a kernel spoilt it."""
+        spoilt = code == layout.INCONSISTENT and not np.isfinite(self.state["energy_open"][0])
+        return Outcome.NOT_FINITE if spoilt else OUTCOMES[code]
+
     def _finite_rows(self) -> int:
         """Rows before the first one that holds NaN or infinity: energies and powers steer no step, but are told."""
         rows = self.buffers["out"][: int(self.state["rows"][0])]
-        told = np.ones(rows.shape[1], dtype=bool)
-        if self.system.energy is _none.energy:  # unknown, and said to be so by NaN
-            first = 1 + 2 * self.system.n + 2 * self.system.nc
-            told[first : first + 2] = False
-        good = np.isfinite(rows[:, told]).all(axis=1)
+        known = np.ones(rows.shape[1], dtype=bool)
+        if self.system.energy is _none.energy:
+            start = 1 + 2 * self.system.n + 2 * self.system.nc
+            known[start : start + 2] = False
+        good = np.isfinite(rows[:, known]).all(axis=1)
         return len(rows) if good.all() else int(np.argmin(good))
 
     def _grow(self, code: int) -> None:
@@ -216,6 +222,8 @@ class CompiledRun:
     def _cause(self, outcome: Outcome, q: Floats, v: Floats) -> str:
         """What an outcome's message names before time and state; empty if nothing."""
         state, marked = self.state[0], np.flatnonzero(self.buffers["history"][-1]).tolist()
+        if outcome is Outcome.NOT_FINITE:
+            return self._blamed(q, v)
         if outcome is Outcome.MODE_CYCLE:
             return f"Rows {marked} at "
         if outcome is Outcome.ILL_POSED:
@@ -228,6 +236,16 @@ class CompiledRun:
         if outcome is Outcome.INCONSISTENT:
             return f"The accelerations do not follow the law of rows {marked}, as `rows` has them, after "
         return ""
+
+    def _blamed(self, q: Floats, v: Floats) -> str:
+        """The kernel that gave what is not finite, at the first bad row or else behind the end of the motion."""
+        n, state, t = self.system.n, self.state[0], float(self.state["t"][0])
+        row = self._finite_rows()
+        if row < state["rows"] and np.all(np.isfinite(self.buffers["out"][row, : 1 + 2 * n])):
+            t, (q, v) = self.buffers["out"][row, 0], np.split(self.buffers["out"][row, 1 : 1 + 2 * n], 2)
+        active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
+        ahead = max(float(self.options.t_end) - t, 0.0)
+        return not_finite(self.system, t, np.concatenate([q, v]), self.work["u"], self.model[0], active, ahead)
 
 
 def _books_everything(system: System) -> bool:

@@ -86,7 +86,8 @@ def _offer(near: tuple[Floats, Floats] | None) -> str:
 
 def _may_hold(system: System) -> NDArray[np.bool_]:
     """Which rows are always on, unless `switch` says otherwise."""
-    return (np.asarray(system.unilateral) == 0) & (np.asarray(system.follows) < 0)
+    may_hold: NDArray[np.bool_] = (np.asarray(system.unilateral) == 0) & (np.asarray(system.follows) < 0)
+    return may_hold
 
 
 def _held(system: System, modes: Bytes) -> Index:

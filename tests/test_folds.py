@@ -50,8 +50,10 @@ def test_linkages_fold_where_their_lengths_say(seed):
         crank, (coupler, rocker), ground, slack = 0.5, rng.uniform(1.5, 2.0, 2), 1.2, 0.0
     system = four_bar((crank, coupler, rocker), ground)
     q, v = assembled(system, 2.0, (0.3, -1.5))
+    if np.abs(system.gap(q)[0]).max() > 1e-9:
+        pytest.skip("these lengths cannot be assembled at that angle")
     run = simulate(system, q, -v, 2.0 * np.pi, rtol=1e-8, max_steps=5000)
-    if slack and np.abs(system.gap(q)[0]).max() < 1e-9:
+    if slack:
         assert run.outcome is Outcome.ILL_POSED
-    elif np.abs(system.gap(q)[0]).max() < 1e-9:
+    else:
         assert run.outcome.ok, run.message

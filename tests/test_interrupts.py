@@ -102,6 +102,7 @@ def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_p
     assert code == 1, said
     assert "fake:stuck: It did not come back within 4 s and was ended" in said
     assert "fake:crash: Its process was ended by SIGSEGV" in said
+    assert "CROSSBODY_DEBUG=1" in said
     rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet").set_index("profile")
     for profile, why in (("stuck", "did not come back"), ("crash", "SIGSEGV")):
         mine = rows.loc[[profile]]

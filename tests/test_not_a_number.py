@@ -87,6 +87,12 @@ BROKEN: dict[str, dict[str, Any]] = {
     "power": {"power": _power},
     "watch": {"watch": _watch, "switch": _switch, "guards": 1},
 }
+NAMED = {
+    "force": "Kernel dynamics gives f[0] = nan", "mass": "Kernel dynamics gives M[0, 0] = nan",
+    "gap": "Kernel gaps gives h[0] = nan", "rate of the gap": "Kernel gaps gives hd[0] = nan",
+    "row": "Kernel rows gives Hdv[0] = nan", "energy": "Kernel energy gives e[1] = nan",
+    "power": "Kernel power gives e[1] = nan", "watch": "Kernel watch gives g[0] = nan",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("samples", [None, np.linspace(0.0, 1.0, 11)], ids=["own steps", "samples"])
@@ -101,5 +107,32 @@ def test_a_nan_is_not_finished(name: str, solver: str, shortcuts: bool, samples:
     run = simulate(system, [1.0], [0.0], 1.0, solver=solver, shortcuts=shortcuts, samples=samples, ledger=True)
     ends = {Outcome.NOT_FINITE, Outcome.ILL_POSED} if name == "mass" else {Outcome.NOT_FINITE}
     assert run.outcome in ends, run.message
+    assert run.outcome is Outcome.ILL_POSED or NAMED[name] in run.message
     assert np.isfinite(run.q).all()
     assert run.q.min() > -1e-3
+
+
+@kernels.control
+def _control(t: float, q: Any, v: Any, u: Any, s: Any, p: Any) -> None:
+    u[0] = 0.0 if t < 0.1 else np.inf
+
+
+@kernels.dynamics
+def _driven(t: float, q: Any, v: Any, u: Any, p: Any, M: Any, f: Any, w: Any) -> None:
+    M[0, 0], f[0] = p[0], u[0] - p[0] * p[1]
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_controller_that_is_not_finite_is_named(solver: str) -> None:
+    fields = ball.KERNELS | {"dynamics": _driven, "control": _control}
+    system = System(n=1, parameters=[1.0, 9.81], a0=[1e4], a1=20.0, inputs=1, tick=0.01, **fields)
+    run = simulate(system, [1.0], [0.0], 1.0, solver=solver)
+    assert run.outcome is Outcome.NOT_FINITE
+    assert "Kernel control gave u[0] = inf" in run.message
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_an_energy_that_nobody_gives_is_no_fault(solver: str) -> None:
+    fields = {name: kernel for name, kernel in ball.KERNELS.items() if name != "energy"}
+    system = System(n=1, parameters=[1.0, 9.81], a0=[1e4], a1=20.0, **fields)
+    assert simulate(system, [1.0], [0.0], 0.6, solver=solver).outcome is Outcome.FINISHED

@@ -93,7 +93,7 @@ def test_rows_that_cannot_be_met_have_no_start():
 def test_a_row_that_holds_a_rate_asks_nothing_of_the_gap():
     rate = linear_rows(np.eye(2), [[1.0, 0.0]], [0.7], 0.0, 20.0, unilateral=False)
     assert simulate(rate, [0.0, 0.0], [0.0, 1.0], 0.1).outcome is Outcome.FINISHED
-    with pytest.raises(SceneError, match="h' = 1 "):
+    with pytest.raises(SceneError, match="h' = 1,"):
         simulate(rate, [0.0, 0.0], [1.0, 1.0], 0.1)
 
 

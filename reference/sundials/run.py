@@ -15,6 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
+from crossbody.reference._blame import not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
 from crossbody.reference._system import System
@@ -228,8 +229,7 @@ class SundialsRun:
     def _record(self, lam: Floats) -> None:
         s, e = self.state, self.equations
         gap, energy = e.gaps(s.t, s.q, s.v)[0].copy(), e.energy(s.q, s.v)
-        known = self.system.energy is not _none.energy
-        if not isfinite(gap.sum() + (energy.sum() if known else 0.0)):
+        if not isfinite(gap.sum() + (0.0 if self.system.energy is _none.energy else energy.sum())):
             raise Ended(Outcome.NOT_FINITE)
         self.rows.append((s.t, s.q, s.v, gap, lam, energy, [int(m) for m in self.machine.modes], s.z))
 
@@ -274,4 +274,12 @@ class SundialsRun:
             return ""
         s = self.state
         rows = f"Rows {self.ended_rows}, " if self.ended_rows else ""
+        if outcome is Outcome.NOT_FINITE:
+            rows = self._blamed()
         return f"{outcome.advice} {rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}."
+
+    def _blamed(self) -> str:
+        """The kernel that gave what is not finite, at the end of the motion or behind it."""
+        s, e = self.state, self.equations
+        active, ahead = np.array(e.active, dtype=np.int64), self.options.t_end - s.t
+        return not_finite(self.system, s.t, np.concatenate([s.q, s.v]), e.u, e.p, active, ahead)

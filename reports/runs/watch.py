@@ -102,7 +102,8 @@ def watched(command: Callable[[], int]) -> int:
             return max(os.WEXITSTATUS(status), 1 if _lost else 0)
         label = str(_diary.read().get("label", ""))
         if not label or label in _lost:
-            return _say(f"the command was ended by {_name(os.WTERMSIG(status))}; please report it.", 3)
+            number = os.WTERMSIG(status)
+            return _say(f"the command was ended by {_name(number)}; please report it.{_advice(number)}", 3)
         _lost[label] = _why(os.WTERMSIG(status), _diary.read())
         _say(f"{label}: {_lost[label]} The rest goes on without it.", 1)
 
@@ -110,7 +111,14 @@ def watched(command: Callable[[], int]) -> int:
 def _why(number: int, told: dict[str, object]) -> str:
     if number == signal.SIGKILL and time.monotonic() >= float(str(told.get("until", "inf"))):
         return f"It did not come back within {float(str(told['seconds'])):g} s and was ended; see --time-limit."
-    return f"Its process was ended by {_name(number)}."
+    return f"Its process was ended by {_name(number)}.{_advice(number)}"
+
+
+def _advice(number: int) -> str:
+    """What to do about a signal by which code of ours or of a user's kernels has crashed."""
+    if number not in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGILL, signal.SIGFPE):
+        return ""
+    return " If it runs kernels of your own, CROSSBODY_DEBUG=1 in the environment makes them check every index."
 
 
 def _name(number: int) -> str:

@@ -472,7 +472,8 @@ def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
 def entry(system: System) -> Callable[..., int]:
     """The compiled `evaluate(what, t, y, out, lines)` of one system."""
     functions = system.kernels
-    return _entry(tuple(functions[name] for name in _USED))
+    found: Callable[..., int] = _entry(tuple(functions[name] for name in _USED))
+    return found
 
 
 def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tuple[dict[str, Array], Array]:

@@ -1,0 +1,85 @@
+"""Which kernel gave a value that is not finite: told after the run, by calls of the kernels from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._check import ARGUMENTS
+from crossbody.reference._guarded import entry
+from crossbody.reference._kinds import Floats, Index
+from crossbody.reference._system import System
+from crossbody.reference.systems import _none
+
+LOOKS = 60  # states ahead, each twice as far as the one before
+
+
+def not_finite(system: System, t: float, y: Floats, u: Floats, p: Floats, active: Index, ahead: float) -> str:
+    """Name the kernel and the entry that first gives NaN or infinity, as the start of a sentence; empty if none does.
+
+    Solvers keep no state at which a kernel gave NaN: what is not found at the last state is looked for ahead of it, on
+    the parabola that it sets out on.
+
+    Args:
+        system: the mechanism.
+        t: time of the last state, s.
+        y: q and v there (2 n,).
+        u: inputs in force (nu,).
+        p: parameters with the discrete state in force.
+        active: rows in force.
+        ahead: how far to look, s.
+    """
+    if not np.all(np.isfinite(u)):
+        return f"Kernel control gave {entry('u', ~np.isfinite(u))} = {u[~np.isfinite(u)][0]} by "
+    if not np.all(np.isfinite(y)):
+        return ""
+    q, v = np.split(y, 2)
+    with np.errstate(all="ignore"):
+        for step, there, speed in _along(system, t, q, v, u, p, ahead):
+            for name, key, value in _values(system, t + step, there, speed, u, p, active):
+                bad = ~np.isfinite(value)
+                if np.any(bad):
+                    at = "" if step == 0.0 else f"t = {t + step:.12g} s, q = {there.tolist()}, just after "
+                    return f"Kernel {name} gives {entry(key, bad)} = {value[bad][0]} at {at}"
+    return ""
+
+
+def _along(
+    system: System, t: float, q: Floats, v: Floats, u: Floats, p: Floats, ahead: float
+) -> Iterator[tuple[float, Floats, Floats]]:
+    """States at the end of a run, and on the way that it sets out on."""
+    yield 0.0, q, v
+    M, f, w = np.zeros((system.n, system.mass_block)), np.zeros(system.n), np.zeros(system.scratch)
+    system.dynamics(t, q, v, u, p, M, f, w)
+    a = np.zeros(system.n)
+    for b in range(0, system.n, system.mass_block):
+        block = slice(b, b + system.mass_block)
+        a[block] = np.linalg.lstsq(M[block], f[block], rcond=None)[0] if np.all(np.isfinite(M[block])) else 0.0
+    for step in (ahead * 0.5 ** np.arange(LOOKS)[::-1]).tolist():
+        yield step, q + step * v + 0.5 * step**2 * a, v + step * a
+
+
+def _values(
+    system: System, t: float, q: Floats, v: Floats, u: Floats, p: Floats, active: Index
+) -> Iterator[tuple[str, str, Any]]:
+    """What every kernel gives at a state: kernel, array and its values; an energy that is nowhere known is left out."""
+    n, nc = system.n, system.nc
+    rows = np.concatenate([active, np.setdiff1d(np.arange(nc), active)])
+    given: dict[str, Any] = {
+        "t": t, "q": q, "v": v, "u": u, "p": p, "w": np.zeros(system.scratch), "idx": rows, "na": nc,
+    }  # fmt: skip
+    filled: dict[str, dict[str, Floats]] = {
+        "dynamics": {"M": np.zeros((n, system.mass_block)), "f": np.zeros(n)},
+        "gaps": {"h": np.zeros(nc), "hd": np.zeros(nc)},
+        "rows": {"H": np.zeros((nc, n)), "h": np.zeros(nc), "Hdv": np.zeros(nc)},
+        "energy": {"e": np.zeros(2)}, "power": {"e": np.zeros(2)}, "watch": {"g": np.zeros(system.guards)},
+    }  # fmt: skip
+    for name, outputs in filled.items():
+        kernel = system.kernels[name]
+        if kernel is getattr(_none, name, None) or (name in ("gaps", "rows") and not nc):
+            continue
+        values = given | outputs
+        kernel(*(values[argument] for argument in ARGUMENTS[name]))
+        yield from ((name, key, value[np.argsort(rows)] if name == "rows" else value) for key, value in outputs.items())
