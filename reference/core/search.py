@@ -28,7 +28,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes
 from crossbody.reference.core.algebra import ULP, all_finite
 from crossbody.reference.core.guards import CATCH, FUNCTIONS, SWITCH, fill_step, functions, largest, root
-from crossbody.reference.core.layout import FUNCTIONS_MOST, NEVER, NODES, WINDOW_LEVELS, Model, Work
+from crossbody.reference.core.layout import FUNCTIONS_MOST, MEMORYLESS, NEVER, NODES, WINDOW_LEVELS, Model, Work
 
 _PLACES = np.linspace(0.0, 1.0, NODES)
 _POWERS = np.linalg.inv(np.vander(_PLACES, increasing=True))  # values to coefficients of P
@@ -230,6 +230,22 @@ def _locate(
     return NEVER
 
 
+@inlined
+def _at_zero(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, found: float) -> float:
+    """Where a guard that left the band of what counts as zero passed its true zero, if it came from above."""
+    widest = max(w.bands[0], w.bands[1])
+    if widest == 0.0 or s.fsm == MEMORYLESS:
+        return found
+    w.bands[:] = 0.0
+    functions(K, s, m, w, mode, kind, i, 0.0)
+    before = largest(w, count)
+    functions(K, s, m, w, mode, kind, i, found)
+    after = largest(w, count)
+    if not (before > 0.0 > after):
+        return found
+    return root(K, s, m, w, mode, kind, i, 0.0, before, found, after)
+
+
 @compiled
 def first_below(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int) -> float:
     """First place of the step where all functions of a guard are below zero; NEVER if none, NaN if one is NaN."""
@@ -251,7 +267,7 @@ def first_below(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: in
             if verdict != NOWHERE:
                 found = _locate(K, s, m, w, mode, kind, i, count, level, place, above)
                 if found < NEVER:
-                    return found
+                    return _at_zero(K, s, m, w, mode, kind, i, count, found)
             above = above or row[NODES - 1] > 0.0
             place += 1
             while level > 0 and place % 2 == 0:
