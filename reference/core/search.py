@@ -27,7 +27,7 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes
 from crossbody.reference.core.algebra import ULP, all_finite
-from crossbody.reference.core.guards import CATCH, FUNCTIONS, RELEASE, SWITCH, fill_step, functions, largest, root
+from crossbody.reference.core.guards import CATCH, FUNCTIONS, SWITCH, fill_step, functions, largest, root
 from crossbody.reference.core.layout import FUNCTIONS_MOST, MEMORYLESS, NEVER, NODES, WINDOW_LEVELS, Model, Work
 
 _PLACES = np.linspace(0.0, 1.0, NODES)
@@ -231,16 +231,19 @@ def _locate(
 
 
 @inlined
-def _at_true_zero(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, found: float) -> float:
-    """Where the multiplier passes zero itself, if it fired beyond the noise that it started in from above.
-
-    An arc in closed form may end at its release to rounding: the next one then starts in the noise.
-    """
-    if kind != RELEASE or s.fsm == MEMORYLESS or w.bands[0] == 0.0 or not w.lams[0, i] >= 0.0:
+def _at_zero(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, found: float) -> float:
+    """Where a guard that left the band of what counts as zero passed its true zero, if it came from above."""
+    widest = max(w.bands[0], w.bands[1])
+    if widest == 0.0 or s.fsm == MEMORYLESS:
         return found
-    w.bands[0] = 0.0
+    w.bands[:] = 0.0
+    functions(K, s, m, w, mode, kind, i, 0.0)
+    before = largest(w, count)
     functions(K, s, m, w, mode, kind, i, found)
-    return root(K, s, m, w, mode, kind, i, 0.0, max(w.lams[0, i], 1e-300), found, w.parts[0])
+    after = largest(w, count)
+    if not (before > 0.0 > after):
+        return found
+    return root(K, s, m, w, mode, kind, i, 0.0, before, found, after)
 
 
 @compiled
@@ -264,7 +267,7 @@ def first_below(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: in
             if verdict != NOWHERE:
                 found = _locate(K, s, m, w, mode, kind, i, count, level, place, above)
                 if found < NEVER:
-                    return _at_true_zero(K, s, m, w, mode, kind, i, found)
+                    return _at_zero(K, s, m, w, mode, kind, i, count, found)
             above = above or row[NODES - 1] > 0.0
             place += 1
             while level > 0 and place % 2 == 0:
