@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import traceback
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -39,6 +40,7 @@ def from_file(kind: str, path: Path) -> ModuleType:
 
     Raises:
         UnknownName: if it is not there.
+        SceneError: if it cannot be imported, with the line.
     """
     spec = importlib.util.spec_from_file_location(f"crossbody_{kind}_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
@@ -47,10 +49,25 @@ def from_file(kind: str, path: Path) -> ModuleType:
     sys.modules[spec.name] = loaded  # dataclasses look their module up there
     try:
         spec.loader.exec_module(loaded)
-    except BaseException:
+    except (CrossbodyError, KeyboardInterrupt):
         del sys.modules[spec.name]
         raise
+    except (Exception, SystemExit) as error:
+        del sys.modules[spec.name]
+        raise SceneError(_failed(kind, path, error)) from error
     return loaded
+
+
+def _failed(kind: str, path: Path, error: BaseException) -> str:
+    """Why a file of a user's own cannot be imported, and the last of its lines that was reached."""
+    if isinstance(error, SyntaxError):
+        file, line, why = error.filename or str(path), error.lineno, error.msg
+    else:
+        own = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path.absolute()]
+        file, line, why = str(path), own[-1].lineno if own else None, str(error)
+    where = file if line is None else f"{file}, line {line}"
+    what = type(error).__name__
+    return f"The {kind} file {path} cannot be imported: {what}{f' ({why[:300]})' if why else ''} in {where}."
 
 
 def resolve(

@@ -1,4 +1,4 @@
-"""Which kernel gave a value that is not finite: told after the run, by calls of the kernels from Python."""
+"""What a run ended by, told after it by calls of the kernels from Python: values not finite, rows dependent."""
 
 from __future__ import annotations
 
@@ -83,3 +83,24 @@ def _values(
         values = given | outputs
         kernel(*(values[argument] for argument in ARGUMENTS[name]))
         yield from ((name, key, value[np.argsort(rows)] if name == "rows" else value) for key, value in outputs.items())
+
+
+def dependence(system: System, active: Index, q: Floats, v: Floats) -> str:
+    """The condition of H M^-1 H^T of the active rows, as the start of a sentence; empty if there are none.
+
+    Args:
+        system: the mechanism.
+        active: rows in force.
+        q: positions (n,).
+        v: velocities (n,).
+    """
+    M, H = system.mass_matrix(q, v), system.constraint(q, v)[0][active]
+    if not (np.isfinite(M).all() and np.isfinite(H).all()) or np.linalg.eigvalsh(M).min(initial=np.inf) <= 0.0:
+        return "The mass matrix is not positive definite near "
+    if not len(active):
+        return ""
+    A = np.linalg.solve(np.linalg.cholesky(M), H.T)
+    rank = int(np.linalg.matrix_rank(A))
+    if rank < len(active):
+        return f"Rows {active.tolist()} have a singular H M^-1 H^T, of rank {rank}, near "
+    return f"Rows {active.tolist()} have H M^-1 H^T of condition {np.linalg.cond(A) ** 2:.3g} and worse near "

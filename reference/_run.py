@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
-from crossbody.reference._blame import not_finite
-from crossbody.reference._kinds import Floats, Index
+from crossbody.reference._blame import dependence, not_finite
+from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
 from crossbody.reference._system import System, initial_modes
@@ -227,7 +227,7 @@ class CompiledRun:
         if outcome is Outcome.MODE_CYCLE:
             return f"Rows {marked} at "
         if outcome is Outcome.ILL_POSED:
-            return _dependence(self.system, np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE)), q, v)
+            return dependence(self.system, np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE)), q, v)
         if outcome is Outcome.INCONSISTENT and abs(state["energy_open"]) > state["energy_allowed"]:
             return (
                 f"The energy account is open by {state['energy_open']:.3g} J, where the steps taken admit "
@@ -252,14 +252,3 @@ def _books_everything(system: System) -> bool:
     """Whether the system says what its energy is and what changes it; one that nothing drives need not name a power."""
     driven = system.inputs > 0 or system.switch is not None
     return system.energy is not _none.energy and (system.power is not _none.power or not driven)
-
-
-def _dependence(system: System, active: Index, q: Floats, v: Floats) -> str:
-    """The condition of the active rows in the metric of M^-1, as a message says it."""
-    M, H = system.mass_matrix(q, v), system.constraint(q, v)[0][active]
-    if not (np.isfinite(M).all() and np.isfinite(H).all()) or np.linalg.eigvalsh(M).min(initial=np.inf) <= 0.0:
-        return "The mass matrix is not positive definite near "
-    if not len(active):
-        return ""
-    condition = np.linalg.cond(np.linalg.solve(np.linalg.cholesky(M), H.T)) ** 2
-    return f"Rows {active.tolist()} have H M^-1 H^T of condition {condition:.3g} and worse near "

@@ -182,3 +182,25 @@ def test_bench_times_every_rung(capsys: pytest.CaptureFixture[str]) -> None:
     assert orders["exact"] == "exact at every setting"
     assert orders["off"] == "does not converge to the truth of the case"
     assert "work-precision" in Path("out/index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "what"),
+    [
+        ("x = 1\ny = (\n", 2, "SyntaxError"),
+        ("x = 1\n\nx / 0\n", 3, "ZeroDivisionError"),
+        ("import sys\nsys.exit(7)\n", 2, "SystemExit"),
+        ("\nimport no_such_package\n", 2, "ModuleNotFoundError"),
+    ],
+)
+@pytest.mark.parametrize("relative", [False, True])
+def test_a_case_file_that_cannot_be_imported_is_wrong_use(text, line, what, relative, tmp_path, monkeypatch, capsys):
+    file = tmp_path / "broken_case.py"
+    file.write_text(text)
+    monkeypatch.chdir(tmp_path)
+    assert call("run", file.name if relative else str(file)) == 2
+    said = capsys.readouterr().err
+    assert what in said
+    assert f"broken_case.py, line {line}." in said
+    assert said.count("\n") == 1
+    assert "fault of crossbody" not in said

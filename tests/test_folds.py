@@ -5,7 +5,28 @@ import pytest
 from four_bar import assembled, four_bar
 
 from crossbody.cases import Outcome
-from crossbody.reference import simulate
+from crossbody.reference import System, kernels, simulate
+
+
+@kernels.dynamics
+def _free(t, q, v, u, p, M, f, w):
+    M[0, 0], f[0] = 1.0, -1.0
+
+
+@kernels.gaps
+def _twice(t, q, v, p, h, hd):
+    h[0], h[1], hd[0], hd[1] = q[0], q[0], v[0], v[0]
+
+
+@kernels.rows
+def _both(t, q, v, p, w, idx, na, H, h, Hdv):
+    for j in range(na):
+        H[j, 0], h[j], Hdv[j] = 1.0, q[0], 0.0
+
+
+def one_coordinate_held_twice():
+    """Two rows that say the same."""
+    return System(n=1, dynamics=_free, gaps=_twice, rows=_both, unilateral=False, a0=[400.0] * 2, a1=40.0)
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11])
@@ -36,6 +57,43 @@ def test_a_linkage_that_cannot_fold_runs_through(lengths, ground, rtol):
     run = simulate(system, q, -v, 8.0, rtol=rtol, ledger=True)
     assert run.outcome.ok, run.message
     assert np.abs(run.gap).max() < 1e-2 * rtol + 1e3 * rtol * (rtol > 1e-4)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-7])
+@pytest.mark.parametrize(
+    ("solver", "lengths", "ground", "start"),
+    [
+        ("cvode", (1.0, 2.0, 1.0), 2.0, (1.0, 0.0, -2.1)),  # uniform: one step passes many folds
+        ("cvode", (1.0, 2.0, 1.5), 1.5, (2.0, 0.0, -1.0)),
+        ("ida", (1.0, 2.0, 1.5), 1.5, (2.0, 0.0, -1.0)),
+    ],
+)
+def test_other_solvers_end_at_the_fold_too(solver, lengths, ground, start, rtol):
+    system = four_bar(lengths, ground)
+    q, v = assembled(system, start[0], start[1:])
+    run = simulate(system, q, -v, 8.0, rtol=rtol, solver=solver, max_steps=2000)
+    assert run.outcome is Outcome.ILL_POSED, run.message
+    assert run.q[-1, 0] > 0.0  # flat where the crank lies along the ground, for the first time
+    assert "Rows [0, 1] have " in run.message
+    assert "condition" in run.message or "singular" in run.message
+    assert "t = " in run.message
+
+
+@pytest.mark.parametrize("solver", ["cvode", "ida"])
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5])
+def test_other_solvers_run_through_where_nothing_folds(rtol, solver):
+    system = four_bar((1.0, 2.0, 2.0), 2.5)
+    q, v = assembled(system, 1.0, (0.2, -1.5))
+    run = simulate(system, q, -v, 8.0, rtol=rtol, solver=solver)
+    assert run.outcome.ok, run.message
+
+
+@pytest.mark.parametrize("solver", ["compiled", "cvode", "ida"])
+def test_rows_that_outnumber_the_coordinates_are_called_singular(solver):
+    q = np.zeros(1)
+    run = simulate(one_coordinate_held_twice(), q, q, 0.1, solver=solver)
+    assert run.outcome is Outcome.ILL_POSED
+    assert "Rows [0, 1] have a singular H M^-1 H^T, of rank 1, near t = 0" in run.message
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
-from crossbody.reference._blame import not_finite
+from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
 from crossbody.reference._system import System
@@ -23,6 +23,7 @@ from crossbody.reference.sundials.arcs import Arc, BdfArc, CvodeArc, Fired, IdaA
 from crossbody.reference.sundials.compiled.evaluation import entry
 from crossbody.reference.sundials.discrete import START, TOUCHED, Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
+from crossbody.reference.sundials.folds import Folds
 from crossbody.reference.sundials.frozen_machine import FrozenMachine
 from crossbody.reference.sundials.level_machine import LevelMachine, View
 from crossbody.reference.sundials.quiet import quiet
@@ -73,6 +74,7 @@ class SundialsRun:
         e = self.equations = Equations(self.system, rigid=bool(self.rigid))
         self.machine = self._machine(e)
         self.discrete = Discrete(self.system, e)
+        self.folds = Folds(e)
         nz = self.system.nc + 2 if self.options.ledger else 0
         energy = np.abs(np.nan_to_num(e.energy(self.q0, self.v0))).sum()
         self.scene = Scene(e, self.machine, self.discrete, self.options, nz, max(float(energy), 1.0))
@@ -108,6 +110,7 @@ class SundialsRun:
         self._discretely(START)
         view = self._settle()
         self._sample(view.lam)
+        self.folds.begin(self.state.t, self.state.q, self.state.v)
         arc = self._arc(view)
         while self.state.t < t_end:
             self._check_bounds(began)
@@ -191,6 +194,7 @@ class SundialsRun:
                 raise
             self.retries += 1
             return None
+        self._check_folds(arc, before, state)
         while self._next_sample() < state.t:
             self.state = arc.at(self._next_sample())
             self._sample(arc.multipliers(self.state))
@@ -201,6 +205,15 @@ class SundialsRun:
         elif self._next_sample() == state.t:
             self._sample(arc.multipliers(state))
         return self._fire(fired)
+
+    def _check_folds(self, arc: Arc, before: State, after: State) -> None:
+        """End the run if the rows that are always on lost rank in the step between these states."""
+
+        def state(t: float) -> tuple[Floats, Floats]:
+            s = after if t >= after.t else arc.at(t)
+            return s.q, s.v
+
+        self.folds.check(before.t, after.t, state)
 
     def _fire(self, fired: Fired) -> bool:
         """Apply what was located; whether the arc ends there."""
@@ -276,6 +289,8 @@ class SundialsRun:
         rows = f"Rows {self.ended_rows}, " if self.ended_rows else ""
         if outcome is Outcome.NOT_FINITE:
             rows = self._blamed()
+        elif outcome is Outcome.ILL_POSED and self.ended_rows:
+            rows = dependence(self.system, np.array(self.ended_rows), s.q, s.v)
         return f"{outcome.advice} {rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}."
 
     def _blamed(self) -> str:
