@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Any, TypeVar
+from collections.abc import Collection
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -42,7 +43,34 @@ def path(where: str, value: object) -> str:
     """
     if not isinstance(value, (str, os.PathLike)) or "\0" in (text := str(value)) or not text:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a path.")
+    try:
+        os.fsencode(text)
+    except UnicodeError:
+        raise InvalidValue(f"{where} is {shown(value)}; no file system can have such a path.") from None
     return text
+
+
+def texts(where: str, value: object) -> tuple[str, ...]:
+    """Return names as a tuple.
+
+    Raises:
+        InvalidValue: if it is no list of texts; one text alone is none.
+    """
+    listed = isinstance(value, Collection) and not isinstance(value, (str, bytes, np.ndarray))
+    if not listed or not all(isinstance(one, str) for one in cast("Collection[object]", value)):
+        raise InvalidValue(f"{where} is {shown(value)}; it must be a list of names.")
+    return tuple(cast("Collection[str]", value))
+
+
+def whole(where: str, value: object, low: int = 1) -> int:
+    """Return a whole number.
+
+    Raises:
+        InvalidValue: if it is none, below the lowest that is valid, or beyond 64 bits.
+    """
+    if not isinstance(value, (int, np.integer)) or not low <= value < 2**63:
+        raise InvalidValue(f"{where} is {shown(value)}; it must be a whole number from {low} on.")
+    return int(value)
 
 
 def real(where: str, value: object) -> float:

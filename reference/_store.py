@@ -119,9 +119,13 @@ class Store:
         except OSError as error:
             self.drop(name, f"cannot be read ({error.strerror})")
             return None
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode):
+            os.close(descriptor)  # a folder, which Python would not even open
+            self.drop(name, "is no file")
+            return None
         with open(descriptor, "rb") as file:
-            found = os.fstat(descriptor)
-            if not stat.S_ISREG(found.st_mode) or not _trusted(found.st_uid) or found.st_mode & 0o022:
+            if not _trusted(found.st_uid) or found.st_mode & 0o022:
                 self.drop(name, "may have been written by another user")
                 return None
             try:
@@ -143,7 +147,7 @@ class Store:
         path = self.folder / (name + CODE)
         tell(f"{path} {why}; it is compiled again.")
         with suppress(OSError):
-            path.unlink()
+            path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
 
     def write(self, name: str, data: bytes) -> None:
         """Keep data under a name, whole or not at all; what cannot be kept is told."""

@@ -324,9 +324,12 @@ def _obey(arguments: list[str] | None) -> int:
         return _say(error.format_message())
     except CrossbodyError as error:
         return _say(str(error))
-    except BrokenPipeError:  # whoever read this has enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except BrokenPipeError:
+        return _enough()
+    except SystemExit as error:  # click's own answer to a pipe that is closed
+        if isinstance(error.__context__, BrokenPipeError):
+            return _enough()
+        raise
     except Exception as error:
         if isinstance(error, OSError) and error.errno in REFUSED:
             return _say(f"The system refuses: {error.strerror}{f' ({error.filename})' if error.filename else ''}.")
@@ -336,6 +339,12 @@ def _obey(arguments: list[str] | None) -> int:
 
 REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENOMEM)
 """What the system may refuse whatever a program does."""
+
+
+def _enough() -> int:
+    """Whoever read what is printed has read enough: let the rest go nowhere, which is no fault."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    return 0
 
 
 def _say(text: str, code: int = 2) -> int:

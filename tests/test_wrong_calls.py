@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from wrong_calls import calls, failure
+from wrong_calls import _logs, calls, failure
 
 from crossbody import cases
 from crossbody.cases import CrossbodyError, InvalidValue, Outcome, SceneError, UnknownName
@@ -22,6 +22,8 @@ from crossbody.reports.bench import measure, skip, throughput
 from crossbody.reports.maps import gapmap, stability
 from crossbody.reports.runs import jobs
 from crossbody.reports.sweep import command as stress
+
+LOG_CALLS = 300
 
 
 @pytest.fixture
@@ -58,6 +60,12 @@ def faults(seed: int, count: int, folder: Path, costly: bool) -> str:
 
 def test_wrong_calls_are_refused_in_a_sentence(cheap: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert not faults(1, 250, cheap, costly=False)
+
+
+def test_wrong_arguments_for_logs_are_refused_in_a_sentence(tmp_path: Path) -> None:
+    rng = random.Random(3)
+    found = [text for _ in range(LOG_CALLS) if (text := failure(_logs(rng, tmp_path)))]
+    assert not found, "\n\n".join(found[:5])
 
 
 @pytest.mark.slow

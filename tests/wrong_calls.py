@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 from crossbody import cases, engines, hw, reports
 from crossbody.cases import Case, CrossbodyError, Parameter
 from crossbody.engines._equations import system_of
-from crossbody.reference import Options, System, ensemble, simulate
+from crossbody.reference import Options, System, ensemble, recheck, simulate
 from crossbody.reports import cli
 
 BOUNDED = {"max_steps": 300, "time_limit": 2.0}
@@ -212,6 +212,54 @@ def _read(rng: random.Random, folder: Path) -> Call:
     return Call(f"hw.read({called!r}, {columns!r}, **{more!r})", lambda: hw.read(called, columns, **more))
 
 
+@cache
+def log() -> hw.Log:
+    """A swinging pendulum, so short that nothing on it takes long."""
+    t = np.arange(80) * 0.01
+    made = tuple(
+        hw.Channel(role=role, name="q", unit=unit, values=np.cos(t), delay=0.0, column="q")
+        for role, unit in ((hw.Role.COORDINATES, "rad"), (hw.Role.SENSORS, "1"))
+    )
+    told = hw.Provenance(file="none", sha256="", format="csv", library="")
+    return hw.Log(time=t, channels=made, sample_time=0.01, provenance=told)
+
+
+def _map() -> hw.Columns:
+    return hw.Columns(time=hw.Time(column="t"), sensors={"x": hw.Signal(column="x", unit="1")})
+
+
+def _logs(rng: random.Random, folder: Path) -> Call:
+    """An entry point of `hw`, or another that takes what was computed, with one argument or two of a wrong kind."""
+    path = folder / "short.csv"
+    path.write_text("t,x\n0,1\n1,2\n2,3\n")
+    replayed = {"log": log(), "model": "single_pendulum"}
+    more = dict.fromkeys(("parameters", "delay"))
+    points: tuple[tuple[Callable[..., Any], dict[str, Any], Sequence[str]], ...] = (
+        (hw.load_columns, {"source": "nonsense"}, ()), (hw.parse_columns, {"text": "[time]"}, ("path",)),
+        (hw.dump_columns, {"columns": _map()}, ()), (_scanned, {"path": path, "columns": _map()}, ("part", "memory")),
+        (hw.check, {"path": path, "columns": _map()}, ("part", "memory")),
+        (hw.parts, {"path": path, "columns": _map()}, ("memory",)), (hw.survey, {"path": path}, ("columns", "memory")),
+        (hw.store, {"log": log(), "path": folder / "stored.parquet"}, ()), (hw.draft_text, {"found": None}, ()),
+        (hw.unlagged, {"t": [0.0, 1.0], "y": [[1.0], [2.0]], "rate": 1.0, "noise": 0.1}, ("quantum",)),
+        (hw.Log.window, {"self": log(), "start": 0.1, "stop": 0.2}, ()),
+        (hw.replay, replayed, (*more, "kind", "wanted", "restart", "horizon", "settings")),
+        (hw.identify, {**replayed, "free": ["k1"], "budget": 1e-9},
+         (*more, "restart", "horizon", "starts", "hold", "stride", "bounds", "engine")),
+        (hw.inverse, replayed, (*more, "half", "degree", "stride")),
+        (recheck, {"system": system_of(ball()), "run": motion()}, ("rtol",)), (reports.truth_of, {"case": ball()}, ()),
+    )  # fmt: skip
+    entry, given, others = rng.choice(points)
+    names = [*(name for name in given if name != "self"), *others]
+    changed = {name: wrong(rng) for name in rng.sample(names, min(len(names), rng.choice((1, 1, 2))))}
+    return Call(f"{entry.__qualname__}(good | {changed!r})", lambda: entry(**given | changed))
+
+
+def _scanned(**given: Any) -> None:
+    with hw.scan(**given) as found:
+        for _ in found.rows():
+            pass
+
+
 COMMANDS = (
     "list",
     "run",
@@ -254,7 +302,7 @@ def calls(rng: random.Random, count: int, folder: Path, costly: bool = True) -> 
     kinds: list[tuple[int, Callable[[], Call]]] = [
         (30, lambda: _load(rng)), (10, lambda: _prepare(rng)), (20, lambda: _simulate(rng, costly)),
         (10, lambda: _system(rng)), (4, lambda: _compare(rng)), (10, lambda: _read(rng, folder)),
-        (16, lambda: _command(rng)),
+        (16, lambda: _command(rng)), (20, lambda: _logs(rng, folder)),
     ]  # fmt: skip
     weights = [weight for weight, _ in kinds]
     for _ in range(count):

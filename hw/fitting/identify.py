@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import InvalidValue, SceneError, Value
+from crossbody.cases import InvalidValue, SceneError, Value, _arguments
 from crossbody.hw import models
 from crossbody.hw.fitting.derivative import DELAY, Exact
 from crossbody.hw.fitting.difference import Differences
@@ -56,10 +56,23 @@ def identify(
         InvalidValue: for numbers outside their ranges.
         SceneError: if the log lacks what the model needs, or no window is left to fit.
     """
-    chosen = models.load(model) if isinstance(model, str) else model
+    chosen = models.chosen(model)
     numbers = chosen.numbers(parameters)
+    free, hold, stride = (
+        _arguments.texts("free", free),
+        _arguments.whole("hold", hold, 0),
+        _arguments.whole("stride", stride),
+    )
+    budget = _arguments.real("budget", budget)
+    _arguments.instance("starts", starts, str, "measured or free")
+    _arguments.instance("engine", engine, str, "E or E:PROFILE")
+    for name, pair in _arguments.instance("bounds", bounds or {}, Mapping, "a table of names and pairs").items():
+        for end in _arguments.instance(f"bounds of {name}", pair, (tuple, list), "a pair of numbers"):
+            _arguments.real(f"bounds of {name}", end)
     _check(chosen, free, starts, hold, stride, budget)
-    logs = [log] if isinstance(log, Log) else list(log)
+    logs = (
+        [log] if isinstance(log, Log) else list(_arguments.instance("log", log, Sequence, "a log, or a list of logs"))
+    )
     cut = [window for one in logs for window in windows(one, chosen, restart, delay, horizon)]
     held = [i for i in range(len(cut)) if hold and i % hold == hold - 1]
     fitted = [i for i in range(len(cut)) if i not in held]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
-from crossbody.cases import InvalidValue, LogFormatError
+from crossbody.cases import LogFormatError, _arguments
 
 MOST_COLUMNS = 20_000  # of a file: each costs a few kilobytes of checks
 MEMORY = 1 << 30  # bytes over the file's own size
@@ -43,18 +44,17 @@ class Budget:
         taken: of it so far.
 
     Raises:
-        InvalidValue: if `memory` is not positive.
+        InvalidValue: if `memory` is no whole number above 0.
     """
 
     def __init__(self, path: Path, memory: int = MEMORY) -> None:
-        if memory <= 0:
-            raise InvalidValue(f"memory is {memory}; it must be above 0 bytes.")
+        memory = _arguments.whole("memory (bytes)", memory)
         self._path = path
         self.size = _occupied(path)
         self.memory, self.most = memory + self.size, memory // PART + RATIO * self.size
         self.seconds = PATIENCE + self.size / SLOWEST
         self._spent, self.taken, self._entered = 0, 0.0, math.nan
-        self._ceiling = _private() + self.memory
+        self._ceiling = min(_private() + self.memory, sys.maxsize)
 
     def hold(self, declared: int, what: str) -> None:
         """Refuse something that would be in memory at once and is larger than that may be.

@@ -47,6 +47,23 @@ def fault(path: Path, what: str, error: Exception, row: int | None = None, colum
 
 
 @contextmanager
+def plain_allocator() -> Iterator[None]:
+    """Let Arrow allocate as the C library does, so that what is bounded is what it uses.
+
+    Its own allocator reserves a gigabyte for its first byte. Within a bound on the process's memory that leaves too
+    little for the rest, and some of Arrow's threads and destructors abort the process where memory is denied to them.
+    """
+    import pyarrow as pa
+
+    before = pa.default_memory_pool()
+    pa.set_memory_pool(pa.system_memory_pool())
+    try:
+        yield
+    finally:
+        pa.set_memory_pool(before)
+
+
+@contextmanager
 def _silent() -> Iterator[None]:
     """Keep the loggers of the parsers from writing to stderr: what matters about a file becomes our one sentence."""
     found = list(logging.root.manager.loggerDict.items())

@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import msgspec
 import numpy as np
@@ -15,7 +15,7 @@ from crossbody.cases import LogFormatError
 from crossbody.hw.formats._budget import MOST_COLUMNS
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._csv_fault import find_fault
-from crossbody.hw.formats._guard import library, parsing
+from crossbody.hw.formats._guard import library, parsing, plain_allocator
 from crossbody.hw.formats._names import header_unit
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
@@ -101,7 +101,7 @@ class CsvReader:
         import pyarrow as pa
 
         try:
-            with parsing(self._path, "CSV file"), self._stream() as stream:
+            with parsing(self._path, "CSV file"), plain_allocator(), self._stream() as stream:
                 return next(iter(stream), None), stream.schema
         except LogFormatError as error:
             if isinstance(error.__cause__, pa.ArrowException):
@@ -146,6 +146,7 @@ class CsvReader:
                 decimal_point=chosen.decimal,
                 timestamp_parsers=[],
             ),
+            pa.system_memory_pool(),
         )
 
     def close(self) -> None:
@@ -164,9 +165,19 @@ def _type(field: Any, batch: Any) -> str:
 
 def _first_line(path: Path, options: Options) -> str:
     with parsing(path, "CSV file"), path.open(encoding=options.encoding, newline="") as file:
-        for _ in range(options.skip):
-            file.readline(BLOCK_BYTES)
+        _leave_out(path, file, options.skip)
         return file.readline(BLOCK_BYTES)
+
+
+def _leave_out(path: Path, file: TextIO, count: int) -> None:
+    """Go past the lines before the header.
+
+    Raises:
+        LogFormatError: if the file ends before.
+    """
+    for line in range(count):
+        if not file.readline(BLOCK_BYTES):
+            raise LogFormatError(path, f"has {line} lines; `options.skip` leaves out {count}, and the header too.")
 
 
 def _units(path: Path, options: Options, delimiter: str) -> list[str]:
@@ -174,8 +185,7 @@ def _units(path: Path, options: Options, delimiter: str) -> list[str]:
     if not options.units:
         return []
     with parsing(path, "CSV file"), path.open(encoding=options.encoding, newline="") as file:
-        for _ in range(options.skip + int(options.header)):
-            file.readline(BLOCK_BYTES)
+        _leave_out(path, file, options.skip + int(options.header))
         cells = next(csv.reader([file.readline(BLOCK_BYTES)], delimiter=delimiter), [])
     return [cell.strip().strip("[]()") for cell in cells]
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from crossbody.cases import _registry
+from crossbody.cases import _arguments, _registry
 
 if TYPE_CHECKING:
     from crossbody.hw.models._contract import Model
 
-__all__ = ["load", "names", "summary"]
+__all__ = ["chosen", "load", "names", "summary"]
 
 
 def names() -> tuple[str, ...]:
@@ -33,3 +33,15 @@ def load(name: str) -> Model:
     """
     model: Model = _registry.load_plugin("model", __name__, list(__path__), name).MODEL
     return model
+
+
+def chosen(model: str | Model) -> Model:
+    """A model by its name, or itself.
+
+    Raises:
+        UnknownName: if there is no model of that name.
+        InvalidValue: for what is neither.
+    """
+    from crossbody.hw.models._contract import Model
+
+    return load(model) if isinstance(model, str) else _arguments.instance("model", model, Model, "a model or its name")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from crossbody.cases import Case, Coordinate, Limit, Parameter, SceneError, Trajectory, UnknownName, Value
+from crossbody.cases import Case, Coordinate, Limit, Parameter, SceneError, Trajectory, UnknownName, Value, _arguments
 
 if TYPE_CHECKING:
     from crossbody.hw.reading.log import Log
@@ -132,6 +132,8 @@ class Model:
             UnknownName: for a parameter that the model does not have.
             InvalidValue: for one outside its bounds.
         """
+        if given is not None:
+            _arguments.instance(f"{self.name}: parameters", given, Mapping, "a table of names and values")
         found = {name: p.default for name, p in self.parameters.items()}
         for name, value in (given or {}).items():
             if name not in self.parameters:
@@ -146,7 +148,9 @@ class Model:
 
     def check_log(self, log: Log) -> None:
         """Raise SceneError for a log that lacks a measured coordinate; it names what there is."""
-        have = log.names("coordinates")
+        from crossbody.hw.reading.log import Log
+
+        have = _arguments.instance("log", log, Log, "a log that was read").names("coordinates")
         lacking = [name for name in self.channels if name not in have]
         if lacking:
             raise SceneError(

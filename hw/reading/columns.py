@@ -27,7 +27,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from crossbody.cases import ColumnMapError, FormatUnavailable, InvalidValue
+from crossbody.cases import ColumnMapError, FormatUnavailable, InvalidValue, _arguments
 from crossbody.hw.reading.units import to_si
 
 LARGEST = 1 << 20  # bytes of a map
@@ -133,7 +133,7 @@ def load_columns(source: str | Path) -> Columns:
         ColumnMapError: with the path of the key, for what is no TOML, an unknown key, a wrong type, a number that is
             not finite or a unit that does not exist.
     """
-    path = Path(source)
+    path = Path(_arguments.path("columns", source))
     if str(source) in maps():
         path = MAPS / f"{source}.toml"
     try:
@@ -150,6 +150,9 @@ def load_columns(source: str | Path) -> Columns:
 
 def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns:
     """A column map from TOML text; see `load_columns`."""
+    path = _arguments.path("path", path)
+    if not isinstance(text, (bytes, str)):
+        raise InvalidValue(f"text is {_arguments.shown(text)}; it must be TOML, as text or bytes.")
     try:
         found = msgspec.toml.decode(text)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
@@ -162,6 +165,7 @@ def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns
 
 def dump_columns(columns: Columns) -> str:
     """The TOML text of a map; it reads back as the same map."""
+    _arguments.instance("columns", columns, Columns, "a column map")
     try:
         return msgspec.toml.encode(columns).decode()
     except ImportError as error:  # msgspec's own words do not name our extra

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import SceneError, UnknownName
+from crossbody.cases import SceneError, UnknownName, _arguments
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading.columns import Role
 
@@ -159,7 +159,9 @@ class Log:
 
         Raises:
             SceneError: if that leaves no row.
+            InvalidValue: for what is no number.
         """
+        start, stop = _arguments.real("start", start), _arguments.real("stop", stop)
         a, b = np.searchsorted(self.time, (start, stop))
         if a >= b:
             raise SceneError(

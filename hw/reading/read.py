@@ -69,7 +69,7 @@ def scan(
     Raises:
         ColumnMapError, LogFormatError, FormatUnavailable, UnknownName: as `read`.
     """
-    with _opened(Path(path), columns, part, memory) as found:
+    with _opened(path, columns, part, memory) as found:
         for source in found.plan.joined:
             text = "has other rows than the times; only `read` joins them."
             raise LogFormatError(path, text, column=source.signal.column)
@@ -77,7 +77,12 @@ def scan(
 
 
 @contextmanager
-def _opened(path: Path, columns: Columns | str | Path | None, part: int | None, memory: int) -> Iterator[Scan]:
+def _opened(
+    log: str | Path, columns: Columns | str | Path | None, part: int | None, memory: int
+) -> Iterator[Scan]:  # fmt: skip
+    path = Path(_arguments.path("log", log))
+    if part is not None:
+        _arguments.instance("part", part, int, "a whole number")
     chosen = _store.columns_of(path) if columns is None else columns
     chosen = chosen if isinstance(chosen, Columns) else load_columns(chosen)
     if (part is None) != (not chosen.part):
@@ -126,8 +131,6 @@ def read(
     path = Path(_arguments.path("log", path))
     if limit is not None:
         _arguments.real("limit", limit)
-    if part is not None:
-        _arguments.instance("part", part, int, "a whole number")
     if columns is not None and not isinstance(columns, Columns):
         _arguments.path("columns", columns)
     if isinstance(repair, np.ndarray) or not isinstance(repair, Collection):
@@ -136,7 +139,7 @@ def read(
     stored = _store.about(Path(path)) if columns is None else None
     if stored is not None and repair:
         raise InvalidValue(f"{path} is a stored log, which is never repaired; repair {stored.provenance.file} instead.")
-    with _opened(Path(path), columns, part, memory) as found:
+    with _opened(path, columns, part, memory) as found:
         plan = found.plan
         block, repairs, checks = _gather(found, repair, found.limit if limit is None else limit)
         step = plan.columns.time.sample_time or plan.step or checks.clock.step
@@ -235,7 +238,7 @@ def check(
     Raises:
         ColumnMapError, LogFormatError, FormatUnavailable: if it cannot be read at all.
     """
-    with _opened(Path(path), columns, part, memory) as found:
+    with _opened(path, columns, part, memory) as found:
         for _ in found.rows():
             pass
         told = list(found.checks.findings())
@@ -263,5 +266,5 @@ def parts(path: str | Path, columns: Columns | str | Path, *, memory: int = form
     chosen = columns if isinstance(columns, Columns) else load_columns(columns)
     if not chosen.part:
         raise InvalidValue("The map names no column by `part`: the file holds one run.")
-    with _opened(Path(path), chosen, 0, memory) as found:
+    with _opened(path, chosen, 0, memory) as found:
         return found.stream.parts()

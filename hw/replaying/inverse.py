@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crossbody.cases import SceneError, Value
+from crossbody.cases import SceneError, Value, _arguments
 from crossbody.engines._equations import system_of
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model, Segment
@@ -82,7 +82,7 @@ def inverse(
             that it cannot, the coordinates that none of them moves, and the condition.
         InvalidValue: for a log shorter than a polynomial.
     """
-    chosen = models.load(model) if isinstance(model, str) else model
+    chosen = models.chosen(model)
     balance = _balance(log, chosen, parameters, delay, half, degree, stride)
     B = balance.inputs[:, :, : len(chosen.inputs)]
     have = all(name in log.names("inputs") for name in chosen.inputs)
@@ -118,7 +118,7 @@ def pushed(model: str | Model) -> Model:
     Raises:
         SceneError: if it has no input for a force that acts besides its torques.
     """
-    chosen = models.load(model) if isinstance(model, str) else model
+    chosen = models.chosen(model)
     if not chosen.forces:
         raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
     return chosen
@@ -160,6 +160,9 @@ def _balance(
     log: Log, model: Model, parameters: Mapping[str, Value] | None, delay: float, half: int, degree: int, stride: int
 ) -> _Balance:
     model.check_log(log)
+    delay = _arguments.real("delay", delay)
+    half, degree = _arguments.whole("half", half), _arguments.whole("degree", degree, 0)
+    stride = _arguments.whole("stride", stride)
     y, _ = model.read(model, log)
     rows = _rows(log, half, stride)
     smooth = derivatives(log.time, y, half, degree, rows)

@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 
 from crossbody import engines
-from crossbody.cases import CaseUnsupported, EngineUnavailable, InvalidValue, SceneError, Trajectory, UnknownName, Value
+from crossbody.cases import (
+    CaseUnsupported,
+    EngineUnavailable,
+    InvalidValue,
+    SceneError,
+    Trajectory,
+    UnknownName,
+    Value,
+    _arguments,
+)
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
@@ -53,9 +62,12 @@ def replay(
         SceneError: if the log lacks what the model needs, or a start is impossible.
         InvalidValue: for a number outside its range.
     """
-    chosen = models.load(model) if isinstance(model, str) else model
+    chosen = models.chosen(model)
     numbers = chosen.numbers(parameters)
-    if kind not in KINDS:
+    wanted = _arguments.texts("wanted", wanted)
+    if settings is not None:
+        _arguments.instance("settings", settings, Mapping, "a table of names and values")
+    if _arguments.instance("kind", kind, str, f"one of {', '.join(KINDS)}") not in KINDS:
         raise UnknownName("kind of replay", kind, KINDS)
     if kind == "closed_loop" and chosen.loop is None:
         raise InvalidValue(f"{chosen.name} has no controller; replay it forward.")

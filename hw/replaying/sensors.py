@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from crossbody.cases import InvalidValue
+from crossbody.cases import InvalidValue, _arguments
+from crossbody.cases._arrays import frozen
 
 Floats = NDArray[np.float64]
 
@@ -100,8 +101,13 @@ def unlagged(t: Floats, y: Floats, rate: float, noise: float, quantum: float = 0
     Raises:
         InvalidValue: for a rate or a noise outside its range.
     """
+    rate, noise = _arguments.real("rate", rate), _arguments.real("noise", noise)
+    quantum = _arguments.real("quantum", quantum)
     if not (0.0 < rate < math.inf and noise >= 0.0 and quantum >= 0.0):
         raise InvalidValue(f"rate is {rate!r} 1/s, noise {noise!r}, quantum {quantum!r}; valid: above 0, at least 0.")
+    t, y = frozen("unlagged", "t", t, (None,)), frozen("unlagged", "y", y, (None, None))
+    if len(t) != len(y) or len(t) < 2:
+        raise InvalidValue(f"{len(t)} times and {len(y)} readings: there must be as many of both, at least two.")
     c = np.exp(-rate * np.diff(t))[:, None]
     force = (y[1:] - c * y[:-1]) / (1.0 - c)
     each = math.hypot(noise, quantum / math.sqrt(12.0))

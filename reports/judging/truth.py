@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Case, Tier, Trajectory
+from crossbody.cases import Case, Tier, Trajectory, _arguments
 from crossbody.cases._arrays import Floats
 from crossbody.cases._trajectory import Ledger
 from crossbody.reports.judging._between import between
@@ -85,6 +85,7 @@ def truth_of(case: Case) -> Truth:
     from crossbody import engines
     from crossbody.engines._equations import builder
 
+    _arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
         return _integrated(case, _tight(case), "cvode" if case.fsm == "level" else "compiled")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from crossbody.cases import OutputError
 
@@ -68,6 +69,19 @@ def _inside(where: int, name: str, folder: Path) -> int:
         raise
     except OSError:
         raise OutputError(f"{folder / name} is a link or no folder; crossbody follows no link there.") from None
+
+
+def decoded(text: bytes) -> Any:
+    """JSON that a stranger may have written.
+
+    Raises:
+        ValueError: for what is no JSON, or holds half of a surrogate pair, which no file can be written with.
+        RecursionError: for what is nested too deeply.
+    """
+    found = json.loads(text)
+    if b"\\ud" in text.lower():
+        json.dumps(found, ensure_ascii=False).encode()
+    return found
 
 
 def open_inside(folder: Path, name: str) -> BinaryIO:

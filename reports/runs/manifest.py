@@ -103,7 +103,7 @@ def read(folder: Path) -> Manifest:
 def _studies(path: Path, text: str) -> dict[str, frozenset[str]]:
     """Studies of a manifest, every name looked at: files are removed by it."""
     try:
-        found: Any = json.loads(text)["studies"]
+        found: Any = files.decoded(text.encode())["studies"]
         told = {str(study): frozenset(names) for study, names in found.items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise OutputError(f"{path} is not a manifest of crossbody: it has no table `studies` of lists.") from None

@@ -229,7 +229,7 @@ def _kept(made: Path, study: str) -> Path:
 def _place(home: Path, ready: Path) -> None:
     """Move the files of a finished study to their places; may be begun again after any of its steps."""
     try:
-        plan = json.loads(files.read_inside(ready, PLAN))
+        plan = files.decoded(files.read_inside(ready, PLAN))
         own, study, adds = [str(name) for name in plan["files"]], str(plan["study"]), bool(plan["adds"])
     except (FileNotFoundError, ValueError, KeyError, TypeError):
         own, study, adds = [], "", True

@@ -109,7 +109,7 @@ class Parts:
 
 def _offer(left: Path) -> None:
     try:
-        told = json.loads(files.read_inside(left, ABOUT))
+        told = files.decoded(files.read_inside(left, ABOUT))
         command = str(told["command"])
     except (OSError, ValueError, KeyError, TypeError):
         command = "a command"

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
-from crossbody.reports.runs.files import open_inside
+from crossbody.reports.runs.files import decoded, open_inside
 
 _KEY = b"crossbody"
 _ARRAYS = ("q", "v", "gap", "lam", "energy", "mode")
@@ -102,7 +102,7 @@ def peek(path: Path) -> dict[str, Any]:
         OSError, ValueError, KeyError: if it is not one of ours; says which field is not as expected.
     """
     with _opened(path) as file:
-        told = json.loads((pq.read_schema(file).metadata or {})[_KEY])
+        told = decoded((pq.read_schema(file).metadata or {})[_KEY])
     _check(told, "", _TOLD)
     _check(told["about"], "about.", _ABOUT)
     known: dict[str, Any] = told
@@ -161,7 +161,7 @@ _BROKEN = (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError,
 def _loaded(path: Path) -> Trace:
     with _opened(path) as file:
         data = pq.read_table(file)
-    about = json.loads((data.schema.metadata or {})[_KEY])
+    about = decoded((data.schema.metadata or {})[_KEY])
     _check(about, "", _TOLD)
     run = replace(
         _motion(data, ""),

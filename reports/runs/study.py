@@ -70,7 +70,7 @@ def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) ->
 
 def _read_case(part: Path) -> dict[str, list[dict[str, Any]]]:
     try:
-        told: Any = json.loads(files.read_inside(part, CASE))
+        told: Any = files.decoded(files.read_inside(part, CASE))
         return {name: [dict(row) for row in told[name]] for name in ("verdicts", "audit")}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise OutputError(f"{part} is no part of a run; remove {part.parent}.") from None
@@ -168,7 +168,7 @@ def read_json(path: Path) -> Any:
         OutputError: if it is not there, not readable, a link, or not of that form; names file and field.
     """
     try:
-        found = json.loads(files.read_inside(path.parent, path.name))
+        found = files.decoded(files.read_inside(path.parent, path.name))
     except OutputError:
         raise
     except (OSError, ValueError, RecursionError):

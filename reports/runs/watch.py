@@ -17,6 +17,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 
@@ -175,7 +176,8 @@ class _Watch:
             _end(self.child)
             return
         self.signalled, self.deadline = number, time.monotonic() + GRACE
-        os.kill(self.child, signal.SIGINT)
+        with suppress(ProcessLookupError):  # it has ended meanwhile, of itself or by the same Ctrl-C
+            os.kill(self.child, signal.SIGINT)
 
     def _look(self, _number: int, _frame: FrameType | None) -> None:
         now = time.monotonic()

@@ -88,7 +88,7 @@ class Store:
 
     def _compare(self, known: Path) -> None:
         try:
-            before = dict(json.loads(files.read_inside(known.parent, known.name)))
+            before = dict(files.decoded(files.read_inside(known.parent, known.name)))
         except (OSError, ValueError, TypeError, RecursionError):
             raise OutputError(f"{known} cannot be read; name a new folder for the sweep.") from None
         other = [key for key in {**before, **self.about} if before.get(key) != self.about.get(key)]

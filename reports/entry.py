@@ -1,0 +1,21 @@
+"""The entry point of a shell: ready for Ctrl-C before anything that takes long to import."""
+
+from __future__ import annotations
+
+import os
+import signal
+from types import FrameType
+
+
+def main() -> None:
+    """Run the command `crossbody`."""
+    signal.signal(signal.SIGINT, _leave)
+    from crossbody.reports import cli
+
+    cli.main()
+
+
+def _leave(_number: int, _frame: FrameType | None) -> None:
+    """End at once: an exception might be swallowed by what is being imported."""
+    os.write(2, b"crossbody: interrupted.\n")
+    os._exit(128 + signal.SIGINT)
