@@ -102,7 +102,7 @@ def _bearable(cut: Sequence[Window], stride: int) -> bool:
     """Whether the derivatives by all starts of these windows are few enough to be kept at once."""
     k = cut[0].y.shape[1]
     rows = k * sum(-(-len(window.t) // stride) for window in cut)
-    return 2 * k * len(cut) * rows <= MOST_DERIVATIVES
+    return bool(2 * k * len(cut) * rows <= MOST_DERIVATIVES)
 
 
 def _limits(

@@ -63,7 +63,7 @@ def moves(problem: Exact, x: Floats, sizes: Floats, fixed: Sequence[int]) -> dic
     step = told.weights.T @ r
     spread = scatter(told.basis, told.weights, r - told.basis @ (told.basis.T @ r), joint.layout)
     seen = np.all(np.abs(told.null) < WEIGHT, axis=0) if len(told.null) else np.ones(len(loose), dtype=bool)
-    limit = stats.t.isf(0.5 * UNLIKELY / len(loose), spread.freedom)
+    limit = np.atleast_1d(stats.t.isf(0.5 * UNLIKELY / len(loose), spread.freedom))
     return {
         int(i): Move(by=float(b), std=float(s), refuted=bool(abs(b) > q * s))
         for i, b, s, q, known in zip(loose, step, spread.std, limit, seen, strict=True)
