@@ -55,7 +55,7 @@ class Exact:
         for name in free:
             if name not in model.places and name != DELAY:
                 raise UnknownName(f"free parameter of {model.name}", name, (*model.places, DELAY))
-        self.starts, self.k = starts, len(model.seen)
+        self.starts, self.stride, self.k = starts, stride, len(model.seen)
         self.grids = [np.unique(np.append(np.arange(0, len(w.t), stride), len(w.t) - 1)) for w in cut]
         self.systems: dict[bytes, tuple[System, Floats]] = {}
         self.parts = 1
@@ -81,17 +81,25 @@ class Exact:
 
     def residual(self, x: Floats) -> Floats:
         """All windows' residuals (N,)."""
-        return np.concatenate([self._window(j, x, None)[0] for j in range(len(self.cut))])
+        return np.concatenate([self.residual_of(j, x) for j in range(len(self.cut))])
 
     def jacobian(self, x: Floats) -> Floats:
         """Their derivatives (N, P)."""
-        blocks = []
-        for j, grid in enumerate(self.grids):
-            block = np.zeros((self.k * len(grid), len(x)))
-            for i in self._columns(j):
-                block[:, i] = self._window(j, x, i)[1]
-            blocks.append(block)
-        return np.concatenate(blocks)
+        found = np.zeros((len(self.layout.windows()), len(x)))
+        begin = 0
+        for j in range(len(self.cut)):
+            block = self.block(j, x)
+            found[begin : begin + len(block), self._columns(j)] = block
+            begin += len(block)
+        return found
+
+    def residual_of(self, j: int, x: Floats) -> Floats:
+        """Residuals of one window (k m,)."""
+        return self._window(j, x, None)[0]
+
+    def block(self, j: int, x: Floats) -> Floats:
+        """Their derivatives by the parameters and, where it is free, by the window's own start."""
+        return np.stack([self._window(j, x, i)[1] for i in self._columns(j)], axis=1)
 
     def checked(self, x: Floats, J: Floats, sizes: Floats, low: Floats) -> float:
         """Largest relative difference of the first columns of J, one for each size, and central differences."""

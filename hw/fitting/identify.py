@@ -17,17 +17,19 @@ from crossbody.hw.fitting.judged import Search, judged
 from crossbody.hw.fitting.search import search
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.windows import windows
+from crossbody.hw.replaying.windows import Window, windows
 
 LONGEST_DELAY = 0.1
 """Bound on an identified delay, s."""
 BUDGET = 300.0
 """Time for a search, s."""
+MOST_DERIVATIVES = 20_000_000
+"""Derivatives by starts that "auto" lets be unknowns: 160 MB, and several times that in the search."""
 
 
 def identify(
     log: Log | Sequence[Log], model: str | Model, free: Sequence[str], *, parameters: Mapping[str, Value] | None = None,
-    restart: float | None = None, horizon: float | None = None, starts: str = "measured", hold: int = 2,
+    restart: float | None = None, horizon: float | None = None, starts: str = "auto", hold: int = 2,
     stride: int = 1, bounds: Mapping[str, tuple[float, float]] | None = None, engine: str = "",
     delay: float = 0.0, budget: float = BUDGET,
 ) -> Fit:  # fmt: skip
@@ -43,7 +45,8 @@ def identify(
         parameters: where not the model's defaults: the start of the search, and what is kept.
         restart: time between restarts, s; the model's usual one if not given; 0 for one window a log.
         horizon: length of a window, s; up to the next restart if not given.
-        starts: "measured": each window starts at the measured state; "free": the starts are unknowns too.
+        starts: "free": the start of each window is an unknown too; "measured": it is the measured state, whose noise no
+            interval counts; "auto": free wherever derivatives are exact and the unknowns are not too many.
         hold: every so manieth window is held out; 0 for none.
         stride: of so many samples one is compared (neighbours that tell the same need not all be).
         bounds: name -> lowest and highest value, inside those of the model.
@@ -80,7 +83,8 @@ def identify(
         raise SceneError("No window is left to fit; hold fewer out, or restart more often.")
     kind: Any = Exact if chosen.places and not engine else Differences
     more = (engine,) if kind is Differences else ()
-    problem = kind(chosen, numbers, free, [cut[i] for i in fitted], starts == "free", stride, *more)
+    joint = starts == "free" or (starts == "auto" and kind is Exact and _bearable([cut[i] for i in fitted], stride))
+    problem = kind(chosen, numbers, free, [cut[i] for i in fitted], joint, stride, *more)
     limits = _limits(chosen, free, bounds or {}, len(problem.first()))
     x0 = np.clip(problem.first(), *limits)
     found = search(problem, limits, lambda x: _sizes(x, *limits), len(free), budget)
@@ -101,10 +105,17 @@ def _check(model: Model, free: Sequence[str], starts: str, hold: int, stride: in
     unknown = [name for name in free if name != DELAY and name not in model.parameters]
     if unknown:
         model.numbers(dict.fromkeys(unknown, 0.0))
-    if starts not in ("measured", "free") or hold < 0 or hold == 1 or stride < 1:
-        raise InvalidValue("starts is measured or free, hold is 0 or at least 2, stride at least 1.")
+    if starts not in ("auto", "measured", "free") or hold < 0 or hold == 1 or stride < 1:
+        raise InvalidValue("starts is auto, measured or free, hold is 0 or at least 2, stride at least 1.")
     if not 0.0 < budget < math.inf:
         raise InvalidValue(f"budget is {budget!r} s; it must be above 0 and finite.")
+
+
+def _bearable(cut: Sequence[Window], stride: int) -> bool:
+    """Whether the derivatives by all starts of these windows are few enough to be kept at once."""
+    k = cut[0].y.shape[1]
+    rows = k * sum(-(-len(window.t) // stride) for window in cut)
+    return bool(2 * k * len(cut) * rows <= MOST_DERIVATIVES)
 
 
 def _limits(

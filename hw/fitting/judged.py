@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from crossbody.cases import Value
 from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Scatter, scatter
-from crossbody.hw.fitting.derivative import DELAY
+from crossbody.hw.fitting.derivative import DELAY, Exact
 from crossbody.hw.fitting.fit import Agreement, Estimate, Fit
 from crossbody.hw.fitting.information import WEIGHT, in_words, information, unseen_by, weak
 from crossbody.hw.fitting.search import Found
+from crossbody.hw.fitting.start_noise import moves
 from crossbody.hw.models._contract import Model
 
 Floats = NDArray[np.float64]
@@ -23,6 +24,9 @@ TOGETHER = 0.999
 """Correlation from which on two parameters are told apart by nothing but noise."""
 EFFECTIVE = 4.0
 """Degrees of freedom below which a standard deviation is itself hardly known."""
+MEASURED = "The windows start as measured: no interval counts the noise of a start; {}."
+COUNTED = 'with starts="free" they would'
+NEVER = "where contacts open the starts cannot be unknowns"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,7 +68,8 @@ def judged(search: Search) -> Fit:
     own = np.flatnonzero(loose < count)
     spread = scatter(told.basis, told.weights[:, own], found.residual, problem.layout)
     open_ = np.any(null != 0.0, axis=0) if len(null) else np.zeros(count, dtype=bool)
-    flat = problem.flat(x)
+    narrow = _narrow(search, dict(zip(loose[own].tolist(), spread.half.tolist(), strict=True)))
+    flat = narrow | problem.flat(x)
     estimates = tuple(_estimates(search, spread, loose[own], blind, open_, flat))
     unseen = _unseen(search, null, spread, loose[own], blind)
     halves = agreement(
@@ -83,7 +88,9 @@ def judged(search: Search) -> Fit:
         covariance=spread.how, warnings=(), evaluations=found.evaluations, success=found.success,
         message=found.message,
     )  # fmt: skip
-    return replace(fit, warnings=tuple(_warnings(fit, unseen, found, flat, off, problem.tolerance)))
+    about = [] if problem.starts else [MEASURED.format(COUNTED if isinstance(problem, Exact) else NEVER)]
+    warnings = (*_warnings(fit, unseen, found, flat, off, problem.tolerance), *about)
+    return replace(fit, warnings=warnings)
 
 
 def _estimates(
@@ -118,6 +125,21 @@ def _identifiable(value: float, half: float, bounds: tuple[float, float]) -> boo
     signed = bounds[0] < 0.0 < bounds[1]
     size = 0.5 * (bounds[1] - bounds[0]) if signed and np.isfinite(bounds[1] - bounds[0]) else abs(value)
     return bool(half < size)
+
+
+def _narrow(search: Search, halves: Mapping[int, float]) -> dict[int, str]:
+    """Parameters that free starts would move out of their intervals from measured ones: index -> that in words."""
+    problem, found, count = search.problem, search.found, len(search.free)
+    if problem.starts or not isinstance(problem, Exact) or not found.success:
+        return {}
+    fixed = [*found.kept, *np.flatnonzero(found.active).tolist()]
+    told = moves(problem, found.x[:count], search.sizes[:count], fixed)
+    return {
+        i: f"its interval of +- {halves[i]:.2g} is from windows that start as measured, and a first step to free "
+        f"starts changes it by {move.by:+.2g}"
+        for i, move in told.items()
+        if move.refuted and abs(move.by) > halves[i]
+    }
 
 
 def _unseen(

@@ -69,7 +69,7 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 @_replayed
 @click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter, or delay; repeatable.")
 @click.option("--hold", type=int, default=2, show_default=True, help="Every so manieth window is held out; 0: none.")
-@click.option("--starts", type=click.Choice(["measured", "free"]), default="measured", show_default=True)
+@click.option("--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True)
 @click.option("--stride", type=int, default=1, show_default=True, help="Of so many samples one is compared.")
 @click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time of the search, s.")
 @speaks

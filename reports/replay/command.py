@@ -113,7 +113,7 @@ def run_identify(
         ask: log, map and model.
         free: names of the parameters; "delay" is that of the measured coordinates.
         hold: every so manieth window is held out.
-        starts: "measured" or "free".
+        starts: "auto", "measured" or "free".
         stride: of so many samples one is compared.
         budget: time that the search may take, s.
         out: folder to write.
