@@ -23,6 +23,7 @@ from crossbody.reference.systems import _none
 
 SLICE, SLICE_S = 200, 0.05  # first steps between two looks at the clock, and the time aimed at, s
 ROWS, EVENTS, HISTORY = 256, 256, 64
+RESOLUTION = 64.0 * float(np.finfo(np.float64).eps)  # part of the whole time by which instants differ
 OUTCOMES = {
     layout.DONE: Outcome.FINISHED,
     layout.MORE: Outcome.STEP_LIMIT,
@@ -151,8 +152,11 @@ class CompiledRun:
             return Outcome.INTERRUPTED
 
     def _ended(self, code: int) -> Outcome:
-        """The outcome of a code; an account that holds NaN is not open, a kernel spoilt it."""
+        """The outcome of a code; an account or a pivot that a kernel spoilt by NaN is neither open nor vanished."""
         spoilt = code == layout.INCONSISTENT and not np.isfinite(self.state["energy_open"][0])
+        if code == layout.ILL_POSED:
+            step = float(self.state["h"][0]) + RESOLUTION * float(self.options.t_end)
+            spoilt = self._blamed(*np.split(self.work["y"], 2), step) != ""
         return Outcome.NOT_FINITE if spoilt else OUTCOMES[code]
 
     def _finite_rows(self) -> int:
@@ -237,14 +241,14 @@ class CompiledRun:
             return f"The accelerations do not follow the law of rows {marked}, as `rows` has them, after "
         return ""
 
-    def _blamed(self, q: Floats, v: Floats) -> str:
-        """The kernel that gave what is not finite, at the first bad row or else behind the end of the motion."""
+    def _blamed(self, q: Floats, v: Floats, within: float = np.inf) -> str:
+        """The kernel that gave what is not finite, at the first bad row or else `within` s of the motion's end."""
         n, state, t = self.system.n, self.state[0], float(self.state["t"][0])
         row = self._finite_rows()
         if row < state["rows"] and np.all(np.isfinite(self.buffers["out"][row, : 1 + 2 * n])):
             t, (q, v) = self.buffers["out"][row, 0], np.split(self.buffers["out"][row, 1 : 1 + 2 * n], 2)
         active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
-        ahead = max(float(self.options.t_end) - t, 0.0)
+        ahead = min(max(float(self.options.t_end) - t, 0.0), within)
         return not_finite(self.system, t, np.concatenate([q, v]), self.work["u"], self.model[0], active, ahead)
 
 
