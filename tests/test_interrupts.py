@@ -178,8 +178,10 @@ def test_a_child_that_has_ended_already_is_not_told_to(monkeypatch: pytest.Monke
 def test_a_reader_that_has_enough_is_no_fault(tmp_path: Path) -> None:
     command = [sys.executable, "-c", ENTRY, "list"]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None and process.stderr is not None
+    assert process.stdout is not None
+    assert process.stderr is not None
     process.stdout.readline()
     process.stdout.close()
-    assert process.stderr.read() == ""
+    with process.stderr as said:
+        assert said.read() == ""
     assert process.wait(timeout=20) == 0
