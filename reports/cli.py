@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import click
+from click.utils import PacifyFlushWrapper
 
 from crossbody.cases import CrossbodyError
 from crossbody.reports.replay.cli import identify, memory_option, replay
@@ -326,8 +327,8 @@ def _obey(arguments: list[str] | None) -> int:
         return _say(str(error))
     except BrokenPipeError:
         return _enough()
-    except SystemExit as error:  # click's own answer to a pipe that is closed
-        if isinstance(error.__context__, BrokenPipeError):
+    except SystemExit:  # click's own answer to a pipe that is closed, whose streams it has wrapped
+        if isinstance(sys.stdout, PacifyFlushWrapper):
             return _enough()
         raise
     except Exception as error:

@@ -306,3 +306,20 @@ def test_the_command_shows_and_clears(folder):
     assert f"{folder}: 1 files" in run.invoke(cli, ["cache"]).output
     assert json.loads(run.invoke(cli, ["cache", "clear", "--json"]).output) == {"removed": 1}
     assert not list(folder.iterdir())
+
+
+def test_a_folder_in_place_of_a_file_is_told_and_written_over(folder, capsys):
+    """An empty one; one that holds something of somebody's stays where it is."""
+    folder.mkdir(parents=True, mode=0o700)
+    store = Store(folder)
+    name, other = f"f-{0:032x}", f"g-{1:032x}"
+    for taken in (name, other):
+        (folder / (taken + CODE)).mkdir()
+    (folder / (other + CODE) / "mine").touch()
+    assert store.read(name) is store.read(other) is None
+    assert capsys.readouterr().err.count("is no file; it is compiled again") == 2
+    store.write(name, b"code")
+    store.write(other, b"code")
+    assert store.read(name) == b"code"
+    assert "cannot be kept" in capsys.readouterr().err
+    assert (folder / (other + CODE) / "mine").exists()

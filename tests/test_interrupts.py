@@ -13,6 +13,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from crossbody.reports.runs import watch
+
 STUCK = Path(__file__).parent / "stuck_engine.py"
 SECOND = 1.0
 """Within this a command has stopped, s; start-up of the interpreter is no part of it."""
@@ -142,3 +144,44 @@ def test_an_interrupt_at_any_instant_stops_and_loses_nothing(tmp_path: Path, cou
     assert code in (0, 1), said
     assert len(pd.read_parquet(out / "verdicts.parquet"))
     assert not list(out.glob(".crossbody-*"))
+
+
+ENTRY = (
+    "import sys; sys.argv[0] = 'crossbody'; from crossbody.reports.entry import main; print('.', flush=True); main()"
+)
+
+
+@pytest.mark.parametrize("after", [0.02, 0.1, 0.3])
+def test_an_interrupt_while_the_command_is_imported_is_one_sentence(after: float, tmp_path: Path) -> None:
+    command = [sys.executable, "-c", ENTRY, "analyse", "bouncing_ball"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    process.stdout.readline()
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert re.fullmatch(r"crossbody: interrupted\..*\n", said)
+
+
+def test_a_child_that_has_ended_already_is_not_told_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*_: int) -> None:
+        raise ProcessLookupError
+
+    monkeypatch.setattr(watch.os, "kill", gone)
+    one = watch._Watch(lambda: 0, watch._Diary())
+    one.child = 2**22 + 1
+    one._stop(signal.SIGINT, None)
+    assert one.signalled == signal.SIGINT
+
+
+def test_a_reader_that_has_enough_is_no_fault(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", ENTRY, "list"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.readline()
+    process.stdout.close()
+    with process.stderr as said:
+        assert said.read() == ""
+    assert process.wait(timeout=20) == 0

@@ -115,7 +115,7 @@ def test_the_stated_memory_decides(tmp_path: Path) -> None:
     assert len(hw.read(tmp_path / "log.parquet", _columns(("a", "b")), memory=50_000_000)) == rows
     with pytest.raises(LogFormatError, match="limit"):
         hw.read(tmp_path / "log.parquet", _columns(("a", "b")), memory=1_000_000)
-    with pytest.raises(InvalidValue, match="above 0"):
+    with pytest.raises(InvalidValue, match="from 1 on"):
         hw.read(tmp_path / "log.parquet", _columns(("a", "b")), memory=0)
 
 
@@ -168,3 +168,46 @@ def test_chunks_of_messages_are_decoded_once(tmp_path: Path, monkeypatch: pytest
         summary = mcap.reader.make_reader(file).get_summary()
     assert summary is not None
     assert len(count) == len(summary.chunk_indexes) > 10
+
+
+@pytest.mark.parametrize("skip", [4, 2 * 10**9, 9 * 10**18])
+def test_no_more_lines_are_left_out_than_there_are(skip: int, tmp_path: Path) -> None:
+    path = tmp_path / "short.csv"
+    path.write_text("t,x\n0,1\n1,2\n")
+    columns = hw.parse_columns(
+        f'options = {{skip = {skip}}}\n[time]\ncolumn = "t"\nunit = "s"\n[sensors]\nx = {{column = "x", unit = "1"}}'
+    )
+    with pytest.raises(LogFormatError, match="has 3 lines"):
+        hw.read(path, columns)
+
+
+WIDE = """
+import sys
+import h5py, pandas  # what is loaded already counts for nothing
+import pyarrow as pa, pyarrow.parquet as pq
+from crossbody import hw
+from crossbody.cases import CrossbodyError
+folder = sys.argv[1]
+with open(folder + "/wide.csv", "w") as file:
+    file.write(",".join(f"c{i}" for i in range(19_999)) + "\\n" + (",".join(["0"] * 19_999) + "\\n") * 60)
+schema = pa.schema([(f"a{i}", pa.float64()) for i in range(4)])
+with pq.ParquetWriter(folder + "/often.parquet", schema) as file:
+    for i in range(500):
+        file.write_table(pa.table({name: [float(i)] for name in schema.names}, schema=schema))
+rows = [hw.survey(f"{folder}/{name}").groups[0].rows for name in ("wide.csv", "often.parquet")]
+assert rows == [60, 500], rows
+with open(folder + "/narrow.csv", "w") as file:
+    file.write("t,x\\n0,1\\n1,2\\n")
+for memory in (1, 1 << 20, 1 << 24, 1 << 27, 1 << 29):
+    for name in ("wide.csv", "often.parquet", "narrow.csv"):
+        try:
+            hw.survey(f"{folder}/{name}", memory=memory)
+        except CrossbodyError as error:
+            print(memory, name, error)
+"""
+
+
+def test_a_wide_table_and_many_row_groups_are_read_within_the_usual_memory(tmp_path: Path) -> None:
+    """With little memory they are refused; nothing ends the process."""
+    done = subprocess.run([sys.executable, "-c", WIDE, str(tmp_path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

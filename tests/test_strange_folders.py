@@ -187,3 +187,20 @@ def test_pages_run_their_own_scripts_alone(out: Path) -> None:
 def test_what_is_no_plain_name_is_never_ours() -> None:
     for name in ("a/../b", "/a", "a//b", ".a", "a/b/c", "", "a\0", "a\n", None, 3):
         assert not files.is_plain(name)
+
+
+@pytest.mark.parametrize("name", ["audit.json", "provenance.json", "verdicts.json"])
+def test_half_a_surrogate_pair_is_refused(out: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """JSON can hold one, no file can."""
+    told = json.loads((out / name).read_text())
+    told["said"] = "\ud800"
+    (out / name).write_text(json.dumps(told))
+    assert report(out) == 2
+    assert f"{name} cannot be read" in capsys.readouterr().err
+
+
+def test_whole_surrogate_pairs_and_backslashes_are_read(out: Path) -> None:
+    told = json.loads((out / "provenance.json").read_text())
+    told["command"] = "\U0001f680 \\ud800"
+    (out / "provenance.json").write_text(json.dumps(told))
+    assert report(out) == 0

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import MOST_COLUMNS
+from crossbody.hw.formats._budget import MOST_COLUMNS, current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._csv_fault import find_fault
 from crossbody.hw.formats._guard import library, parsing, plain_allocator
@@ -22,6 +22,8 @@ SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
 DELIMITERS = ",;\t|"
 BLOCK_BYTES = 1 << 20
 WIDE = 0.4  # of the letters' second bytes that are zero in UTF-16
+OPENING = 16 << 20  # bytes that pyarrow takes for a few blocks and its own needs
+COLUMN = 30_000  # bytes that it takes for each column while it parses: 19,000 were seen
 HEAD = 4096  # bytes that tell the encoding
 EXACT = 2**53  # beyond, an integer is no float64
 MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "NA", "N/A"]
@@ -83,6 +85,8 @@ class CsvReader:
         width = _width(path, options, self._delimiter)
         if width > MOST_COLUMNS:  # before anything is made for each of them
             raise LogFormatError(path, f"has {width} columns; a log of more than {MOST_COLUMNS} is not read.")
+        # pyarrow ends the process where memory is denied to it: it is not begun with less than it needs.
+        current(path).hold(OPENING + COLUMN * width, f"a table of {width} columns")
         self.library = library("pyarrow")
         self.refused: dict[str, str] = {}
         batch, schema = self._first()
