@@ -176,7 +176,9 @@ def test_identified_friction_of_the_double_pendulum_does_better_on_windows_not_f
 @needs_pendulum
 def test_identified_friction_of_the_single_pendulum_halves_the_published_error() -> None:
     log = pendulum("single")
-    fit = hw.identify(log, "single_pendulum", ["k1", "s1"], restart=1.0, horizon=5.0, stride=50)
+    fit = hw.identify(
+        log, "single_pendulum", ["k1", "s1"], restart=1.0, horizon=5.0, stride=50, starts="measured"
+    )  # fmt: skip
     errors = after(log, "single_pendulum", fit, 1.0, 5.0, True)
     published = after(log, "single_pendulum", None, 1.0, 5.0, True)
     print(f"5 s: median {np.median(published):.4f} -> {np.median(errors):.4f} rad")
