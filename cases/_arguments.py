@@ -24,7 +24,7 @@ def shown(value: object) -> str:
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
 
 
-def instance(where: str, value: object, kind: type[_Kind], wanted: str) -> _Kind:
+def instance(where: str, value: object, kind: type[_Kind] | tuple[type[_Kind], ...], wanted: str) -> _Kind:
     """Return a value of a type.
 
     Raises:

@@ -156,7 +156,8 @@ class CompiledRun:
         spoilt = code == layout.INCONSISTENT and not np.isfinite(self.state["energy_open"][0])
         if code == layout.ILL_POSED:
             step = float(self.state["h"][0]) + RESOLUTION * float(self.options.t_end)
-            spoilt = self._blamed(*np.split(self.work["y"], 2), step) != ""
+            q, v = np.split(self.work["y"], 2)
+            spoilt = self._blamed(q, v, step) != ""
         return Outcome.NOT_FINITE if spoilt else OUTCOMES[code]
 
     def _finite_rows(self) -> int:

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import click
-from click.utils import PacifyFlushWrapper
 
 from crossbody.cases import CrossbodyError
 from crossbody.reports.replay.cli import identify, memory_option, replay
@@ -328,7 +327,7 @@ def _obey(arguments: list[str] | None) -> int:
     except BrokenPipeError:
         return _enough()
     except SystemExit:  # click's own answer to a pipe that is closed, whose streams it has wrapped
-        if isinstance(sys.stdout, PacifyFlushWrapper):
+        if type(sys.stdout).__name__ == "PacifyFlushWrapper":
             return _enough()
         raise
     except Exception as error:

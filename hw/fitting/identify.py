@@ -69,12 +69,13 @@ def identify(
     budget = _arguments.real("budget", budget)
     _arguments.instance("starts", starts, str, "measured or free")
     _arguments.instance("engine", engine, str, "E or E:PROFILE")
-    for name, pair in _arguments.instance("bounds", bounds or {}, Mapping, "a table of names and pairs").items():  # type: ignore[type-abstract]
-        for end in _arguments.instance(f"bounds of {name}", pair, (tuple, list), "a pair of numbers"):
+    for name, pair in _arguments.instance("bounds", bounds or {}, Mapping, "a table of names and pairs").items():
+        ends: Any = _arguments.instance(f"bounds of {name}", pair, (tuple, list), "a pair of numbers")
+        for end in ends:
             _arguments.real(f"bounds of {name}", end)
     _check(chosen, free, starts, hold, stride, budget)
     logs = (
-        [log] if isinstance(log, Log) else list(_arguments.instance("log", log, Sequence, "a log, or a list of logs"))  # type: ignore[type-abstract]
+        [log] if isinstance(log, Log) else list(_arguments.instance("log", log, Sequence, "a log, or a list of logs"))
     )
     cut = [window for one in logs for window in windows(one, chosen, restart, delay, horizon)]
     held = [i for i in range(len(cut)) if hold and i % hold == hold - 1]

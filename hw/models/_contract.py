@@ -133,7 +133,7 @@ class Model:
             InvalidValue: for one outside its bounds.
         """
         if given is not None:
-            _arguments.instance(f"{self.name}: parameters", given, Mapping, "a table of names and values")  # type: ignore[type-abstract]
+            _arguments.instance(f"{self.name}: parameters", given, Mapping, "a table of names and values")
         found = {name: p.default for name, p in self.parameters.items()}
         for name, value in (given or {}).items():
             if name not in self.parameters:

@@ -66,7 +66,7 @@ def replay(
     numbers = chosen.numbers(parameters)
     wanted = _arguments.texts("wanted", wanted)
     if settings is not None:
-        _arguments.instance("settings", settings, Mapping, "a table of names and values")  # type: ignore[type-abstract]
+        _arguments.instance("settings", settings, Mapping, "a table of names and values")
     if _arguments.instance("kind", kind, str, f"one of {', '.join(KINDS)}") not in KINDS:
         raise UnknownName("kind of replay", kind, KINDS)
     if kind == "closed_loop" and chosen.loop is None:
