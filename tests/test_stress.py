@@ -427,7 +427,7 @@ def test_the_command_of_a_row_repeats_its_run(capsys: pytest.CaptureFixture[str]
     with pytest.raises(SystemExit):
         main([*words[1:], "--setting", "rtol=1e-8", "--json", "--out", str(tmp_path / "out")])
     told = json.loads(capsys.readouterr().out)
-    assert {line["engine"] for line in told} == {"reference"}
+    assert {line["engine"] for line in told} == {"reference", "truth"}
     assert "rtol=1e-08" in told[0]["settings"]
 
 

@@ -323,4 +323,5 @@ class IdaArc(Arc):
 
     def _state(self, t: float, y: Floats) -> State:
         n = self.n
-        return State(t, y[:n], y[n : 2 * n], y[self.work], y[self.lam])
+        # At index 1 lam follows from the state; what is integrated of it is held to a loose tolerance.
+        return State(t, y[:n], y[n : 2 * n], y[self.work], y[self.lam] if self.rigid else None)
