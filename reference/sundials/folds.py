@@ -35,7 +35,8 @@ class Folds:
 
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
-        rows = np.flatnonzero(~np.asarray(equations.system.unilateral, dtype=bool)).tolist()
+        system = equations.system
+        rows = np.flatnonzero(~np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
         self.rows: list[int] = rows if len(rows) > 1 else []  # one row alone has no other to fold onto
         self._before: Floats | None = None
         self._lengths, self._first = np.ones(len(rows)), 0.0
