@@ -138,8 +138,9 @@ class LinearArcs:
 
     def _switch(self, t: float, x: Floats, modes: list[Mode], fired: tuple[int, Mode], events: list[Event]) -> None:
         i, after = fired
-        if after == Mode.BALLISTIC and self._gap(i) @ x > 0.0:
-            after = Mode.FREE
+        gap = self._gap(i)
+        if after == Mode.BALLISTIC and gap @ x > NOISE * (np.abs(gap) @ np.abs(x)):
+            after = Mode.FREE  # clearly above: one that is let go at its touch is at the surface but for rounding
         events.append(Event(t=t, contact=i, before=modes[i], after=after))
         modes[i] = after
 
