@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 UNIT = "1"
 CLAIMED = False
 ROUNDING = 1e-6
-"""Closures rest at zero: of gaps below this part of the largest coordinate two programs agree to rounding alone, which is
-1e-10 of it."""
+"""Closures rest at zero: on gaps below this part of the largest coordinate two programs agree to rounding alone, which
+is 1e-10 of it."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
