@@ -327,7 +327,7 @@ def _obey(arguments: list[str] | None) -> int:
     except BrokenPipeError:
         return _enough()
     except SystemExit:  # click's own answer to a pipe that is closed, whose streams it has wrapped
-        if type(sys.stdout).__name__ == "PacifyFlushWrapper":
+        if type(sys.stdout).__name__.endswith("PacifyFlushWrapper"):
             return _enough()
         raise
     except Exception as error:
