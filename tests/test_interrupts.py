@@ -117,7 +117,7 @@ def test_a_fault_in_an_engine_is_a_row_that_crashed(tmp_path: Path) -> None:
     code, _ = finished(begun("run", "balls.py", "--variant", "linear", "-e", "fake:fault", cwd=tmp_path))
     assert code == 1
     rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet")
-    assert (rows.loc[rows["profile"] == "fault", "verdict"] == "outside").any()
+    assert (rows.loc[rows["profile"] == "fault", "verdict"] == "crashed").all()
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(20, marks=pytest.mark.slow)])
