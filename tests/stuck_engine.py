@@ -38,7 +38,13 @@ def patched(arguments: list[str] | None) -> int:
     profiles = dict.fromkeys(("exact", "slow", "stuck", "crash", "fault"), "")
     fake, real = SimpleNamespace(name="fake", profiles=profiles, versions={}, prepare=prepare), engines.load
     engines.names = lambda: ("fake",)
-    engines.load = lambda name: fake if name == "fake" else real(name)
+
+    def load(name: str) -> Any:
+        if name == "broken":
+            raise LookupError("a fault of its own")
+        return fake if name == "fake" else real(name)
+
+    engines.load = load
     return obey(arguments)
 
 

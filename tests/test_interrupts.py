@@ -113,6 +113,19 @@ def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_p
     assert not (rows.loc[["exact"], "verdict"] == "outside").any()
 
 
+def test_a_fault_of_ours_has_a_code_and_a_file_of_its_own(tmp_path: Path) -> None:
+    code, said = finished(begun("run", "balls.py", "--variant", "linear", "-e", "broken", cwd=tmp_path))
+    assert code == 3
+    found = re.fullmatch(
+        r"crossbody: This is a fault of crossbody \(LookupError: .*\)\. Please report it with (.*)\.\n", said
+    )
+    assert found, said
+    told = Path(found[1])
+    assert "Traceback" in told.read_text()
+    told.unlink()
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_fault_in_an_engine_is_a_row_that_crashed(tmp_path: Path) -> None:
     code, _ = finished(begun("run", "balls.py", "--variant", "linear", "-e", "fake:fault", cwd=tmp_path))
     assert code == 1
