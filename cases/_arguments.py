@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
+import numbers
 import os
 from collections.abc import Collection
-from typing import Any, TypeVar, cast
-
-import numpy as np
+from typing import Any, TypeGuard, TypeVar, cast
 
 from crossbody.cases._errors import InvalidValue
 
@@ -56,7 +55,7 @@ def texts(where: str, value: object) -> tuple[str, ...]:
     Raises:
         InvalidValue: if it is no list of texts; one text alone is none.
     """
-    listed = isinstance(value, Collection) and not isinstance(value, (str, bytes, np.ndarray))
+    listed = isinstance(value, Collection) and not isinstance(value, (str, bytes)) and not hasattr(value, "dtype")
     if not listed or not all(isinstance(one, str) for one in cast("Collection[object]", value)):
         raise InvalidValue(f"{where} is {shown(value)}; it must be a list of names.")
     return tuple(cast("Collection[str]", value))
@@ -68,7 +67,7 @@ def whole(where: str, value: object, low: int = 1) -> int:
     Raises:
         InvalidValue: if it is none, below the lowest that is valid, or beyond 64 bits.
     """
-    if not isinstance(value, (int, np.integer)) or not low <= value < 2**63:
+    if not isinstance(value, numbers.Integral) or not low <= int(value) < 2**63:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a whole number from {low} on.")
     return int(value)
 
@@ -79,7 +78,7 @@ def real(where: str, value: object) -> float:
     Raises:
         InvalidValue: if it is no real number, or not a number.
     """
-    if not isinstance(value, (int, float, np.integer, np.floating, np.bool_)):
+    if not _is_number(value):
         raise InvalidValue(f"{where} is {shown(value)}; it must be a number.")
     try:
         found = float(value)
@@ -90,12 +89,17 @@ def real(where: str, value: object) -> float:
     return found
 
 
+def _is_number(value: Any) -> TypeGuard[float]:
+    """Return whether this is a real number, one of NumPy included, whose switches are no `numbers.Real`."""
+    return isinstance(value, numbers.Real) or (getattr(value, "dtype", "") == "bool" and value.ndim == 0)
+
+
 def flag(where: str, value: Any) -> bool:
     """Return a switch.
 
     Raises:
         InvalidValue: if it is neither true nor false (nor 1 nor 0).
     """
-    if not isinstance(value, (bool, int, float, np.bool_, np.integer, np.floating)) or value not in (0, 1):
+    if not _is_number(value) or value not in (0, 1):
         raise InvalidValue(f"{where} is {shown(value)}; valid: True, False.")
     return bool(value)
