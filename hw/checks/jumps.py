@@ -20,6 +20,7 @@ OUT = 8.0  # times the neighbours' own differences, and the noise, that a step m
 STEPS = 4.0  # of the encoder's grid
 COARSEST = TURN / 100.0  # rad: no encoder's grid, where a single step tells nothing about it
 NOISE = 0.9  # quantile of the second differences of steps that is taken for twice their noise
+FEWEST = 32  # of them that tell it of steps over several samples
 ENOUGH = 1024  # of them that tell it
 LATE = 1.5  # times the usual time of a step: there, samples are missing
 SPANS = (2, 4, 8)  # samples that a slow slip may take
@@ -75,19 +76,39 @@ def find_jumps(
     if len(values) < 2 * EDGE + 2:
         return Jumps(), noise or 0.0
     steps = values[1:] - values[:-1]
-    bends = steps[1:] - steps[:-1]
-    bent = np.abs(bends[1:] - bends[:-1])
-    if noise is None:
-        some = bent[:: max(len(bent) // ENOUGH, 1)]
-        at = int(NOISE * (len(some) - 1))
-        noise = 0.5 * float(np.partition(some, at)[at])
+    bent = _bent(steps)
+    noise = _noise(bent) if noise is None else noise
+    slow = _slowly(values)
     folds = rotates and (float(steps.max()) > 0.5 * TURN or float(steps.min()) < -0.5 * TURN)
-    if not folds and not float(bent.max()) > 2.0 * OUT * noise:
+    if not folds and not len(slow) and not float(bent.max()) > 2.0 * OUT * noise:
         return Jumps(), noise
     looked = bent > 2.0 * OUT * noise
     if folds:
         looked |= np.abs(steps[1:-1]) > 0.5 * TURN
-    return _Suspects(times, values, steps, rotates, noise, slack).judged(np.flatnonzero(looked) + 1), noise
+    return _Suspects(times, values, steps, rotates, noise, slack).judged(np.flatnonzero(looked) + 1, slow), noise
+
+
+def _bent(steps: Floats) -> Floats:
+    """Size of the second differences of steps."""
+    bends = steps[1:] - steps[:-1]
+    return np.abs(bends[1:] - bends[:-1])
+
+
+def _noise(bent: Floats) -> float:
+    """What steps scatter by: half of what few second differences exceed."""
+    some = bent[:: max(len(bent) // ENOUGH, 1)]
+    at = int(NOISE * (len(some) - 1))
+    return 0.5 * float(np.partition(some, at)[at])
+
+
+def _slowly(values: Floats) -> Indices:
+    """Samples about which the steps over eight of them stand out: a slow slip bends little from one to the next."""
+    wide = SPANS[-1]
+    bent = _bent(np.diff(values[::wide]))
+    if len(bent) < FEWEST or not float(bent.max()) > (least := 2.0 * OUT * _noise(bent)):
+        return np.zeros(0, np.int64)
+    found: Indices = (wide * np.flatnonzero(bent > least)[:, None] + np.arange(3 * wide)).ravel()
+    return found
 
 
 class _Suspects:
@@ -102,7 +123,7 @@ class _Suspects:
         self._grid = min(float(moved.min(initial=np.inf)), COARSEST if rotates else np.inf)
         self._usual = float(np.median(np.diff(times)))
 
-    def judged(self, at: Indices) -> Jumps:
+    def judged(self, at: Indices, slow: Indices) -> Jumps:
         """Wraps and slips of one sample first: others are judged without them."""
         inside = at[(at >= EDGE) & (at < len(self._steps) - EDGE)]
         once = self._single(inside)
@@ -110,7 +131,7 @@ class _Suspects:
             taken = np.zeros(len(self._values))
             np.add.at(taken, once.at, once.size)
             self._values = self._values - np.cumsum(taken)
-        parts = [once, *self._spikes(at), *self._slow(at)]
+        parts = [once, *self._spikes(at), *self._slow(np.append(at, slow))]
         order = np.argsort(np.concatenate([part.at for part in parts]), kind="stable")
         at, turns, size, span, spike = (
             np.concatenate([getattr(part, name) for part in parts])[order]

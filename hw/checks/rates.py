@@ -32,9 +32,11 @@ UNITS = {
 }  # fmt: skip
 
 
-def _usual(dq: Floats, iv: Floats) -> NDArray[np.bool_]:
+def _usual(spans: Floats) -> NDArray[np.bool_]:
     """Which spans tell about gain and correlation: not the few that disagree far more than the rest, as slips do."""
-    away, size = np.abs(dq - iv), np.abs(iv)
+    products = np.einsum("ik,jk->ij", spans, spans)
+    line = np.linalg.lstsq(products[1:, 1:], products[1:, 0], rcond=None)[0]
+    away, size = np.abs(spans[0] - line[0] * spans[1] - line[1] * spans[2]), np.abs(spans[1])
     moving = size >= MOVING * np.quantile(size, USUAL)
     return np.asarray(away <= FAR * np.quantile(away[moving], USUAL))
 
@@ -57,7 +59,7 @@ class RateCheck:
         self._name, self._rotates, self._lag = name, rotates, lag
         self._slips = JumpCheck(name, "rad" if rotates else "m", own=False)
         self._n, self._left, self._loose = 0, 0.0, 0.0
-        self._next = 0.0
+        self._moved = np.zeros((2, 3))  # of all spans and usual ones: how many, squares of dq, products of two
         self._products = np.zeros((3, 3))  # of dq, the integral of v and the change of v
         self._quantum, self._step = np.inf, np.nan
         self._tail: tuple[Rows, Floats, Floats, Floats] | None = None
@@ -84,10 +86,11 @@ class RateCheck:
         dq = q[at[1:]] - q[at[:-1]] - self._turns(q)
         areas = (v[1:] + v[:-1]) * (times[1:] - times[:-1])
         spans = np.stack((dq, 0.5 * np.add.reduceat(areas, at[:-1]), v[at[1:]] - v[at[:-1]]))
-        usual = spans[:, _usual(dq, spans[1])]
+        usual = spans[:, _usual(spans)]
         self._n += usual.shape[1]
         self._products += np.einsum("ik,jk->ij", usual, usual)  # no BLAS: its threads cost more
-        self._next += float((usual[0, 1:] * usual[0, :-1]).sum())
+        for sums, change in zip(self._moved, (dq, usual[0]), strict=True):
+            sums += len(change), (change * change).sum(), (change[1:] * change[:-1]).sum()
         self._remember(dq, spans[1], rows[at[:-1]], times[at[:-1]])
         if first:
             self._step = float(np.median(times[1:] - times[:-1]))
@@ -142,10 +145,10 @@ class RateCheck:
         return found, np.sqrt(np.diag(inverse) * left / (self._n - 2)), 1.0 - left / size
 
     def _moves(self) -> bool:
-        """Whether the coordinate does more than show its noise and the steps of its encoder."""
-        squares = self._products[0, 0]
-        size = np.sqrt(squares / max(self._n, 1))
-        return bool(self._n >= FEWEST and size > QUANTA * self._quantum and self._next > SMOOTH * squares)
+        """Whether the coordinate does more than show its noise and the steps of its encoder, with or without slips."""
+        count, squares, products = self._moved.T
+        size = np.sqrt(squares / np.maximum(count, 1.0))
+        return bool(np.any((count >= FEWEST) & (size > QUANTA * self._quantum) & (products > SMOOTH * squares)))
 
     def findings(self) -> list[Finding]:
         """Whether the two belong together; nothing if there is too little motion to tell."""

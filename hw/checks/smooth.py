@@ -117,7 +117,7 @@ class JumpCheck:
         ):  # fmt: skip
             if first.count >= least and first.count == self._slips.count:
                 text = f"the angle wraps at {turn} in {first.count} places: it is in {unit}; the map has another unit."
-                return [*found, first.told("unit", self._channel, text, fault=True)]
+                return [first.told("unit", self._channel, text, fault=True)]
         if self._fast.count >= FAST:
             text = f"{self._fast.count} steps of the angle are longer than half a turn: is its unit right?"
             found.append(self._fast.told("unit", self._channel, text, fault=False))
