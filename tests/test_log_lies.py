@@ -250,6 +250,14 @@ def test_a_wrapped_log_is_refused_and_unwrapped_when_asked(tmp_path: Path) -> No
     assert not [f for f in log.findings if f.check in ("wraps", "slips")]
 
 
+@pytest.mark.parametrize("size", [1e150, 1e200, 1e308])
+def test_values_whose_squares_overflow_are_no_crash(size: float) -> None:
+    motion = draw(0, "sines")
+    for q, v in ((size * motion.q, motion.v), (motion.q, size * motion.v), (size * motion.q, size * motion.v)):
+        with np.errstate(over="ignore", invalid="ignore"):
+            findings(motion, q, v)
+
+
 def test_a_wrap_does_not_hide_a_wrong_rate(tmp_path: Path) -> None:
     t = np.arange(20_000) * 1e-3
     q = np.mod(9.0 * np.sin(1.3 * t) + np.pi, 2.0 * np.pi) - np.pi

@@ -35,6 +35,8 @@ UNITS = {
 def _usual(spans: Floats) -> NDArray[np.bool_]:
     """Which spans tell about gain and correlation: not the few that disagree far more than the rest, as slips do."""
     products = np.einsum("ik,jk->ij", spans, spans)
+    if not np.all(np.isfinite(products)):  # what is that large has a check that tells it
+        return np.ones(spans.shape[1], np.bool_)
     line = np.linalg.lstsq(products[1:, 1:], products[1:, 0], rcond=None)[0]
     away, size = np.abs(spans[0] - line[0] * spans[1] - line[1] * spans[2]), np.abs(spans[1])
     moving = size >= MOVING * np.quantile(size, USUAL)
@@ -137,7 +139,8 @@ class RateCheck:
     def _line(self) -> tuple[Floats, Floats, float]:
         """Gain and delay, their standard errors, and the squared correlation; 1 and 0 if there is too little."""
         known, wanted, size = self._products[1:, 1:], self._products[1:, 0], self._products[0, 0]
-        if self._n < FEWEST or not size > 0.0 or not np.linalg.det(known) > 1e-9 * known[0, 0] * known[1, 1]:
+        told = np.all(np.isfinite(self._products)) and self._n >= FEWEST and size > 0.0
+        if not told or not np.linalg.det(known) > 1e-9 * known[0, 0] * known[1, 1]:
             return np.array([1.0, 0.0]), np.full(2, np.inf), 0.0
         inverse = np.linalg.inv(known)
         found = inverse @ wanted
