@@ -88,6 +88,28 @@ def test_what_is_complete_is_kept_and_the_same_command_goes_on(tmp_path: Path) -
     assert not list(out.glob(".crossbody-*"))
 
 
+BENCH = ("bench", "balls.py", "-e", "fake:slow", "--repeats", "1")
+
+
+def test_a_benchmark_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = begun(*BENCH, cwd=tmp_path)
+    wait_for(out, PARTS, process)
+    code, said = interrupted(process)
+    assert code == 130
+    assert "what is complete is kept in" in said
+    assert "the same command goes on" in said
+    (part,) = out.glob(PARTS)
+    kept = pd.read_parquet(part / "bench.parquet")
+    code, said = finished(begun(*BENCH, cwd=tmp_path))
+    assert code == 0, said
+    assert "1 parts of an interrupted run" in said
+    rows = pd.read_parquet(out / "bench.parquet")
+    assert rows["case"].nunique() == 2
+    pd.testing.assert_frame_equal(rows[rows["case"].isin(kept["case"])], kept)  # times too: it was not run again
+    assert not list(out.glob(".crossbody-*"))
+
+
 def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:
     process = begun("run", "balls.py", "--variant", "linear", "-e", "fake:stuck", cwd=tmp_path)
     wait_for(tmp_path, "out/.crossbody-parts.*", process)
