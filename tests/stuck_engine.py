@@ -37,6 +37,7 @@ def patched(arguments: list[str] | None) -> int:
 
     profiles = dict.fromkeys(("exact", "slow", "stuck", "crash", "fault"), "")
     fake, real = SimpleNamespace(name="fake", profiles=profiles, versions={}, prepare=prepare), engines.load
+    fake.why_not = lambda *_: None
     engines.names = lambda: ("fake",)
 
     def load(name: str) -> Any:
