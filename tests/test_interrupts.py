@@ -192,6 +192,22 @@ def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_p
     assert not (rows.loc[["exact"], "verdict"] == "outside").any()
 
 
+def test_an_identification_that_never_comes_back_is_ended(tmp_path: Path) -> None:
+    log = run_as_log(cases.load("bouncing_ball", "linear", t_end=0.5), {"height": 0}, 1e-4)
+    hw.store(log, tmp_path / "log.parquet")
+    words = ("identify", "log.parquet", "-m", "ball", "-f", "a1", "--set", "a1=20", "--time-limit", "0.25")
+    began = time.monotonic()
+    process = begun(*words, cwd=tmp_path)
+    assert process.stderr is not None
+    said = process.stderr.readline()
+    assert "ball identified from log.parquet: It did not come back within 2.5 s and was ended" in said
+    assert time.monotonic() - began < 6.0 + 4.0 * load()  # 2 (1 + 0.25) s, and the start of the command
+    code, said = finished(process)
+    assert (code, said.count("\n")) == (2, 1)
+    assert said.startswith("crossbody: ball identified from log.parquet: It did not come back")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_fault_of_ours_has_a_code_and_a_file_of_its_own(tmp_path: Path) -> None:
     code, said = finished(begun("run", "balls.py", "--variant", "linear", "-e", "broken", cwd=tmp_path))
     assert code == 3
