@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError
-from crossbody.cases._arguments import shown
-from crossbody.cases._arrays import frozen
+from crossbody.cases._arguments import flag, shown
+from crossbody.cases._arrays import frozen, full, is_number
 from crossbody.reference import kernels as kernel_types
+from crossbody.reference._entry_points import checked_arguments, finite
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
 
@@ -86,10 +87,18 @@ class System:
     def __post_init__(self) -> None:
         """Bring every field to its shape and check it once."""
         put = object.__setattr__
-        nc = np.size(self.a0)
         self._check_sizes()
+        for name in ("gaps", "rows", "energy", "power"):
+            put(self, name, getattr(_none, name) if getattr(self, name) is None else getattr(self, name))
+        self._check_kernels()
+        put(self, "tick", finite("System.tick", self.tick))
+        for name in ("constant_mass", "affine"):
+            put(self, name, flag(f"System.{name}", getattr(self, name)))
+        nc = len(frozen("System", "a0", [self.a0] if is_number(self.a0) else self.a0, (None,)))
         for name in ("a0", "a1", "a2", "b0", "b1", "b2"):
             put(self, name, self._row_field(name, nc, np.float64))
+        if not np.all(np.isin(self._row_field("unilateral", nc, np.float64), (0.0, 1.0))):
+            raise SceneError(f"System.unilateral is {shown(self.unilateral)}; valid: True, False.")
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
@@ -102,7 +111,6 @@ class System:
         put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
         put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
         self._check_values()
-        self._check_kernels()
 
     @property
     def nc(self) -> int:
@@ -116,9 +124,7 @@ class System:
         return {name: getattr(_none, name, None) if kernel is None else kernel for name, kernel in given.items()}
 
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
-        value = getattr(self, name)
-        full = np.full(nc, value) if np.ndim(value) == 0 else value
-        return frozen("System", name, full, (nc,), dtype)
+        return full("System", name, getattr(self, name), nc, dtype)
 
     def _spans(self, nc: int) -> Index:
         """Columns that each row may touch, widened to whole blocks of the mass matrix."""
@@ -152,7 +158,7 @@ class System:
         follows: Index = np.asarray(self.follows)
         if np.any(follows >= self.nc) or np.any(follows[follows >= 0] == np.flatnonzero(follows >= 0)):
             raise SceneError(f"System.follows is {follows.tolist()}; it must name other rows, below {self.nc}.")
-        if self.control is not None and not self.tick > 0.0:
+        if self.tick < 0.0 or (self.control is not None and self.tick == 0.0):
             raise SceneError(f"System.tick is {self.tick}; a system with a controller needs a period above 0 s.")
 
     def _check_kernels(self) -> None:
@@ -168,6 +174,7 @@ class System:
         """M(q) as a dense (n, n) matrix."""
         return self.terms(q, v, u)[0]
 
+    @checked_arguments
     def terms(
         self, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None, t: float = 0.0
     ) -> tuple[Floats, Floats]:
@@ -196,6 +203,7 @@ class System:
         self.gaps(0.0, *self._state(q, v), np.array(self.p), h, hd)
         return h, hd
 
+    @checked_arguments
     def check(self, q: ArrayLike, v: ArrayLike | None = None, *, states: int = 100, t_end: float = 1.0) -> None:
         """Check the kernels at a state and at random ones near it.
 
@@ -205,7 +213,7 @@ class System:
             q: positions (n,).
             v: velocities (n,); zeros if not given.
             states: number of random states.
-            t_end: the random states lie at times in [0, t_end], s.
+            t_end: the random states lie at times in [0, t_end], s; gaps are looked at there, and at t_end.
 
         Raises:
             SceneError: naming the kernel, the entry and both values: if h, H, h' and H'v do not belong together, if M
