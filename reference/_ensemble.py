@@ -157,7 +157,7 @@ class _Job:
         try:
             loop(
                 first, last, run.template, run.state, *run.tables, self.p, self.laws, self.starts,
-                initial_modes(self.system), self.out, self.counts, min(run.options.max_steps, 2**62),
+                initial_modes(self.system), self.out, self.counts, int(min(run.options.max_steps, 2**62)),
             )  # fmt: skip
         finally:
             spaces.put(run)
@@ -183,14 +183,17 @@ def _loop(functions: tuple[Any, ...]) -> Any:
         s = state[0]
         for r in range(first, last):
             state[0] = template[0]
-            m.p[:] = p[r]
-            m.alpha[:] = laws[r, 0]
-            m.beta[:] = laws[r, 1]
-            b.mode[:] = modes
-            w.y[:] = starts[r]
-            w.u[:] = 0.0
-            w.s[:] = 0.0
-            w.z[:] = 0.0
+            # Entry by entry: what an array of another shape would be told takes seconds to compile.
+            for i in range(len(m.p)):
+                m.p[i] = p[r, i]
+            for i in range(len(modes)):
+                b.mode[i] = modes[i]
+                for j in range(3):
+                    m.alpha[i, j], m.beta[i, j] = laws[r, 0, i, j], laws[r, 1, i, j]
+            for i in range(len(w.y)):
+                w.y[i] = starts[r, i]
+            for z in (w.u, w.s, w.z):
+                z.fill(0.0)
             code = MORE
             while code == MORE and s.steps < limit:
                 code = advance(
@@ -198,7 +201,8 @@ def _loop(functions: tuple[Any, ...]) -> Any:
                     state, model, work, buffers, min(SLICE, limit - s.steps),
                 )  # fmt: skip
             out[r, 0] = s.t
-            out[r, 1:] = w.y
+            for i in range(len(w.y)):
+                out[r, 1 + i] = w.y[i]
             counts[r, 0], counts[r, 1], counts[r, 2] = code, s.steps, s.events + s.dropped
 
     return embedding(runs, nogil=True)

@@ -208,7 +208,7 @@ def arguments_of_entry_points() -> Iterator[Call]:
          "std_force": 1.0, "time_force": 0.1}, "u v0 active std_q0 std_v0 smooth"),
         (linear.balanced, record | {"q": [[1.0], [1.0]], "v": [[0.0], [0.0]], "vd": [[0.0], [0.0]], "std_vd": 1.0},
          "u active std_q std_v std_u"),
-        (linear.Unknown, {}, "inputs rows"), (linear.locus, {"build": lambda _: model, "values": [1.0]}, ""),
+        (linear.Unknown, {}, "inputs rows"), (_poles_over, {"values": [1.0]}, ""),
         (ensemble, run | {"q0": [[1.0]], "v0": [[0.0]]}, "parameters law threads"),
         (prepare, {"system": own, "q0": [1.0], "v0": [0.0], "options": Options(t_end=0.1)}, ""),
         (own.check, {"q": [1.0]}, "v t_end states"), (own.gap, {"q": [1.0]}, "v"),
@@ -220,6 +220,11 @@ def arguments_of_entry_points() -> Iterator[Call]:
             for value in WRONG:
                 text = f"{entry.__qualname__}(good | {{{name!r}: {value!r}}})"
                 yield Call(text, partial(entry, **given | {name: value}))
+
+
+def _poles_over(values: Any) -> None:
+    model = linear.linearise(system_of(ball()), [1.0], [0.0])
+    linear.locus(lambda _: model, values)
 
 
 def _compare(rng: random.Random) -> Call:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
+from crossbody.cases._arguments import instance
 from crossbody.cases._arrays import frozen, is_number
 from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats
@@ -137,7 +138,7 @@ def locus(build: Callable[[float], LinearModel], values: Sequence[float] | Array
         raise InvalidValue("locus: values is empty; give the values of the parameter.")
     found: list[Array] = []
     for value in grid.tolist():
-        poles = build(value).poles()
+        poles = instance("What locus.build returns", build(value), LinearModel, "a LinearModel").poles()
         if found and len(poles) != len(found[0]):
             raise InvalidValue(f"locus: the model has {len(poles)} states at {value:g} and {len(found[0])} before.")
         if found:
