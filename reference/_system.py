@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numba.core.config as numba_config
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -164,7 +165,8 @@ class System:
     def _check_kernels(self) -> None:
         for name, kernel in self.kernels.items():
             wanted = kernel_types.REAL[name]
-            if wanted.args not in getattr(kernel, "signatures", ()):
+            plain = numba_config.DISABLE_JIT and (kernel is None or callable(kernel))
+            if not plain and wanted.args not in getattr(kernel, "signatures", ()):
                 raise SceneError(
                     f"System.{name} is not a kernel of the right signature; "
                     f"declare it with @crossbody.reference.kernels.{name}."

@@ -261,6 +261,53 @@ DEBUG = """
 """
 
 
+SHIPPED = """
+    import numpy as np
+    from importlib import import_module
+    from mechanisms import sliders
+    from crossbody import cases
+    from crossbody.reference import System, kernels
+
+    count = 0
+    for name in cases.names():
+        for variant in import_module(f"crossbody.cases.{name}").VARIANTS:
+            case = cases.load(name, variant)
+            system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
+            system.check(case.q0, case.v0, states=5, t_end=case.t_end)
+            q, v, p = (np.array(x) for x in (case.q0, case.v0, system.p))
+            u, s, mode = np.zeros(system.inputs), np.zeros(system.memory), np.zeros(system.nc, np.int8)
+            if system.control is not None:
+                for tick in range(3):
+                    system.control(tick * system.tick, q, v, u, s, p)
+            if system.switch is not None:
+                for fired in (kernels.START, kernels.TOUCHED):
+                    system.switch(0.0, q, v, p, mode, fired)
+            count += 1
+    print(count)
+
+    @kernels.energy
+    def energy(q, v, p, e):
+        e[0], e[1] = p[2], 0.0
+
+    try:
+        System(n=1, dynamics=sliders(1).dynamics, energy=energy, mass_block=1, parameters=[1.0, 9.81]).check([1.0])
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+def test_every_shipped_kernel_stays_inside_its_arrays(tmp_path):
+    # As Python the kernels need not be compiled, and NumPy looks at every index.
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(SHIPPED)], cwd=Path(__file__).parent,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    count, found = done.stdout.splitlines()
+    assert int(count) == len(VARIANTS)
+    assert found.startswith("SceneError Kernel energy reads or writes beyond an array: index")
+
+
 def test_with_debugging_on_kernels_check_their_indices(tmp_path):
     environment = {**os.environ, "CROSSBODY_DEBUG": "1"}
     done = subprocess.run(
