@@ -14,6 +14,7 @@ import numpy as np
 
 from crossbody import cases, engines, hw, reports
 from crossbody.cases import Case, CrossbodyError, Parameter
+from crossbody.cases._arrays import is_number
 from crossbody.engines._equations import system_of
 from crossbody.reference import Options, System, ensemble, linear, prepare, recheck, simulate
 from crossbody.reports import cli
@@ -154,7 +155,7 @@ def _simulate(rng: random.Random, costly: bool) -> Call:
     if rng.random() < 0.4:
         start[rng.randrange(4)] = wrong(rng)
     if not isinstance(given["max_steps"], int) or isinstance(given["max_steps"], bool) or given["max_steps"] > 300:
-        start[3] = start[3] if start[3] is not None and np.ndim(start[3]) else 1e-3
+        start[3] = start[3] if start[3] is not None and not is_number(start[3]) else 1e-3
     text = f"simulate({start!r}, **{given!r})"
     if rng.random() < 0.1 and given.keys() <= Options.__dataclass_fields__.keys():
         return Call(f"Options(t_end={start[3]!r}, **{given!r})", lambda: Options(t_end=start[3], **given))
