@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from crossbody.cases._case import Case, Chaos, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
     from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
 
+_VOCABULARY = ("files", "scene")
+"""Modules of this folder that are no cases."""
 _LAZY = {
     **dict.fromkeys(
         ("Case", "Chaos", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"
@@ -85,7 +87,7 @@ def __getattr__(name: str) -> Any:
 
 def names() -> tuple[str, ...]:
     """Names of all cases, those of other distributions too; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _registry.plugin_names(__name__, list(__path__), _VOCABULARY)
 
 
 def summary(name: str) -> str:

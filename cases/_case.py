@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import Floats, frozen
 from crossbody.cases._errors import InvalidValue, SceneError
 from crossbody.cases._trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from crossbody.cases.scene import Scene
 
 Value = float | int | str | bool
 
@@ -236,6 +240,7 @@ class Case:
         inputs: what acts from outside; None for nothing.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
+        scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
             show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
@@ -265,6 +270,8 @@ class Case:
     tight: float = 1e-13
     chaos: Chaos | None = None
     consistent: bool = True
+    scene: Scene | None = None
+    file: str = ""
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:

@@ -288,7 +288,7 @@ class Scene:
     """Bodies on joints and what acts between them; see the module.
 
     Attributes:
-        bodies: each behind its parent.
+        bodies: depth-first: behind its parent, and no other branch in between. Engines number them so.
         joints: those of one body stand together, in the order of the bodies.
         shapes, loops, tendons, actuators: what else there is.
         gravity: m/s^2.
@@ -328,9 +328,18 @@ class Scene:
 
     def _check_order(self) -> None:
         seen: dict[str, int] = {"": -1}
+        branch: list[str] = []
         for i, body in enumerate(self.bodies):
             _known(body, "parent", body.parent, seen)
             seen[body.name] = i
+            while branch and body.parent != branch[-1]:
+                branch.pop()
+            if body.parent and not branch:
+                raise SceneError(
+                    f"Body {body.name!r} hangs on {body.parent!r}, whose branch has ended before it: "
+                    "Scene.bodies must stand branch by branch (depth-first)."
+                )
+            branch.append(body.name)
         for joint in self.joints:
             _known(joint, "body", joint.body, set(seen) - {""})
             if joint.type == "free" and self.bodies[seen[joint.body]].parent:

@@ -11,8 +11,8 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory
 from crossbody.engines import _settings
-from crossbody.engines._equations import builder, module, system_of
-from crossbody.engines._reference_audit import audit
+from crossbody.engines._equations import known, module, system_of
+from crossbody.engines._reference_audit import audit, listed
 from crossbody.reference import Options, System, prepare
 from crossbody.reference._options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
 
@@ -55,8 +55,11 @@ class ReferenceRun:
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""
-        listed = getattr(module(self.case.mechanism), "listed", None)
-        return audit(self.system, self.case.q0, self.case.v0) | (listed(self.system.p) if listed else {})
+        own = audit(self.system, self.case.q0, self.case.v0)
+        if self.case.scene is not None:
+            return own | listed(self.case.scene)
+        told = getattr(module(self.case.mechanism), "listed", None)
+        return own | (told(self.system.p) if told else {})
 
 
 class Reference:
@@ -82,7 +85,7 @@ class Reference:
         solver = _settings.profile_of(self.name, self.profiles, profile)
         if (case.mechanism, solver) in UNSUITED:
             return UNSUITED[case.mechanism, solver]
-        if builder(case.mechanism) is None:
+        if not known(case):
             return f"The reference has no equations of the mechanism {case.mechanism!r}."
         if case.collisions not in COLLISIONS:
             return (

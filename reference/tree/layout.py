@@ -4,9 +4,9 @@ from __future__ import annotations
 
 FREE, BALL, SLIDE, HINGE = range(4)
 
-# Head of the table: sizes, gravity, and where each part begins.
-NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, HEAD = (
-    0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13,
+# Head of the table: sizes, gravity, where each part begins, and the potential energy of what never moves.
+NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, RESTING, HEAD = (
+    0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14,
 )  # fmt: skip
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.

@@ -99,7 +99,7 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
     nodes = int(p[layout.NODES].real)
     w = np.empty(layout.NODE_SCRATCH * nodes + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
     sweeps.outwards(q, v, p, w)
-    kinetic, potential = 0.0 * q[0], 0.0 * q[0]
+    kinetic, potential = 0.0 * q[0], p[layout.RESTING] + 0.0 * q[0]
     for i in range(nodes):
         o, x = int(p[layout.AT_NODE].real) + layout.NODE * i, layout.NODE_SCRATCH * i
         root = layout.NODE_SCRATCH * int(p[o + layout.ROOT].real)

@@ -119,6 +119,7 @@ class _Builder:
         self.coordinates: dict[str, int] = {}
         self.dofs: dict[str, int] = {}
         self.nq = 0
+        self.resting = 0.0
 
     def table(self) -> Table:
         for body in self.scene.bodies:
@@ -140,6 +141,9 @@ class _Builder:
         self.places[body.name] = place
         if place.node >= 0:
             self.inertias[place.node].add(body, place)
+        else:
+            centre = place.p + place.R @ np.array(body.com)
+            self.resting -= (1.0 - body.weightless) * body.mass * float(centre @ np.array(self.scene.gravity))
 
     def _node(self, joint: Joint, before: Place) -> None:
         row, kind = np.zeros(layout.NODE), TYPES[joint.type]
@@ -180,6 +184,7 @@ class _Builder:
             len(self.rows), len(self.dof_rows), len(actuators), len(tendons), len(rows),
         )  # fmt: skip
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
+        head[layout.RESTING] = self.resting
         parts = [self.rows, self.dof_rows, actuators, tendons, rows]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW]] = starts[:5]

@@ -1,0 +1,305 @@
+"""Any scene of slides and hinges in MuJoCo: matched, built from the scene; default, the file as it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from crossbody.cases import Case, CaseUnsupported, Mode
+from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import RowLaw, Scene
+from crossbody.engines._log import Modes, Observe
+from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE, without_regularisation
+from crossbody.engines.mujoco._scene import Scene as Prepared
+
+OF_MATCHED = 1e-3
+LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
+SOFT = "The file's rows are soft: their law varies with depth."
+HIDDEN = "MuJoCo has a row for a bound only where it acts."
+
+
+def why_not(case: Case, profile: str) -> str | None:
+    """Return why a profile cannot do it: a scene from Python has no file to take as it stands."""
+    return "There is no file to run as it stands." if profile == "default" and not case.file else None
+
+
+def default_step(case: Case, profile: str) -> float:
+    """Return the file's own step, s, or 1 ms."""
+    return float(_from_file(case).opt.timestep) if profile == "default" else OF_MATCHED
+
+
+def build(case: Case, profile: str, dt: float) -> Prepared:
+    """Compile the model of one profile.
+
+    Raises:
+        ValueError: MuJoCo's own, for a model that it refuses.
+    """
+    scene = _scene(case)
+    model = _from_file(case) if profile == "default" else matched(scene)
+    data = mujoco.MjData(model)
+    rows = Rows(scene, model, data)
+    prepared = Prepared(
+        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data), modes=rows.modes,
+        lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
+        observe=rows.observe(), instants=() if case.inputs is None else case.inputs.times.tolist(),
+        change=_change(case, data),
+    )  # fmt: skip
+    prepared.audit = _audit(case, profile, model, rows)
+    return prepared
+
+
+def _scene(case: Case) -> Scene:
+    if case.scene is None:
+        raise CaseUnsupported(f"{case.label} is not a scene.")
+    return case.scene
+
+
+def _from_file(case: Case) -> Any:
+    return mujoco.MjModel.from_xml_path(case.file)
+
+
+def matched(scene: Scene) -> Any:
+    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no contacts."""
+    spec = spec_of(scene)
+    option = spec.option
+    option.integrator, option.solver = mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_NEWTON
+    option.tolerance, option.jacobian = 0.0, mujoco.mjtJacobian.mjJAC_DENSE
+    off = mujoco.mjtDisableBit
+    option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE | off.mjDSBL_CONTACT)
+    model = compiled(spec, scene)
+    without_regularisation(model)
+    return model
+
+
+def compiled(spec: Any, scene: Scene) -> Any:
+    """Return the compiled model, with what no element of the format says: where the springs of ball joints rest."""
+    model = spec.compile()
+    for joint in scene.joints:
+        if joint.type == "ball":
+            at = int(model.joint(joint.name).qposadr[0])
+            model.qpos_spring[at : at + 4] = joint.rest
+    return model
+
+
+def spec_of(scene: Scene) -> Any:
+    """Return a scene as an editable model."""
+    spec = mujoco.MjSpec()
+    spec.compiler.balanceinertia, spec.compiler.inertiafromgeom = False, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.compiler.degree, spec.compiler.autolimits = False, False
+    spec.option.gravity = scene.gravity
+    bodies = {"": spec.worldbody}
+    for body in scene.bodies:
+        added = bodies[body.parent].add_body(
+            name=body.name, pos=body.position, quat=body.orientation, mass=body.mass, ipos=body.com,
+            gravcomp=body.weightless, explicitinertial=True,
+        )  # fmt: skip
+        # The full inertia stands in the order xx yy zz xy xz yz.
+        added.fullinertia = body.inertia if body.mass > 0.0 else np.full(6, np.nan)
+        bodies[body.name] = added
+        for joint in scene.joints:
+            if joint.body == body.name:
+                _add_joint(added, joint)
+    for tendon in scene.tendons:
+        _add_tendon(spec, tendon)
+    for loop in scene.loops:
+        _add_loop(spec, loop)
+    for actuator in scene.actuators:
+        _add_actuator(spec, actuator)
+    return spec
+
+
+def _bounds(bounds: tuple[float, ...]) -> tuple[bool, tuple[float, ...]]:
+    """Return whether there is a bound, and both of them; one that is not there is far away."""
+    return bool(np.isfinite(bounds).any()), tuple(np.clip(bounds, -1e10, 1e10))
+
+
+def _solref(law: RowLaw) -> tuple[float, float]:
+    return -MAX_IMPEDANCE * law.a0, -MAX_IMPEDANCE * law.a1
+
+
+def _add_joint(body: Any, joint: Any) -> None:
+    added = body.add_joint(
+        name=joint.name, type=getattr(mujoco.mjtJoint, f"mjJNT_{joint.type.upper()}"), axis=joint.axis,
+        pos=joint.anchor, ref=joint.reference, margin=joint.margin, armature=joint.armature,
+        springref=joint.rest[0], actgravcomp=joint.actuated_weight,
+    )  # fmt: skip
+    added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
+    added.limited, added.range = _bounds(joint.range)
+    added.actfrclimited, added.actfrcrange = _bounds(joint.force_range)
+    added.solref_limit, added.solimp_limit = _solref(joint.law), IMPEDANCE
+
+
+def _add_tendon(spec: Any, tendon: Any) -> None:
+    added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
+    added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
+    added.limited, added.range = _bounds(tendon.range)
+    added.actfrclimited, added.actfrcrange = _bounds(tendon.force_range)
+    added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE
+    for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
+        added.wrap_joint(name, c)
+
+
+def _add_loop(spec: Any, loop: Any) -> None:
+    if loop.type != "joint":
+        raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
+    added = spec.add_equality(name=loop.name, type=mujoco.mjtEq.mjEQ_JOINT, active=True)
+    added.objtype = mujoco.mjtObj.mjOBJ_JOINT
+    added.name1, added.name2 = loop.first, loop.second
+    added.data[:5] = loop.polynomial
+    added.solref, added.solimp = _solref(loop.law), IMPEDANCE
+
+
+def _add_actuator(spec: Any, actuator: Any) -> None:
+    added = spec.add_actuator(name=actuator.name, target=actuator.joint or actuator.tendon)
+    added.trntype = mujoco.mjtTrn.mjTRN_JOINT if actuator.joint else mujoco.mjtTrn.mjTRN_TENDON
+    added.gear[: len(actuator.gear)] = actuator.gear
+    added.gaintype, added.biastype = mujoco.mjtGain.mjGAIN_AFFINE, mujoco.mjtBias.mjBIAS_AFFINE
+    added.gainprm[:3], added.biasprm[:3] = actuator.gain, actuator.bias
+    added.armature, added.damping[0] = actuator.armature, actuator.damping
+    added.ctrllimited, added.ctrlrange = _bounds(actuator.control_range)
+    added.forcelimited, added.forcerange = _bounds(actuator.force_range)
+
+
+def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
+    def start() -> None:
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = case.q0, case.v0
+
+    return start
+
+
+def _change(case: Case, data: Any) -> Callable[[float], None]:
+    given = case.inputs
+
+    def change(t: float) -> None:
+        if given is not None:
+            data.ctrl[:] = given.values[np.searchsorted(given.times, t)]
+
+    return change
+
+
+class Rows:
+    """The rows of a scene among those that MuJoCo has at a state.
+
+    Attributes:
+        always: number of rows that are always on; they stand first in both.
+    """
+
+    def __init__(self, scene: Scene, model: Any, data: Any) -> None:
+        self.scene, self.model, self.data = scene, model, data
+        self.always = sum(loop.width for loop in scene.loops)
+        self.places: dict[tuple[int, int, bool], int] = {}
+        row = self.always
+        groups = ((int(LIMITS[0]), scene.joints, model.joint), (int(LIMITS[1]), scene.tendons, model.tendon))
+        for kind, parts, named in groups:
+            for part in parts:
+                i = int(named(part.name).id)
+                for upper, bound in enumerate(part.range):
+                    if np.isfinite(bound):
+                        self.places[kind, i, bool(upper)] = row
+                        row += 1
+        self.nc = row
+
+    def constants(self) -> dict[str, Any]:
+        """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
+        model = self.model
+        solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
+        solref += [(model.jnt_solref if kind == LIMITS[0] else model.tendon_solref_lim)[i] for kind, i, _ in self.places]
+        pairs = np.array(solref).reshape(-1, 2)
+        if (pairs >= 0.0).any():
+            return {"solref": pairs}
+        return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), np.zeros(len(pairs))), strict=True))
+
+    def lam(self) -> Floats:
+        """Return the multiplier of every row (nc,), 0 where it does not act."""
+        data, lam = self.data, np.zeros(self.nc)
+        lam[: self.always] = data.efc_force[: self.always]
+        for j in range(data.ne, data.nefc):
+            kind, part = int(data.efc_type[j]), int(data.efc_id[j])
+            if kind in LIMITS:
+                lam[self._place(j, kind, part)] += data.efc_force[j]
+        return lam
+
+    def _place(self, j: int, kind: int, part: int) -> int:
+        """Return which bound an active row is: the upper one has a falling gap."""
+        J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
+        if kind == LIMITS[0]:
+            return self.places[kind, part, bool(J.sum() < 0.0)]
+        tendon = next(one for one in self.scene.tendons if self.model.tendon(one.name).id == part)
+        slope = J[int(self.model.joint(tendon.joints[0]).dofadr[0])] * tendon.coefficients[0]
+        return self.places[kind, part, bool(slope < 0.0)]
+
+    def modes(self) -> Modes:
+        """Return the mode of every row: a bound is in contact where it pushes."""
+        lam = self.lam()[self.always :]
+        return (int(Mode.BILATERAL),) * self.always + tuple(int(Mode.CONTACT if x > 0.0 else Mode.FREE) for x in lam)
+
+    def observe(self) -> Observe:
+        """Return what reads gaps and energies of recorded states."""
+        data = mujoco.MjData(self.model)
+        T = np.array([[dict(zip(t.joints, t.coefficients, strict=True)).get(j.name, 0.0) for j in self.scene.joints]
+                      for t in self.scene.tendons]).reshape(-1, self.model.nv)  # fmt: skip
+
+        def heights(q: Floats) -> list[float]:
+            h: list[float] = []
+            lengths = [*q, *(T @ q)]
+            for part, x in zip((*self.scene.joints, *self.scene.tendons), lengths, strict=True):
+                low, high = part.range
+                h += [x - low - part.margin] if np.isfinite(low) else []
+                h += [high - x - part.margin] if np.isfinite(high) else []
+            return h
+
+        def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
+            gaps, energy = np.empty((len(q), self.nc)), np.empty((len(q), 2))
+            for i in range(len(q)):
+                data.qpos[:], data.qvel[:] = q[i], v[i]
+                mujoco.mj_fwdPosition(self.model, data)
+                mujoco.mj_fwdVelocity(self.model, data)
+                mujoco.mj_energyPos(self.model, data)
+                mujoco.mj_energyVel(self.model, data)
+                gaps[i] = [*data.efc_pos[: self.always], *heights(q[i])]
+                spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
+                energy[i] = data.energy[1], data.energy[0] + spared.sum()
+            return gaps, energy
+
+        return observe
+
+
+def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
+    """Masses, M and bias at zero input; rows where all of them are always on."""
+    data = mujoco.MjData(model)
+
+    def look(q: Floats, v: Floats) -> None:
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+
+    def M(q: Floats) -> Floats:
+        look(q, np.zeros(model.nv))
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, full)
+        return full
+
+    def bias(q: Floats, v: Floats) -> Floats:
+        look(q, v)
+        return np.array(data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)
+
+    def H(q: Floats) -> Floats:
+        look(q, np.zeros(model.nv))
+        return np.array(data.efc_J).reshape(-1, model.nv)[: rows.nc]
+
+    def lam(q: Floats, v: Floats) -> Floats:
+        look(q, v)
+        return np.array(data.efc_force[: rows.nc])
+
+    found: dict[str, Any] = {
+        "masses": np.array([model.body(body.name).mass[0] for body in rows.scene.bodies]), "gravity": float(np.linalg.norm(model.opt.gravity)),
+        **({"constants": rows.constants()} if profile == "matched" else {}), "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
+    }  # fmt: skip
+    hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
+    if rows.nc > rows.always:
+        return found | {"hidden": {**hidden, "H": HIDDEN, "lam": HIDDEN}}
+    return found | {"hidden": hidden, "H": H} | ({"lam": lam} if profile == "matched" else {})
