@@ -62,8 +62,8 @@ class _Named:
         what = f"{type(self).__name__} {self.name!r}"
         if not isinstance(self.name, str) or not self.name:
             raise SceneError(f"{type(self).__name__}.name is {shown(self.name)}; it must be a text.")
-        for field, size in self.sizes.items():
-            object.__setattr__(self, field, _vector(f"{what}: {field}", getattr(self, field), size))
+        for name, size in self.sizes.items():
+            object.__setattr__(self, name, _vector(f"{what}: {name}", getattr(self, name), size))
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if isinstance(value, float) and math.isnan(value):
@@ -351,6 +351,11 @@ class Scene:
     def replace(self, **changes: Any) -> Scene:
         """Return a copy with other parts."""
         return dataclasses.replace(self, **changes)
+
+    @property
+    def bounded(self) -> tuple[Joint | Tendon, ...]:
+        """What may have bounds, in the order of their rows."""
+        return (*self.joints, *self.tendons)
 
     @property
     def nq(self) -> int:

@@ -7,26 +7,30 @@ Coordinates are the scene's; slides and hinges alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from crossbody.cases import CaseUnsupported
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Scene, Vector
+from crossbody.cases.scene import Joint, Loop, Scene, Tendon, Vector
 
 
-def polynomial(constants: Vector, x: Floats) -> Floats:
+def polynomial(constants: Vector, x: Any) -> Any:
     """Return k0 x + k1 x^2 + k2 x^3."""
     k0, k1, k2 = constants
-    total: Floats = k0 * x + k1 * x**2 + k2 * x**3
-    return total
+    return k0 * x + k1 * x**2 + k2 * x**3
 
 
-def drag(constants: Vector, v: Floats) -> Floats:
+def clamped(x: Any, bounds: Vector) -> Any:
+    """Return x within its bounds."""
+    return np.clip(x, bounds[0], bounds[1])
+
+
+def drag(constants: Vector, v: Any) -> Any:
     """Return b0 v + b1 v |v| + b2 v^3."""
     b0, b1, b2 = constants
-    total: Floats = b0 * v + b1 * v * np.abs(v) + b2 * v**3
-    return total
+    return b0 * v + b1 * v * np.abs(v) + b2 * v**3
 
 
 def stored(constants: Vector, x: Floats) -> Floats:
@@ -34,6 +38,16 @@ def stored(constants: Vector, x: Floats) -> Floats:
     k0, k1, k2 = constants
     total: Floats = k0 * x**2 / 2 + k1 * x**3 / 3 + k2 * x**4 / 4
     return total
+
+
+def tendons(scene: Scene) -> Floats:
+    """Return dl/dq (nt, nv) of the tendons."""
+    T = np.zeros((len(scene.tendons), scene.nv))
+    places = {joint.name: i for i, joint in enumerate(scene.joints)}
+    for row, tendon in zip(T, scene.tendons, strict=True):
+        for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
+            row[places[name]] += c
+    return T
 
 
 @dataclass(slots=True)
@@ -58,13 +72,10 @@ class Forces:
         if scene.nq != n:
             raise CaseUnsupported("Free and ball joints are not built here.")
         place = {joint.name: i for i, joint in enumerate(scene.joints)}
-        self.u, self.T, self.A = np.zeros(len(scene.actuators)), np.zeros((len(scene.tendons), n)), np.zeros((0, n))
-        for row, tendon in zip(self.T, scene.tendons, strict=True):
-            for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
-                row[place[name]] += c
-        tendons = {tendon.name: row for tendon, row in zip(scene.tendons, self.T, strict=True)}
+        self.u, self.T = np.zeros(len(scene.actuators)), tendons(scene)
+        named = {tendon.name: row for tendon, row in zip(scene.tendons, self.T, strict=True)}
         rows = [
-            actuator.gear[0] * (tendons[actuator.tendon] if actuator.tendon else np.eye(n)[place[actuator.joint]])
+            actuator.gear[0] * (named[actuator.tendon] if actuator.tendon else np.eye(n)[place[actuator.joint]])
             for actuator in scene.actuators
         ]
         self.A = np.array(rows).reshape(len(rows), n)
@@ -88,13 +99,14 @@ class Forces:
         for i, joint in enumerate(self.scene.joints):
             total[i] -= polynomial(joint.stiffness, q[i] - joint.rest[0]) + drag(joint.damping, v[i])
         for row, tendon in zip(self.T, self.scene.tendons, strict=True):
-            total -= row * (polynomial(tendon.stiffness, self.outside(tendon.rest, row @ q)) + drag(tendon.damping, row @ v))
+            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, row @ q))
+            total -= row * (spring + drag(tendon.damping, row @ v))
         return total + self.actuated(q, v)
 
     @staticmethod
     def outside(rest: Vector, length: Floats) -> Floats:
         """Return how far a length is outside its dead band."""
-        out: Floats = length - np.clip(length, *rest)
+        out: Floats = length - clamped(length, rest)
         return out
 
     def actuated(self, q: Floats, v: Floats) -> Floats:
@@ -102,8 +114,8 @@ class Forces:
         total: Floats = np.zeros(len(v))
         for row, actuator, given in zip(self.A, self.scene.actuators, self.u, strict=True):
             terms = np.array([1.0, row @ q, row @ v])
-            force = np.dot(actuator.gain, terms) * np.clip(given, *actuator.control_range) + np.dot(actuator.bias, terms)
-            total += row * np.clip(force, *actuator.force_range)
+            force = np.dot(actuator.gain, terms) * clamped(given, actuator.control_range) + np.dot(actuator.bias, terms)
+            total += row * clamped(force, actuator.force_range)
             if actuator.joint:
                 total -= row**2 * actuator.damping * v
         bounds = np.array([joint.force_range for joint in self.scene.joints])
@@ -155,14 +167,13 @@ class Rows:
             drift[i] = -self._loop(loop, q)[2] * (v[self._place(loop.second)] ** 2 if loop.second else 0.0)
         return drift
 
-    def _bounded(self, q: Floats) -> list[tuple[object, float]]:
-        lengths = self.forces.T @ q
-        return [*zip(self.scene.joints, q, strict=True), *zip(self.scene.tendons, lengths, strict=True)]
+    def _bounded(self, q: Floats) -> list[tuple[Joint | Tendon, float]]:
+        return list(zip(self.scene.bounded, [*q, *(self.forces.T @ q)], strict=True))
 
     def _place(self, joint: str) -> int:
         return next(i for i, one in enumerate(self.scene.joints) if one.name == joint)
 
-    def _loop(self, loop: object, q: Floats) -> tuple[float, Floats, float]:
+    def _loop(self, loop: Loop, q: Floats) -> tuple[float, Floats, float]:
         """Return h, H and the second derivative of the polynomial."""
         first = self._place(loop.first)
         y = q[self._place(loop.second)] - self.scene.joints[self._place(loop.second)].reference if loop.second else 0.0

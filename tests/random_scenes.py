@@ -83,7 +83,8 @@ def _body(rng: np.random.Generator, name: str, parent: str, *, fixed: bool) -> B
 def _joint(rng: np.random.Generator, name: str, body: str, kind: str) -> Joint:
     single = kind in SINGLE
     return Joint(
-        name=name, body=body, type=kind, axis=_unit(rng, 3), anchor=tuple(rng.normal(size=3)) if kind != "free" else (0, 0, 0),
+        name=name, body=body, type=kind, axis=_unit(rng, 3),
+        anchor=tuple(rng.normal(size=3)) if kind != "free" else (0.0, 0.0, 0.0),
         reference=float(rng.normal()) if single else 0.0, armature=float(rng.choice([0.0, 0.2])),
         damping=tuple(rng.uniform(0.0, 0.3, 3)) if kind != "free" else (0.0, 0.0, 0.0),
         stiffness=tuple(rng.uniform(0.0, 2.0, 3)) if kind != "free" else (0.0, 0.0, 0.0),

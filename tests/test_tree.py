@@ -13,7 +13,7 @@ from crossbody.cases import CaseUnsupported
 from crossbody.cases.files.case import case_of, rows_of
 from crossbody.cases.scene import Scene
 from crossbody.engines import load
-from crossbody.engines.mujoco import scene as build
+from crossbody.engines.mujoco import _build as build
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,8 @@ REFERENCE_POSE = "reference"
 OF_THE_FILE = -1.0
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
-    "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1 for the file's", low=OF_THE_FILE),
-    "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1 for the file's", low=OF_THE_FILE),
+    "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
+    "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
 
 
@@ -85,8 +85,6 @@ def overruled(scene: Scene, a0: float, a1: float) -> Scene:
 
     changed: dict[str, Any] = {}
     for group in ("joints", "loops", "tendons"):
-        from dataclasses import replace
-
         changed[group] = tuple(replace(part, law=law(part.law)) for part in getattr(scene, group))
     return scene.replace(**changed)
 
@@ -107,8 +105,10 @@ def case_of(
 
     Args:
         scene: what moves.
-        name, variant: how the case is called.
-        q0, v0: start, (nq,) and (nv,); the reference pose at rest if not given.
+        name: of the case.
+        variant: of the case.
+        q0: start (nq,); the reference pose if not given.
+        v0: velocities there (nv,); at rest if not given.
         ctrl: controls held from the start on, (nu,).
         t_end: horizon, s.
         parameters: of the case.
@@ -141,7 +141,7 @@ def check_runnable(scene: Scene) -> None:
     for joint in scene.joints:
         if joint.type in ("free", "ball"):
             raise SceneError(f"Joint {joint.name!r} is of type {joint.type}: only slides and hinges can be run.")
-    for part in (*scene.joints, *scene.tendons):
+    for part in scene.bounded:
         if part.friction_loss:
             raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
 
@@ -173,7 +173,7 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
             names.append(loop.name if loop.width == 1 else f"{loop.name} {'xyz'[k]}")
             laws.append(loop.law)
             unilateral.append(False)
-    for part in (*scene.joints, *scene.tendons):
+    for part in scene.bounded:
         for side, bound in zip(("low", "high"), part.range, strict=True):
             if np.isfinite(bound):
                 names.append(f"{part.name} {side}")

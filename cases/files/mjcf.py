@@ -182,7 +182,7 @@ def _loop(model: Any, i: int) -> Loop:
             name=name, type="connect", first=bodies(one), second=bodies(two),
             first_position=_floats(data[:3]), second_position=_floats(data[3:6]), law=given,
         )  # fmt: skip
-    raise SceneError(f"Equality {name!r} of type {mujoco.mjtEq(kind).name} is not done; leave it out: --without {name}.")
+    raise SceneError(f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: connect by bodies, joint.")
 
 
 def _tendon(model: Any, i: int) -> Tendon:
@@ -190,9 +190,9 @@ def _tendon(model: Any, i: int) -> Tendon:
     where = slice(first, first + count)
     name = _name(model, "tendon", i)
     if np.any(model.wrap_type[where] != JOINT_WRAP):
-        raise SceneError(f"Tendon {name!r} runs over sites or shapes, which is not done: --without tendon:{name}.")
+        raise SceneError(f"Tendon {name!r} runs over sites or shapes; a scene has sums of joints.")
     if model.tendon_armature[i] != 0.0:
-        raise SceneError(f"Tendon {name!r} has armature, which is not done: --without tendon:{name}.")
+        raise SceneError(f"Tendon {name!r} has armature, which a scene does not have.")
     return Tendon(
         name=name,
         joints=tuple(_name(model, "jnt", int(j)) for j in model.wrap_objid[where]),
@@ -215,7 +215,7 @@ def _actuator(model: Any, i: int) -> Actuator:
     kind = mujoco.mjtTrn(model.actuator_trntype[i])
     gain, bias = mujoco.mjtGain(model.actuator_gaintype[i]), mujoco.mjtBias(model.actuator_biastype[i])
     if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-        raise SceneError(f"Actuator {name!r} has an activation, which is not done: --without actuator:{name}.")
+        raise SceneError(f"Actuator {name!r} has an activation, which a scene does not have.")
     if gain.name not in ("mjGAIN_FIXED", "mjGAIN_AFFINE") or bias.name not in ("mjBIAS_NONE", "mjBIAS_AFFINE"):
         raise SceneError(f"Actuator {name!r} has {gain.name} and {bias.name}; valid: fixed and affine ones.")
     target = int(model.actuator_trnid[i, 0])

@@ -10,9 +10,11 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import RowLaw, Scene
+from crossbody.cases.scene import Scene
 from crossbody.engines._log import Modes, Observe
-from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE, without_regularisation
+from crossbody.engines._scene import tendons
+from crossbody.engines.mujoco._build import compiled, spec_of
+from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._scene import Scene as Prepared
 
 OF_MATCHED = 1e-3
@@ -74,95 +76,6 @@ def matched(scene: Scene) -> Any:
     return model
 
 
-def compiled(spec: Any, scene: Scene) -> Any:
-    """Return the compiled model, with what no element of the format says: where the springs of ball joints rest."""
-    model = spec.compile()
-    for joint in scene.joints:
-        if joint.type == "ball":
-            at = int(model.joint(joint.name).qposadr[0])
-            model.qpos_spring[at : at + 4] = joint.rest
-    return model
-
-
-def spec_of(scene: Scene) -> Any:
-    """Return a scene as an editable model."""
-    spec = mujoco.MjSpec()
-    spec.compiler.balanceinertia, spec.compiler.inertiafromgeom = False, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    spec.compiler.degree, spec.compiler.autolimits = False, False
-    spec.option.gravity = scene.gravity
-    bodies = {"": spec.worldbody}
-    for body in scene.bodies:
-        added = bodies[body.parent].add_body(
-            name=body.name, pos=body.position, quat=body.orientation, mass=body.mass, ipos=body.com,
-            gravcomp=body.weightless, explicitinertial=True,
-        )  # fmt: skip
-        # The full inertia stands in the order xx yy zz xy xz yz.
-        added.fullinertia = body.inertia if body.mass > 0.0 else np.full(6, np.nan)
-        bodies[body.name] = added
-        for joint in scene.joints:
-            if joint.body == body.name:
-                _add_joint(added, joint)
-    for tendon in scene.tendons:
-        _add_tendon(spec, tendon)
-    for loop in scene.loops:
-        _add_loop(spec, loop)
-    for actuator in scene.actuators:
-        _add_actuator(spec, actuator)
-    return spec
-
-
-def _bounds(bounds: tuple[float, ...]) -> tuple[bool, tuple[float, ...]]:
-    """Return whether there is a bound, and both of them; one that is not there is far away."""
-    return bool(np.isfinite(bounds).any()), tuple(np.clip(bounds, -1e10, 1e10))
-
-
-def _solref(law: RowLaw) -> tuple[float, float]:
-    return -MAX_IMPEDANCE * law.a0, -MAX_IMPEDANCE * law.a1
-
-
-def _add_joint(body: Any, joint: Any) -> None:
-    added = body.add_joint(
-        name=joint.name, type=getattr(mujoco.mjtJoint, f"mjJNT_{joint.type.upper()}"), axis=joint.axis,
-        pos=joint.anchor, ref=joint.reference, margin=joint.margin, armature=joint.armature,
-        springref=joint.rest[0], actgravcomp=joint.actuated_weight,
-    )  # fmt: skip
-    added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
-    added.limited, added.range = _bounds(joint.range)
-    added.actfrclimited, added.actfrcrange = _bounds(joint.force_range)
-    added.solref_limit, added.solimp_limit = _solref(joint.law), IMPEDANCE
-
-
-def _add_tendon(spec: Any, tendon: Any) -> None:
-    added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
-    added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
-    added.limited, added.range = _bounds(tendon.range)
-    added.actfrclimited, added.actfrcrange = _bounds(tendon.force_range)
-    added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE
-    for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
-        added.wrap_joint(name, c)
-
-
-def _add_loop(spec: Any, loop: Any) -> None:
-    if loop.type != "joint":
-        raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
-    added = spec.add_equality(name=loop.name, type=mujoco.mjtEq.mjEQ_JOINT, active=True)
-    added.objtype = mujoco.mjtObj.mjOBJ_JOINT
-    added.name1, added.name2 = loop.first, loop.second
-    added.data[:5] = loop.polynomial
-    added.solref, added.solimp = _solref(loop.law), IMPEDANCE
-
-
-def _add_actuator(spec: Any, actuator: Any) -> None:
-    added = spec.add_actuator(name=actuator.name, target=actuator.joint or actuator.tendon)
-    added.trntype = mujoco.mjtTrn.mjTRN_JOINT if actuator.joint else mujoco.mjtTrn.mjTRN_TENDON
-    added.gear[: len(actuator.gear)] = actuator.gear
-    added.gaintype, added.biastype = mujoco.mjtGain.mjGAIN_AFFINE, mujoco.mjtBias.mjBIAS_AFFINE
-    added.gainprm[:3], added.biasprm[:3] = actuator.gain, actuator.bias
-    added.armature, added.damping[0] = actuator.armature, actuator.damping
-    added.ctrllimited, added.ctrlrange = _bounds(actuator.control_range)
-    added.forcelimited, added.forcerange = _bounds(actuator.force_range)
-
-
 def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
     def start() -> None:
         mujoco.mj_resetData(model, data)
@@ -207,7 +120,8 @@ class Rows:
         """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
         model = self.model
         solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
-        solref += [(model.jnt_solref if kind == LIMITS[0] else model.tendon_solref_lim)[i] for kind, i, _ in self.places]
+        bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
+        solref += [bounds[kind][i] for kind, i, _ in self.places]
         pairs = np.array(solref).reshape(-1, 2)
         if (pairs >= 0.0).any():
             return {"solref": pairs}
@@ -240,13 +154,12 @@ class Rows:
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
         data = mujoco.MjData(self.model)
-        T = np.array([[dict(zip(t.joints, t.coefficients, strict=True)).get(j.name, 0.0) for j in self.scene.joints]
-                      for t in self.scene.tendons]).reshape(-1, self.model.nv)  # fmt: skip
+        T = tendons(self.scene)
 
         def heights(q: Floats) -> list[float]:
             h: list[float] = []
             lengths = [*q, *(T @ q)]
-            for part, x in zip((*self.scene.joints, *self.scene.tendons), lengths, strict=True):
+            for part, x in zip(self.scene.bounded, lengths, strict=True):
                 low, high = part.range
                 h += [x - low - part.margin] if np.isfinite(low) else []
                 h += [high - x - part.margin] if np.isfinite(high) else []
@@ -296,9 +209,11 @@ def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
         return np.array(data.efc_force[: rows.nc])
 
     found: dict[str, Any] = {
-        "masses": np.array([model.body(body.name).mass[0] for body in rows.scene.bodies]), "gravity": float(np.linalg.norm(model.opt.gravity)),
-        **({"constants": rows.constants()} if profile == "matched" else {}), "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
+        "masses": model.body_mass[1:].copy(), "gravity": float(np.linalg.norm(model.opt.gravity)),
+        "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
+    if profile == "matched":
+        found["constants"] = rows.constants()
     hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
     if rows.nc > rows.always:
         return found | {"hidden": {**hidden, "H": HIDDEN, "lam": HIDDEN}}

@@ -11,7 +11,7 @@ from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import _scene as parts
-from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
+from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 
@@ -49,7 +49,7 @@ def build(case: Case, algebra: str) -> Prepared:
     return Prepared(
         rows=pinned, observe=_observe(scene, model, forces, rows, reference), sizes=(span, span),
         start=(case.q0 - reference, case.v0), chart=lambda q, v: (q + reference, v), world=_world(case, forces),
-        audit=_audit(case, pinned, forces, reference),
+        audit=_audit(scene, pinned, forces, apply, reference),
     )  # fmt: skip
 
 
@@ -141,14 +141,14 @@ def _world(case: Case, forces: parts.Forces) -> World:
     return World(instants=given.times.tolist(), change=change, reset=lambda: forces.change(0.0 * forces.u))
 
 
-def _audit(case: Case, rows: PinRows, forces: parts.Forces, reference: Floats) -> dict[str, Any]:
+def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, reference: Floats) -> dict[str, Any]:
     """What differs from the rows' own audit: masses body by body, forces at zero input, and the scene's coordinates."""
     model, data = rows.model, rows.data
     on = rows_on(rows)
 
     def bias(q: Floats, v: Floats) -> Floats:
         forces.change(0.0 * forces.u)
-        rows.forces(q - reference, v, rows.tau)
+        apply(q - reference, v, rows.tau)
         total: Floats = pin.nonLinearEffects(model, data, q - reference, v) - rows.tau
         return total
 
@@ -157,7 +157,7 @@ def _audit(case: Case, rows: PinRows, forces: parts.Forces, reference: Floats) -
         return rows.accelerate(q - reference, v, on)[1]
 
     return {
-        "masses": np.array([body.mass for body in case.scene.bodies]),
+        "masses": np.array([body.mass for body in scene.bodies]),
         "M": lambda q: mass_matrix(model, data, q - reference),
         "bias": bias,
         "H": lambda q: rows.jacobian(q - reference),

@@ -189,7 +189,8 @@ class _Builder:
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW]] = starts[:5]
         packed = np.concatenate([head, *(row for part in parts for row in part)])
-        return np.clip(packed, -1e300, 1e300)  # a bound that is not there: parameters are finite
+        finite: Floats = np.clip(packed, -1e300, 1e300)
+        return finite  # a bound that is not there: parameters are finite
 
     def _actuator(self, actuator: Actuator) -> Floats:
         row = np.zeros(layout.ACTUATOR)
