@@ -45,7 +45,6 @@ DERIVED = frozenset(
 """What the compiler computes from the rest, or what has no meaning without something that is refused."""
 
 UNSEEN = (
-)
     "bvh_",
     "oct_",
     "cam_",
