@@ -42,7 +42,7 @@ class Parameter:
         doc: what it is.
         low, high: bounds of a number.
         open_low: whether `low` itself is excluded.
-        choices: the words admitted, for a word.
+        choices: the words admitted, for a word; any text if there are none.
     """
 
     default: Value
@@ -60,7 +60,7 @@ class Parameter:
             InvalidValue: if it has another type, is not finite or lies outside the bounds.
         """
         if isinstance(self.default, str):
-            if not isinstance(value, str) or value not in self.choices:
+            if not isinstance(value, str) or (self.choices and value not in self.choices):
                 raise InvalidValue(f"{where} is {shown(value)}; valid: {', '.join(self.choices)}.")
             return value
         try:

@@ -120,7 +120,6 @@ class Joint(_Named):
         rest: where the spring is at rest: one number, or four of a quaternion.
         friction_loss: dry friction, N m or N.
         force_range: bounds of the sum of the actuators' forces on it.
-        actuated_weight: whether the force against weight is one of these.
         law: of the rows of its bounds.
     """
 
@@ -137,7 +136,6 @@ class Joint(_Named):
     rest: Vector = (0.0,)
     friction_loss: float = 0.0
     force_range: Vector = UNBOUNDED
-    actuated_weight: bool = False
     law: RowLaw = STIFF
     sizes: ClassVar[dict[str, int]] = {
         "axis": 3, "anchor": 3, "range": 2, "damping": 3, "stiffness": 3, "force_range": 2,
@@ -233,7 +231,7 @@ class Tendon(_Named):
         damping, stiffness: as of a joint, of the length.
         rest: dead band of the spring, lowest and highest length.
         range, margin, law: as of a joint.
-        friction_loss, force_range: as of a joint.
+        friction_loss: as of a joint.
     """
 
     joints: tuple[str, ...]
@@ -244,10 +242,9 @@ class Tendon(_Named):
     range: Vector = UNBOUNDED
     margin: float = 0.0
     friction_loss: float = 0.0
-    force_range: Vector = UNBOUNDED
     law: RowLaw = STIFF
     sizes: ClassVar[dict[str, int]] = {
-        "damping": 3, "stiffness": 3, "rest": 2, "range": 2, "force_range": 2,
+        "damping": 3, "stiffness": 3, "rest": 2, "range": 2,
     }  # fmt: skip
 
     def __post_init__(self) -> None:

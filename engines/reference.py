@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory
+from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.engines import _settings
 from crossbody.engines._equations import known, module, system_of
 from crossbody.engines._reference_audit import audit, listed
@@ -51,7 +52,7 @@ class ReferenceRun:
     def run(self) -> Trajectory:
         """Integrate from the start."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
-        return trajectory
+        return within_the_model(self.case, trajectory) if self.case.file else trajectory
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""
@@ -60,6 +61,16 @@ class ReferenceRun:
             return own | listed(self.case.scene)
         told = getattr(module(self.case.mechanism), "listed", None)
         return own | (told(self.system.p) if told else {})
+
+
+def within_the_model(case: Case, run: Trajectory) -> Trajectory:
+    """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
+    from crossbody.cases.files.contacts import first_contact
+    from crossbody.cases.files.mjcf import compiled
+
+    model = compiled(Path(case.file), str(case.parameters.get("without", "")))
+    found = first_contact(model, run.t, run.q) if run.outcome.ok else ""
+    return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
 
 class Reference:

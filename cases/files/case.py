@@ -13,6 +13,7 @@ import numpy as np
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
 from crossbody.cases._errors import SceneError, UnknownName
+from crossbody.cases.files.controls import read_controls
 from crossbody.cases.files.mjcf import compiled, scene_of
 from crossbody.cases.scene import RowLaw, Scene
 
@@ -22,6 +23,8 @@ OF_THE_FILE = -1.0
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
+    "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
+    "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
 
@@ -40,25 +43,26 @@ class FileCase:
 
     @cached_property
     def model(self) -> Any:
-        """MuJoCo's model."""
+        """MuJoCo's model of the whole file."""
         return compiled(self.path)
 
     @cached_property
     def VARIANTS(self) -> Mapping[str, Mapping[str, Value]]:
         """The keyframes of the file, the pose of its bodies if it has none."""
         names = [self.model.key(i).name or f"key{i}" for i in range(self.model.nkey)]
-        return {name: {} for name in [*names, REFERENCE_POSE]}
+        return {name: {} for name in names or [REFERENCE_POSE]}
 
     def build(self, variant: str, p: Mapping[str, Value]) -> Case:
         """Return the case of one keyframe."""
-        keys = list(self.VARIANTS)
-        index = keys.index(variant) if variant != REFERENCE_POSE else -1
+        index = list(self.VARIANTS).index(variant) if self.model.nkey else -1
         q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
-        scene = overruled(scene_of(self.model), float(p["a0"]), float(p["a1"]))
+        scene = overruled(scene_of(compiled(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
+        table = Path(str(p["ctrl"])) if p["ctrl"] else None
         return case_of(
-            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, ctrl=ctrl, t_end=float(p["t_end"]),
+            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),
+            inputs=read_controls(table, scene) if table else held(scene, ctrl),
             parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
 
@@ -96,7 +100,7 @@ def case_of(
     variant: str = REFERENCE_POSE,
     q0: Any = None,
     v0: Any = None,
-    ctrl: Any = None,
+    inputs: Inputs | None = None,
     t_end: float = 1.0,
     parameters: Mapping[str, Value] | None = None,
     file: str = "",
@@ -109,7 +113,7 @@ def case_of(
         variant: of the case.
         q0: start (nq,); the reference pose if not given.
         v0: velocities there (nv,); at rest if not given.
-        ctrl: controls held from the start on, (nu,).
+        inputs: controls of the actuators; zero if not given.
         t_end: horizon, s.
         parameters: of the case.
         file: where the scene comes from.
@@ -127,7 +131,7 @@ def case_of(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}), coordinates=coordinates(scene),
         contacts=tuple(names), q0=reference_pose(scene) if q0 is None else q0,
-        v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=held(scene, ctrl), scene=scene,
+        v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
         file=file,
     )  # fmt: skip
 
@@ -156,7 +160,7 @@ def reference_pose(scene: Scene) -> Floats:
     return np.array([joint.reference for joint in scene.joints])
 
 
-def held(scene: Scene, ctrl: Any) -> Inputs | None:
+def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
     """Return controls that are held from the start on; None for a scene without actuators."""
     if not scene.actuators:
         return None

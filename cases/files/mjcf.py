@@ -10,6 +10,7 @@ import numpy as np
 
 from crossbody.cases._errors import SceneError
 from crossbody.cases.files.understood import check_understood
+from crossbody.cases.files.without import strip
 from crossbody.cases.scene import (
     UNBOUNDED,
     Actuator,
@@ -33,18 +34,21 @@ WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 JOINT_WRAP = 1
 
 
-def compiled(path: Path) -> mujoco.MjModel:
-    """Return MuJoCo's model of a file.
+def compiled(path: Path, without: str = "") -> mujoco.MjModel:
+    """Return MuJoCo's model of a file, less what is left out.
 
     Raises:
         SceneError: with MuJoCo's own sentence.
+        InvalidValue: for a word in `without` that names nothing.
     """
     import mujoco
 
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
+    strip(model, without)
+    return model
 
 
 def scene_of(model: mujoco.MjModel) -> Scene:
@@ -112,6 +116,8 @@ def _rotation(quaternion: Any) -> Any:
 def _joint(model: Any, i: int) -> Joint:
     kind, at, dof = JOINTS[model.jnt_type[i]], int(model.jnt_qposadr[i]), int(model.jnt_dofadr[i])
     single = kind in ("slide", "hinge")
+    if model.jnt_actgravcomp[i] and model.jnt_actfrclimited[i]:
+        raise SceneError(f"Joint {_name(model, 'jnt', i)!r} bounds the force against weight: a scene's joint does not.")
     rest = model.qpos_spring[at : at + 1] if single else model.qpos_spring[at + (3 if kind == "free" else 0) :][:4]
     limited = bool(model.jnt_limited[i]) and not model.opt.disableflags & _disabled("LIMIT")
     return Joint(
@@ -129,7 +135,6 @@ def _joint(model: Any, i: int) -> Joint:
         rest=_floats(rest),
         friction_loss=float(model.dof_frictionloss[dof]),
         force_range=_floats(model.jnt_actfrcrange[i]) if model.jnt_actfrclimited[i] else UNBOUNDED,
-        actuated_weight=bool(model.jnt_actgravcomp[i]),
         law=law(model, model.jnt_solref[i], model.jnt_solimp[i]),
     )
 
@@ -186,6 +191,8 @@ def _loop(model: Any, i: int) -> Loop:
 
 
 def _tendon(model: Any, i: int) -> Tendon:
+    if model.tendon_actfrclimited[i]:
+        raise SceneError(f"Tendon {_name(model, 'tendon', i)!r} bounds its actuators' sum: a scene's tendon has none.")
     first, count = int(model.tendon_adr[i]), int(model.tendon_num[i])
     where = slice(first, first + count)
     name = _name(model, "tendon", i)
@@ -203,7 +210,6 @@ def _tendon(model: Any, i: int) -> Tendon:
         range=_floats(model.tendon_range[i]) if model.tendon_limited[i] else UNBOUNDED,
         margin=float(model.tendon_margin[i]),
         friction_loss=float(model.tendon_frictionloss[i]),
-        force_range=_floats(model.tendon_actfrcrange[i]) if model.tendon_actfrclimited[i] else UNBOUNDED,
         law=law(model, model.tendon_solref_lim[i], model.tendon_solimp_lim[i]),
     )
 

@@ -102,7 +102,26 @@ def _only_seen(name: str) -> bool:
     return name in DRAWN or name in NOT_FELT or name.startswith(UNSEEN) or name.endswith(("_user", "_group"))
 
 
+HARMLESS = ("CONTACT", "LIMIT", "GRAVITY", "REFSAFE", "WARMSTART", "SENSOR", "ISLAND", "AUTORESET", "EULERDAMP")
+HARMLESS_TOO = ("MIDPHASE", "NATIVECCD", "MULTICCD", "FILTERPARENT")
+"""Flags that are taken into account, or that change no physics of a scene."""
+
+
+def _check_flags(option: Any) -> None:
+    import mujoco
+
+    allowed = {f"mjDSBL_{name}" for name in (*HARMLESS, *HARMLESS_TOO)}
+    for flag in mujoco.mjtDisableBit.__members__.values():
+        if flag.name.startswith("mjDSBL") and option.disableflags & int(flag) and flag.name not in allowed:
+            raise SceneError(f"The model sets the flag {flag.name}, which is not understood.")
+    if option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
+        raise SceneError("The model overrides contact constants for all pairs (flag override): not understood.")
+    if option.disableactuator:
+        raise SceneError("The model disables groups of actuators: not understood.")
+
+
 def _check_options(option: Any) -> None:
+    _check_flags(option)
     for name in ("density", "viscosity"):
         if getattr(option, name) != 0.0:
             raise SceneError(f"The model moves in a medium (option {name} {getattr(option, name):g}): not done.")

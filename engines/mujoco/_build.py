@@ -63,7 +63,7 @@ def _add_joint(body: Any, joint: Joint) -> None:
     added = body.add_joint(
         name=joint.name, type=getattr(mujoco.mjtJoint, f"mjJNT_{joint.type.upper()}"), axis=joint.axis,
         pos=joint.anchor, ref=joint.reference, margin=joint.margin, armature=joint.armature,
-        springref=joint.rest[0], actgravcomp=joint.actuated_weight,
+        springref=joint.rest[0],
     )  # fmt: skip
     added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
     added.limited, added.range = _bounds(joint.range)
@@ -75,7 +75,6 @@ def _add_tendon(spec: Any, tendon: Tendon) -> None:
     added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
     added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
     added.limited, added.range = _bounds(tendon.range)
-    added.actfrclimited, added.actfrcrange = _bounds(tendon.force_range)
     added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE
     for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
         added.wrap_joint(name, c)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -10,14 +11,17 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
+from crossbody.cases.files.mjcf import compiled as model_of
 from crossbody.cases.scene import Scene
 from crossbody.engines._log import Modes, Observe
-from crossbody.engines._scene import tendons
+from crossbody.engines._scene import Forces, tendons
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._scene import Scene as Prepared
 
-OF_MATCHED = 1e-3
+SLOWEST, OF_RATE = 1e-3, 0.02
+"""Largest step of the matched profile, s, and the part of the fastest time constant that it is: Runge-Kutta 4 leaves
+(1/50)^4 a time constant."""
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 SOFT = "The file's rows are soft: their law varies with depth."
 HIDDEN = "MuJoCo has a row for a bound only where it acts."
@@ -29,8 +33,25 @@ def why_not(case: Case, profile: str) -> str | None:
 
 
 def default_step(case: Case, profile: str) -> float:
-    """Return the file's own step, s, or 1 ms."""
-    return float(_from_file(case).opt.timestep) if profile == "default" else OF_MATCHED
+    """Return the file's own step, s, or for matched a part of the fastest time constant that forces of joints have."""
+    if profile == "default":
+        return float(_from_file(case).opt.timestep)
+    return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0))
+
+
+def fastest(scene: Scene, q: Floats, v: Floats) -> float:
+    """Return the largest rate, 1/s, with which springs, dampers and actuators move the bodies from a state."""
+    model = matched(scene)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = q, v
+    mujoco.mj_forward(model, data)
+    M, n, forces, step = np.zeros((model.nv, model.nv)), model.nv, Forces(scene), 1e-6
+    mujoco.mj_fullM(model, data, M)
+    lift = step * np.eye(n)
+    K = np.array([(forces(q + d, v) - forces(q - d, v)) / (2.0 * step) for d in lift]).T
+    D = np.array([(forces(q, v + d) - forces(q, v - d)) / (2.0 * step) for d in lift]).T
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [np.linalg.solve(M, K), np.linalg.solve(M, D)]])
+    return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
 
 
 def build(case: Case, profile: str, dt: float) -> Prepared:
@@ -60,7 +81,7 @@ def _scene(case: Case) -> Scene:
 
 
 def _from_file(case: Case) -> Any:
-    return mujoco.MjModel.from_xml_path(case.file)
+    return model_of(Path(case.file), str(case.parameters.get("without", "")))
 
 
 def matched(scene: Scene) -> Any:

@@ -14,12 +14,12 @@ TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIF
     0, 1, 2, 3, 4, 5, 6, 42, 45, 48, 49, 52, 58, 62, 65, 69,
 )  # fmt: skip
 # A degree of freedom: the one before it on the way to the world, armature, damping, bounds of its actuators' sum.
-BEFORE, ARMATURE, DAMPING, FORCE_LOW, FORCE_HIGH, WEIGHT_INSIDE, DOF = 0, 1, 2, 5, 6, 7, 8
+BEFORE, ARMATURE, DAMPING, FORCE_LOW, FORCE_HIGH, DOF = 0, 1, 2, 5, 6, 7
 # An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds.
 TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTUATOR = 0, 1, 2, 3, 9, 12, 15, 17, 19
 ON_JOINT, ON_TENDON = 0, 1
 # A tendon: its spring, damper and bounds; then joint by joint the coordinate, the velocity and the coefficient.
-COUNT, STIFF, DAMP, BAND, SUM, FIRST = 0, 1, 4, 7, 9, 11
+COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
 LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT = range(4)

@@ -166,8 +166,8 @@ class _Builder:
         previous = self.last_dof[before.node] if before.node >= 0 else -1
         for k in range(width_v):
             low, high = joint.force_range
-            inside = float(joint.actuated_weight)
-            self.dof_rows.append(np.array([previous, joint.armature, *joint.damping, low, high, inside]))
+
+            self.dof_rows.append(np.array([previous, joint.armature, *joint.damping, low, high]))
             previous = dof + k
         self.last_dof.append(previous)
         self.rows.append(row)
@@ -226,7 +226,7 @@ class _Builder:
             for name, c in zip(tendon.joints, tendon.coefficients, strict=True)
         ]
         return np.array([
-            len(steps), *tendon.stiffness, *tendon.damping, *tendon.rest, *tendon.force_range, *np.ravel(steps),
+            len(steps), *tendon.stiffness, *tendon.damping, *tendon.rest, *np.ravel(steps),
         ])  # fmt: skip
 
 
