@@ -17,8 +17,8 @@ from crossbody.cases import _registry
 from crossbody.cases._arguments import path
 from crossbody.cases._case import Case, Parameter, Value
 from crossbody.cases._errors import CrossbodyError, SceneError, UnknownName
-from crossbody.cases.files.case import SUFFIXES as ROBOT_FILES
 from crossbody.cases.files.case import open_file
+from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
 
 
 def module(name: str) -> Any:

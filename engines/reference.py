@@ -66,9 +66,9 @@ class ReferenceRun:
 def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
     from crossbody.cases.files.contacts import first_contact
-    from crossbody.cases.files.mjcf import compiled
+    from crossbody.cases.files.reading import model_of
 
-    model = compiled(Path(case.file), str(case.parameters.get("without", "")))
+    model = model_of(Path(case.file), str(case.parameters.get("without", "")))
     found = first_contact(model, run.t, run.q) if run.outcome.ok else ""
     return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 

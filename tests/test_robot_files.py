@@ -13,6 +13,8 @@ from click.testing import CliRunner
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, SceneError, UnknownName
 from crossbody.cases.files.mjcf import compiled, scene_of
+from crossbody.cases.files.reading import model_of
+from crossbody.cases.files.reading import scene_of as scene_of_file
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
@@ -184,3 +186,66 @@ def test_the_command_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert "mujoco" in found
     assert "pinocchio" in found
     assert (tmp_path / "out" / "index.html").is_file()
+
+
+URDF = """
+<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0 .1 -.2" rpy=".3 -.2 .9"/><mass value="1.3"/>
+<inertia ixx=".05" iyy=".04" izz=".02" ixy=".003" ixz="-.002" iyz=".001"/></inertial></link>
+<link name="hand"><inertial><mass value=".4"/><inertia ixx=".001" iyy=".2" izz=".001" ixy="0" ixz="0" iyz="0"/>
+</inertial></link><link name="empty"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+<origin xyz=".1 0 .5" rpy=".1 .2 .3"/><limit lower="-2" upper="2" effort="10" velocity="3"/></joint>
+<joint name="wrist" type="continuous"><parent link="upper"/><child link="hand"/><axis xyz="0 1 1"/>
+<origin xyz="0 0 -.4"/><dynamics damping=".2"/></joint>
+<joint name="tip" type="fixed"><parent link="hand"/><child link="empty"/><origin xyz="0 0 -.1"/></joint></robot>
+"""
+
+
+def test_a_urdf_has_the_inertias_of_its_own(tmp_path: Path) -> None:
+    """Against Pinocchio's reader; one inertia is that of no body, one link has no mass: neither is changed."""
+    import pinocchio as pin
+
+    from crossbody.cases.files.urdf import findings
+
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    scene = scene_of_file(path, model_of(path))
+    table, theirs, rng = tabulate(scene), pin.buildModelFromUrdf(str(path)), np.random.default_rng(3)
+    data, M, f = theirs.createData(), np.zeros((2, 2)), np.zeros(2)
+    for _ in range(STATES):
+        q, v = rng.normal(size=2), rng.normal(size=2)
+        mechanism.dynamics(0.0, q, v, np.zeros(0), table.p, M, f, np.zeros(table.scratch))
+        turned = np.array([q[0], np.cos(q[1]), np.sin(q[1])])  # a continuous joint has two coordinates there
+        upper = np.triu(pin.crba(theirs, data, turned))
+        assert np.abs(M - upper - np.triu(upper, 1).T).max() <= SAME
+        bias = pin.nonLinearEffects(theirs, data, turned, v) + np.array([0.0, 0.2 * v[1]])
+        assert np.abs(f + bias).max() <= SAME * np.abs(bias).max()
+    assert [sentence.split("'")[1] for sentence in findings(path)] == ["hand"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('value="1.3"', 'value="heavy"', "upper.*heavy"),
+        ('xyz="0 .1 -.2"', 'xyz="0 .1"', "three numbers"),
+        ("</robot>", "", "no XML"),
+        ("robot", "model", "<model>|compiler refuses"),
+    ],
+)
+def test_a_wrong_urdf_is_refused_by_name(tmp_path: Path, old: str, new: str, said: str) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF.replace(old, new), encoding="utf-8")
+    with pytest.raises(SceneError, match=said):
+        cases.load(str(path))
+
+
+def test_a_urdf_runs_in_the_reference_and_in_pinocchio(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    case = cases.load(str(path), t_end=0.5)
+    runs = [
+        engines.load(e).prepare(case, p, rtol=1e-11).run() for e, p in (("reference", "compiled"), ("pinocchio", "law"))
+    ]
+    assert all(run.outcome is Outcome.FINISHED for run in runs)
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() <= 1e-8

@@ -14,10 +14,9 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
 from crossbody.cases._errors import SceneError, UnknownName
 from crossbody.cases.files.controls import read_controls
-from crossbody.cases.files.mjcf import compiled, scene_of
+from crossbody.cases.files.reading import model_of, scene_of
 from crossbody.cases.scene import RowLaw, Scene
 
-SUFFIXES = (".xml", ".mjcf")
 REFERENCE_POSE = "reference"
 OF_THE_FILE = -1.0
 PARAMETERS = {
@@ -44,7 +43,7 @@ class FileCase:
     @cached_property
     def model(self) -> Any:
         """MuJoCo's model of the whole file."""
-        return compiled(self.path)
+        return model_of(self.path)
 
     @cached_property
     def VARIANTS(self) -> Mapping[str, Mapping[str, Value]]:
@@ -58,7 +57,7 @@ class FileCase:
         q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
-        scene = overruled(scene_of(compiled(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
+        scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
         table = Path(str(p["ctrl"])) if p["ctrl"] else None
         return case_of(
             scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),

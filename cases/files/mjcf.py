@@ -10,7 +10,6 @@ import numpy as np
 
 from crossbody.cases._errors import SceneError
 from crossbody.cases.files.understood import check_understood
-from crossbody.cases.files.without import strip
 from crossbody.cases.scene import (
     UNBOUNDED,
     Actuator,
@@ -34,21 +33,18 @@ WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 JOINT_WRAP = 1
 
 
-def compiled(path: Path, without: str = "") -> mujoco.MjModel:
-    """Return MuJoCo's model of a file, less what is left out.
+def compiled(path: Path) -> mujoco.MjModel:
+    """Return MuJoCo's model of a file as it stands.
 
     Raises:
         SceneError: with MuJoCo's own sentence.
-        InvalidValue: for a word in `without` that names nothing.
     """
     import mujoco
 
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
-    strip(model, without)
-    return model
 
 
 def scene_of(model: mujoco.MjModel) -> Scene:
@@ -62,7 +58,7 @@ def scene_of(model: mujoco.MjModel) -> Scene:
         bodies=tuple(_body(model, i) for i in range(1, model.nbody)),
         joints=tuple(_joint(model, i) for i in range(model.njnt)),
         shapes=tuple(shape for i in range(model.ngeom) if (shape := _shape(model, i)) is not None),
-        loops=tuple(_loop(model, i) for i in range(model.neq) if model.eq_active0[i]),
+        loops=tuple(_loop(model, i) for i in range(model.neq) if model.eq_active0[i] and _on(model, "EQUALITY")),
         tendons=tuple(_tendon(model, i) for i in range(model.ntendon)),
         actuators=tuple(_actuator(model, i) for i in range(model.nu)),
         gravity=tuple(model.opt.gravity) if not model.opt.disableflags & _disabled("GRAVITY") else (0.0, 0.0, 0.0),
@@ -73,6 +69,11 @@ def _disabled(flag: str) -> int:
     import mujoco
 
     return int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
+
+
+def _on(model: Any, rows: str) -> bool:
+    """Return whether the model has a kind of rows at all."""
+    return not model.opt.disableflags & (_disabled(rows) | _disabled("CONSTRAINT"))
 
 
 def _name(model: Any, kind: str, index: int) -> str:
@@ -119,7 +120,7 @@ def _joint(model: Any, i: int) -> Joint:
     if model.jnt_actgravcomp[i] and model.jnt_actfrclimited[i]:
         raise SceneError(f"Joint {_name(model, 'jnt', i)!r} bounds the force against weight: a scene's joint does not.")
     rest = model.qpos_spring[at : at + 1] if single else model.qpos_spring[at + (3 if kind == "free" else 0) :][:4]
-    limited = bool(model.jnt_limited[i]) and not model.opt.disableflags & _disabled("LIMIT")
+    limited = bool(model.jnt_limited[i]) and _on(model, "LIMIT")
     return Joint(
         name=_name(model, "jnt", i),
         body=_name(model, "body", int(model.jnt_bodyid[i])),
@@ -207,7 +208,7 @@ def _tendon(model: Any, i: int) -> Tendon:
         damping=_poly(model.tendon_damping[i], model.tendon_dampingpoly[i]),
         stiffness=_poly(model.tendon_stiffness[i], model.tendon_stiffnesspoly[i]),
         rest=_floats(model.tendon_lengthspring[i]),
-        range=_floats(model.tendon_range[i]) if model.tendon_limited[i] else UNBOUNDED,
+        range=_floats(model.tendon_range[i]) if model.tendon_limited[i] and _on(model, "LIMIT") else UNBOUNDED,
         margin=float(model.tendon_margin[i]),
         friction_loss=float(model.tendon_frictionloss[i]),
         law=law(model, model.tendon_solref_lim[i], model.tendon_solimp_lim[i]),

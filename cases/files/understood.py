@@ -102,7 +102,19 @@ def _only_seen(name: str) -> bool:
     return name in DRAWN or name in NOT_FELT or name.startswith(UNSEEN) or name.endswith(("_user", "_group"))
 
 
-HARMLESS = ("CONTACT", "LIMIT", "GRAVITY", "REFSAFE", "WARMSTART", "SENSOR", "ISLAND", "AUTORESET", "EULERDAMP")
+HARMLESS = (
+    "CONSTRAINT",
+    "EQUALITY",
+    "CONTACT",
+    "LIMIT",
+    "GRAVITY",
+    "REFSAFE",
+    "WARMSTART",
+    "SENSOR",
+    "ISLAND",
+    "AUTORESET",
+    "EULERDAMP",
+)
 HARMLESS_TOO = ("MIDPHASE", "NATIVECCD", "MULTICCD", "FILTERPARENT")
 """Flags that are taken into account, or that change no physics of a scene."""
 

@@ -9,9 +9,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Mode
+from crossbody.cases import Case, CaseUnsupported, Mode, SceneError
 from crossbody.cases._arrays import Floats
-from crossbody.cases.files.mjcf import compiled as model_of
+from crossbody.cases.files import mjcf
+from crossbody.cases.files.without import strip
 from crossbody.cases.scene import Scene
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces, tendons
@@ -28,8 +29,16 @@ HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
 
 def why_not(case: Case, profile: str) -> str | None:
-    """Return why a profile cannot do it: a scene from Python has no file to take as it stands."""
-    return "There is no file to run as it stands." if profile == "default" and not case.file else None
+    """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
+    if profile != "default":
+        return None
+    if not case.file:
+        return "There is no file to run as it stands."
+    try:
+        _from_file(case)
+    except SceneError as error:
+        return str(error)
+    return None
 
 
 def default_step(case: Case, profile: str) -> float:
@@ -81,7 +90,10 @@ def _scene(case: Case) -> Scene:
 
 
 def _from_file(case: Case) -> Any:
-    return model_of(Path(case.file), str(case.parameters.get("without", "")))
+    """Return MuJoCo's own reading of the file, less what is left out of every engine."""
+    model = mjcf.compiled(Path(case.file))
+    strip(model, str(case.parameters.get("without", "")))
+    return model
 
 
 def matched(scene: Scene) -> Any:
