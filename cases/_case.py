@@ -240,7 +240,8 @@ class Case:
         inputs: what acts from outside; None for nothing.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
-        scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from.
+        scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
+            `findings` what is strange in it.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
             show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
@@ -272,6 +273,7 @@ class Case:
     consistent: bool = True
     scene: Scene | None = None
     file: str = ""
+    findings: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:

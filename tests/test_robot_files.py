@@ -240,6 +240,15 @@ def test_a_wrong_urdf_is_refused_by_name(tmp_path: Path, old: str, new: str, sai
         cases.load(str(path))
 
 
+def test_what_is_strange_in_a_file_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    arguments = ["run", str(path), "-e", "reference:compiled", "--set", "t_end=0.1", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code == 0, result.output
+    assert "note: arm.urdf: Link 'hand'" in result.stderr
+
+
 def test_a_urdf_runs_in_the_reference_and_in_pinocchio(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(URDF, encoding="utf-8")

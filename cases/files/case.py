@@ -14,7 +14,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
 from crossbody.cases._errors import SceneError, UnknownName
 from crossbody.cases.files.controls import read_controls
-from crossbody.cases.files.reading import model_of, scene_of
+from crossbody.cases.files.reading import findings_of, model_of, scene_of
 from crossbody.cases.scene import RowLaw, Scene
 
 REFERENCE_POSE = "reference"
@@ -61,6 +61,7 @@ class FileCase:
         table = Path(str(p["ctrl"])) if p["ctrl"] else None
         return case_of(
             scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),
+            findings=findings_of(self.path),
             inputs=read_controls(table, scene) if table else held(scene, ctrl),
             parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
@@ -103,6 +104,7 @@ def case_of(
     t_end: float = 1.0,
     parameters: Mapping[str, Value] | None = None,
     file: str = "",
+    findings: tuple[str, ...] = (),
 ) -> Case:
     """Return a scene as a case: its rows are its loops, then the bounds of its joints and tendons.
 
@@ -116,6 +118,7 @@ def case_of(
         t_end: horizon, s.
         parameters: of the case.
         file: where the scene comes from.
+        findings: sentences on what is strange there.
 
     Raises:
         SceneError: for a scene that no engine here can run, naming what stands against it.
@@ -131,7 +134,7 @@ def case_of(
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}), coordinates=coordinates(scene),
         contacts=tuple(names), q0=reference_pose(scene) if q0 is None else q0,
         v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
-        file=file,
+        file=file, findings=findings,
     )  # fmt: skip
 
 

@@ -43,3 +43,8 @@ def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
     """
     scene = mjcf.scene_of(model)
     return urdf.with_inertias(path, scene) if is_urdf(path) else scene
+
+
+def findings_of(path: Path) -> tuple[str, ...]:
+    """Return sentences on what is strange in a file but taken as it stands."""
+    return tuple(urdf.findings(path)) if is_urdf(path) else ()
