@@ -26,6 +26,10 @@ LARGEST = 1_000_000
 class System:
     """The equations of one mechanism, ready for `simulate`.
 
+    A system that is deleted takes its kernels with it, but LLVM gives no memory back that holds machine code: 1.5 to 3 MB
+    stay of each system with kernels of its own (`pytest tests/test_kernels_released.py -m bench -s`). Where many are
+    made, give one set of kernels other parameters.
+
     Attributes:
         n: number of coordinates.
         dynamics, gaps, rows, energy, power, solve, control, watch, switch: kernels as in `crossbody.reference.kernels`.
