@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -297,28 +298,41 @@ def _is_known(judge_: _Judge, limit: Limit, row: AuditRow) -> bool:
     return stored == row.difference or (sizes is not None and sizes[0] <= row.difference <= sizes[1])
 
 
+def crash(error: Exception) -> str:
+    """What was thrown, and where."""
+    place = "".join(traceback.format_tb(error.__traceback__)[-1:]).strip().splitlines()[0]
+    return f"{type(error).__name__}: {error} ({place})"
+
+
 def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict]:
+    """A row for every metric that says something; one that throws is a row too, so that the others are judged."""
     for name in metrics.names():
         metric = metrics.load(name)
         wanted = name in judge_.claims or judge_.limit(name) is not None
         if metric.CLAIMED and not wanted:
             continue
-        value, compared = _value(metric, name, truth, run, judge_.case)
-        needs = getattr(metric, "NEEDS", "")
-        excused = (
-            value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
-        )
-        if value is not None and not excused:
-            yield judge_.judged(name, value, metric.UNIT, truth, compared)
-        elif excused and not wanted:
-            continue
-        elif name in judge_.claims or (wanted and _shown(metric, truth, judge_.case)):
-            why = (
-                "The run has no such number, the truth has."
-                if name not in judge_.claims
-                else "There is no such number."
-            )
-            yield judge_.missing(name, metric.UNIT, why, needs)
+        try:
+            found = _row(judge_, metric, name, wanted, truth, run)
+        except Exception as error:
+            found = judge_.row(name, math.nan, metric.UNIT, Word.CRASHED, crash(error))
+        if found is not None:
+            yield found
+
+
+def _row(
+    judge_: _Judge, metric: metrics.Metric, name: str, wanted: bool, truth: Truth, run: Trajectory
+) -> Verdict | None:
+    """What is said of one metric; None where nothing is."""
+    value, compared = _value(metric, name, truth, run, judge_.case)
+    needs = getattr(metric, "NEEDS", "")
+    excused = value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
+    if value is not None and not excused:
+        return judge_.judged(name, value, metric.UNIT, truth, compared)
+    if name in judge_.claims:
+        return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
+    if wanted and _shown(metric, truth, judge_.case):
+        return judge_.missing(name, metric.UNIT, "The run has no such number, the truth has.", needs)
+    return None
 
 
 def _shown(metric: metrics.Metric, truth: Truth, case: Case) -> bool:
@@ -356,6 +370,10 @@ def _split(judge_: _Judge) -> Iterator[Verdict]:
     for name in SPLIT:
         metric = metrics.load(name)
         for label, against, run in sides:
-            value, compared = _value(metric, name, against, run, judge_.case)
+            try:
+                value, compared = _value(metric, name, against, run, judge_.case)
+            except Exception as error:
+                yield judge_.row(f"{name} ({label})", math.nan, metric.UNIT, Word.CRASHED, crash(error))
+                continue
             if value is not None:
                 yield judge_.judged(f"{name} ({label})", value, metric.UNIT, against, compared)

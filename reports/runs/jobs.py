@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,7 +22,7 @@ from crossbody.cases import (
     Value,
 )
 from crossbody.reports.judging.audit import AuditRow, audit
-from crossbody.reports.judging.comparison import Entry, check_names
+from crossbody.reports.judging.comparison import Entry, check_names, crash
 from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
 from crossbody.reports.runs import watch
 
@@ -188,8 +187,7 @@ def _entry(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mappin
     except CrossbodyError:  # wrong use of ours
         raise
     except Exception as error:
-        place = "".join(traceback.format_tb(error.__traceback__)[-1:]).strip().splitlines()[0]
-        return Entry(engine=pick.engine, profile=pick.profile, crashed=f"{type(error).__name__}: {error} ({place})")
+        return Entry(engine=pick.engine, profile=pick.profile, crashed=crash(error))
 
 
 def _ran(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
