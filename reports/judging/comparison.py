@@ -16,7 +16,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.stored import Deviations, deviations, words
+from crossbody.reports.judging.stored import Deviations, deviations, differing, words
 from crossbody.reports.judging.truth import Truth, from_run, truth_of
 from crossbody.reports.judging.verdict import (
     Regression,
@@ -290,10 +290,14 @@ def _audit(judge_: _Judge) -> Verdict:
 
 
 def _is_known(judge_: _Judge, limit: Limit, row: AuditRow) -> bool:
-    """Whether a stored run differed in the same quantity by as much; without one, the property explains all."""
+    """Whether a stored run differed in the same quantity by as much.
+
+    With other parameters or settings than any stored run's the size is not known: the quantity alone must be.
+    """
+    name = f"audit {row.quantity}"
     if not judge_.stored:
-        return True
-    stored = judge_.stored.get(f"audit {row.quantity}", 0.0)
+        return name in differing(judge_.case, judge_.entry)
+    stored = judge_.stored.get(name, 0.0)
     sizes = explained(limit, stored)
     return stored == row.difference or (sizes is not None and sizes[0] <= row.difference <= sizes[1])
 

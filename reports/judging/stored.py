@@ -43,6 +43,12 @@ def deviations(case: Case, entry: Entry) -> Deviations:
     return {metric: float(value) for metric, value in run["deviations"].items()}
 
 
+def differing(case: Case, entry: Entry) -> frozenset[str]:
+    """What was looked at in the stored run of that variant, engine and profile, whatever its parameters."""
+    run = _table().get(case.label, {}).get("runs", {}).get(f"{entry.engine}:{entry.profile}")
+    return frozenset() if run is None else frozenset(run["deviations"])
+
+
 @cache
 def _table() -> dict[str, Any]:
     found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.is_file() else {}
