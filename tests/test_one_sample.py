@@ -74,6 +74,29 @@ def pulsed(run: Trajectory, k: int, _truth: Trajectory) -> tuple[Trajectory, flo
     return replace(run, lam=lam), max(abs(first), abs(second)) / total
 
 
+def pulling(run: Trajectory, k: int, _truth: Trajectory) -> tuple[Trajectory, float]:
+    """A row that is closed pulls."""
+    lam, mode = run.lam.copy(), run.mode.copy()
+    lam[k, 0], mode[k, 0] = -OFF * lam.max(), Mode.CONTACT
+    return replace(run, lam=lam, mode=mode), OFF
+
+
+def pressing(run: Trajectory, k: int, _truth: Trajectory) -> tuple[Trajectory, float]:
+    """A row that is open pushes."""
+    lam, mode = run.lam.copy(), run.mode.copy()
+    lam[k, 0], mode[k, 0] = OFF * lam.max(), Mode.FREE
+    return replace(run, lam=lam, mode=mode), OFF
+
+
+def begun(name: str) -> Fault:
+    """A start beside the case's."""
+
+    def fault(run: Trajectory, k: int, truth: Trajectory) -> tuple[Trajectory, float]:
+        return bumped(name, scale=lambda motion: np.abs(getattr(motion, name)).max())(run, 0, truth)
+
+    return fault
+
+
 AT_ONE: dict[str, Fault] = {
     "position": bumped("q", scale=lambda run: np.abs(run.q).max()),
     "velocity": bumped("v", scale=lambda run: np.abs(run.v).max()),
@@ -81,6 +104,10 @@ AT_ONE: dict[str, Fault] = {
     "energy_drift": bumped("energy", 1, scale=lambda run: run.energy[:, 0].max()),
     "energy_integrator": booked("input", 1.0),
     "lam_impulse_path": pulsed,
+    "complementarity": pulling,
+    "complementarity of an open row": pressing,
+    "start_error": begun("q"),
+    "start_error in velocity": begun("v"),
 }
 
 
@@ -91,7 +118,8 @@ def test_a_fault_at_one_sample_counts_in_full(name: str, place: float, ball: tup
     times = case.t_end * np.linspace(0.0, 1.0, 2001)
     run = truth.at(times)
     run, wanted = AT_ONE[name](run, int(place * len(run.t)), truth.trajectory)
-    value, floor = measure(name, case, truth, run), measure(name, case, truth, truth.at(times))
+    metric = name.split()[0]
+    value, floor = measure(metric, case, truth, run), measure(metric, case, truth, truth.at(times))
     assert value == pytest.approx(wanted, rel=1e-6, abs=2.0 * floor)
     assert wanted > 10.0 * floor
 

@@ -116,6 +116,12 @@ def table(rows: Iterable[Verdict]) -> pd.DataFrame:
     return pd.DataFrame([row.row() for row in rows], columns=list(Verdict.__dataclass_fields__))
 
 
+def judges_parts(case: Case, engine: str, profile: str) -> bool:
+    """Whether a limit asks for the model or the discretisation error of an engine."""
+    names = (f"{name} ({part})" for name in SPLIT for part in PARTS)
+    return any(limit_for(limits_of(case), name, engine, profile) is not None for name in names)
+
+
 def check_names(case: Case) -> None:
     """Say which names in claims and limits do not exist.
 
