@@ -93,7 +93,7 @@ def truth_of(case: Case) -> Truth:
     first = motion(np.zeros(1))
     truth = Truth(
         tier=Tier.A,
-        source="closed form of every arc",
+        source="closed form of every arc, which shares the numbers of the case alone with what it judges",
         trajectory=motion(sample_times(first, case.t_end)),
         at=motion,
         agreement={},
@@ -162,7 +162,8 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     second = reference.prepare(case, other, rtol=loose).run()
     truth = _held_against(Truth(tier=tier, source="", trajectory=dense, at=at, agreement={}), second, case, loose)
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
-    source = f"compiled reference at rtol {case.tight:g}, {other} at {loose:g} agrees: {said}"
+    shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
+    source = f"compiled reference at rtol {case.tight:g}, {other} at {loose:g} agrees: {said}; they share {shared}"
     if truth.parted < case.t_end:
         source += f"; they part at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
     return _rechecked(replace(truth, source=source), case)
