@@ -20,9 +20,10 @@ SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
-AGREES = 1e5
-"""Largest disagreement of the two, in units of the looser tolerance: errors add up and grow over thousands of steps. It
-is never more than `PARTED`."""
+STEPS, GROWTH = 1e4, 10.0
+"""Most steps of a run, whose errors add up at worst, and how much they grow where a motion is not declared chaotic."""
+AGREES = STEPS * GROWTH
+"""Largest disagreement of the two, in units of the looser tolerance; it is never more than `PARTED`."""
 GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
 
