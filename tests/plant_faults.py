@@ -220,11 +220,12 @@ def main() -> int:
     """The command line; the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--only", default="", help="part of the name of a fault or of its file")
+    parser.add_argument("--only", action="append", help="part of the name of a fault or of its file; repeatable")
     parser.add_argument("--quick", action="store_true", help="the sample of the gate")
     parser.add_argument("--kept", type=Path, default=ROOT / "build" / "faults.jsonl", help="what was seen before")
     asked = parser.parse_args()
-    wanted = [f for f in faults() if asked.only in f.name + f.file and (f.quick or not asked.quick)]
+    named = asked.only or [""]
+    wanted = [f for f in faults() if any(x in f"{f.name} {f.file}" for x in named) and (f.quick or not asked.quick)]
     kept = Kept(asked.kept)
     words, enough = summary(look(wanted, kept, asked.jobs))
     print(words)
