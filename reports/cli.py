@@ -98,18 +98,20 @@ _LIMIT = click.option(
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
 @_LIMIT
 @_AGAINST
 @_WITH
 @speaks
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, settings: tuple[str, ...], limit: float, against: Path | None, others: tuple[Path, ...],
+    rtol: float | None, settings: tuple[str, ...], strict: bool, limit: float, against: Path | None,
+    others: tuple[Path, ...],
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
     from crossbody.reports.commands import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit)
+    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit, strict)
 
 
 @cli.command()
