@@ -281,9 +281,10 @@ class LevelMachine:
 
     def _guards(self, i: int, view: View, inside: bool) -> list[Guard]:
         mode, noise = self.modes[i], float(view.noise[i])
-        # The rate's own zero is the place; one that stands still there already must close first.
+        # The rate's own zero is the place; one that stands still there already must close first. So must a gap that has
+        # just opened, whose next values round to either side; a gap that was open cannot close without a rate below 0.
         still = i in self.frozen or view.rate[i] <= self.slow
-        closing = Term(Kind.RATE, i, self.slow if still else 0.0)
+        closing = Term(Kind.RATE, i, self.slow if still and (inside or mode != Mode.FREE) else 0.0)
         if mode in ACTIVE:
             lam = float(view.lam[i])  # one that starts at or below zero is round-off, or has fired already
             released = Guard(i, Watch.SWITCH, [Term(Kind.FORCE, i, noise - lam if lam <= 0.0 else 0.0, noise)])
@@ -291,6 +292,6 @@ class LevelMachine:
                 return [released]
             return [released, Guard(i, Watch.OTHER, [Term(Kind.SPENT, i, sides=sides) for sides in SIDES])]
         if mode == Mode.FREE:
-            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i), closing] if inside else [Term(Kind.GAP, i)])]
+            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i), closing])]
         catch = [closing] if i in self.frozen else [closing, Term(Kind.PRESS, i)]
         return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i)]), Guard(i, Watch.OTHER, catch)]
