@@ -19,7 +19,7 @@ from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
 from crossbody.reference._system import System
-from crossbody.reference.sundials.arcs import Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
+from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
 from crossbody.reference.sundials.compiled.evaluation import entry
 from crossbody.reference.sundials.discrete import START, TOUCHED, Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
@@ -73,6 +73,7 @@ class SundialsRun:
         """Back to the beginning."""
         e = self.equations = Equations(self.system, rigid=bool(self.rigid))
         self.machine = self._machine(e)
+        self.machine.error = SHARE * self.options.tolerance
         self.discrete = Discrete(self.system, e)
         self.folds = Folds(e)
         nz = self.system.nc + 2 if self.options.ledger else 0
