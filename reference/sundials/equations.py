@@ -144,9 +144,7 @@ class Equations:
         """Let the sampled controller set the inputs."""
         self.system.control(t, q, v, self.u, self.memory, self.p)
 
-    def noise(
-        self, t: float, q: Floats, v: Floats, speed: float = 0.0, error: float = 0.0
-    ) -> tuple[Floats, Floats]:
+    def noise(self, t: float, q: Floats, v: Floats, speed: float = 0.0, error: float = 0.0) -> tuple[Floats, Floats]:
         """What rounding may make of each active multiplier, and the size that it has or may take (nc,), N.
 
         Args:

@@ -138,7 +138,7 @@ class LevelMachine:
         return View(gap, rate, vd, lam, noise, size)
 
     def pressure(self, i: int, t: float, q: Floats, v: Floats, error: float = 0.0) -> tuple[float, float]:
-        """Multiplier of row i if it were active now, and its noise; -inf if that is ill posed. `error` as in `noise`."""
+        """Multiplier of row i if it were active now, and its noise; -inf if ill posed. `error` is that of `noise`."""
         trial = list(self.modes)
         trial[i] = self._active_mode(i)
         self._activate(trial)
