@@ -179,7 +179,7 @@ class SundialsRun:
         longest = self.options.max_step
         if cautious:
             longest = min(longest, (self.options.t_end - self.state.t) * CAUTION**self.retries)
-        return self.kind(self.scene, self.state, view, longest, self.single)
+        return self.kind(self.scene, self.state, view, longest, self.single or cautious)
 
     def _step(self, arc: Arc, stop: float) -> bool | None:
         """Go on; whether a machine switched, or None if the arc must begin anew with shorter steps."""
