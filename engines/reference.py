@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Parameter, Trajectory
+from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.engines import _settings
-from crossbody.engines._equations import builder, module, system_of
-from crossbody.engines._reference_audit import audit
+from crossbody.engines._equations import known, module, system_of
+from crossbody.engines._reference_audit import audit, listed
 from crossbody.reference import Options, System, prepare
 from crossbody.reference._options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
 
@@ -45,12 +46,25 @@ class ReferenceRun:
     def run(self) -> Trajectory:
         """Integrate from the start."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
-        return trajectory
+        return within_the_model(self.case, trajectory) if self.case.file else trajectory
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""
-        listed = getattr(module(self.case.mechanism), "listed", None)
-        return audit(self.system, self.case.q0, self.case.v0) | (listed(self.system.p) if listed else {})
+        own = audit(self.system, self.case.q0, self.case.v0)
+        if self.case.scene is not None:
+            return own | listed(self.case.scene)
+        told = getattr(module(self.case.mechanism), "listed", None)
+        return own | (told(self.system.p) if told else {})
+
+
+def within_the_model(case: Case, run: Trajectory) -> Trajectory:
+    """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
+    from crossbody.cases.files.contacts import first_contact
+    from crossbody.cases.files.reading import model_of
+
+    model = model_of(Path(case.file), str(case.parameters.get("without", "")))
+    found = first_contact(model, run.t, run.q) if run.outcome.ok else ""
+    return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
 
 class Reference:
@@ -76,7 +90,7 @@ class Reference:
         solver = _settings.profile_of(self.name, self.profiles, profile)
         if (case.mechanism, solver) in UNSUITED:
             return UNSUITED[case.mechanism, solver]
-        if builder(case.mechanism) is None:
+        if not known(case):
             return f"The reference has no equations of the mechanism {case.mechanism!r}."
         if case.collisions not in COLLISIONS:
             return (

@@ -67,7 +67,9 @@ def _shared(command: _Work) -> _Work:
     options = (
         click.argument("names", metavar="[CASE]...", nargs=-1),
         click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable."),
-        click.option("--variant", metavar="V", help="Variant of the case; all if not given."),
+        click.option(
+            "--variant", "--key", metavar="V", help="Variant of the case, keyframe of a robot's file; all if not given."
+        ),
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
         click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR"),
     )
@@ -212,7 +214,7 @@ def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
 
 @cli.command()
 @click.argument("name", metavar="CASE")
-@click.option("--variant", metavar="V", help="Variant of the case; the first if not given.")
+@click.option("--variant", "--key", metavar="V", help="Variant of the case; the first if not given.")
 @click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
 @click.option("--at", metavar="K=V", multiple=True, help="Where to look: x, y, z of the flange, m; repeatable.")
 @click.option("--bode", is_flag=True, help="Frequency responses too.")

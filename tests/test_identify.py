@@ -160,6 +160,7 @@ def after(log: hw.Log, model: str, fit: hw.Fit | None, restart: float, horizon: 
     return errors[1::2] if held else errors
 
 
+@pytest.mark.slow
 @needs_pendulum
 def test_identified_friction_of_the_double_pendulum_does_better_on_windows_not_fitted() -> None:
     log = pendulum("double")

@@ -39,7 +39,7 @@ def test_tosses_in_pinocchio_and_why_the_reference_has_none() -> None:
 
 
 def test_friction_is_found_near_the_published_one() -> None:
-    fit = hw.identify(tosses(9), "cube_toss", ["friction"], hold=0, parameters={"friction": 0.25})
+    fit = hw.identify(tosses(19), "cube_toss", ["friction"], hold=0, parameters={"friction": 0.25})
     assert fit["friction"].value == pytest.approx(0.18, abs=0.02)
     assert fit["friction"].identifiable
     assert 0.12 < fit["friction"].low < fit["friction"].high < 0.24

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from rig_data import channels, log_of
@@ -11,6 +14,7 @@ from scipy.integrate import solve_ivp
 from crossbody import hw
 from crossbody.cases import InvalidValue
 from crossbody.hw import models
+from crossbody.hw.fitting import deadline
 from crossbody.hw.fitting.derivative import Exact
 from crossbody.hw.fitting.start_noise import moves
 from crossbody.hw.replaying.windows import windows
@@ -92,3 +96,28 @@ def test_default_intervals_hold_where_windows_restart(rho: float, least: float, 
     print(f"lag-1 correlation {rho:g}: of {draws} intervals of {', '.join(true)} {held.sum(axis=0)} hold")
     scatter = 2.0 * np.sqrt(0.95 * 0.05 / (2 * draws))
     assert least - scatter <= inside <= most + scatter
+
+
+@pytest.mark.parametrize("runs", [0, 30])
+def test_an_identification_stops_at_its_time_limit_with_what_it_reached(
+    runs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = itertools.count()  # a clock that every look moves by a second
+    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: float(next(now))))
+    fit = fitted(swing(0), time_limit=runs + 0.5)
+    assert (fit.outcome, fit.success) == ("stopped", False)
+    assert f"Stopped at the time limit of {runs + 0.5:g} s" in fit.message
+    assert fit.warnings[0].startswith(fit.message)
+    for e in fit.estimates:
+        assert (e.low, e.high, e.identifiable) == (-np.inf, np.inf, False)
+        assert e.bounds[0] <= e.value <= e.bounds[1]
+        assert fit.parameters[e.name] == e.value
+    assert all(e.value == e.start for e in fit.estimates) == (runs == 0)
+
+
+def test_a_limit_that_is_not_reached_changes_nothing() -> None:
+    free, limited = (fitted(swing(0, seconds=6.0), time_limit=limit) for limit in (np.inf, 1e6))
+    assert limited.outcome == "converged"
+    assert [(e.value, e.low, e.high) for e in free.estimates] == [(e.value, e.low, e.high) for e in limited.estimates]
+    with pytest.raises(InvalidValue, match="time_limit"):
+        fitted(swing(0), time_limit=0.0)

@@ -99,10 +99,10 @@ def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:
 
 
 def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_path: Path) -> None:
-    words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", "4")
+    words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", "2")
     code, said = finished(begun("run", "balls.py", "--variant", "linear", *words, cwd=tmp_path))
     assert code == 1, said
-    assert "fake:stuck: It did not come back within 4 s and was ended" in said
+    assert "fake:stuck: It did not come back within 2 s and was ended" in said
     assert "fake:crash: Its process was ended by SIGSEGV" in said
     assert "CROSSBODY_DEBUG=1" in said
     rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet").set_index("profile")

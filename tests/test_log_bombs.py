@@ -101,7 +101,7 @@ def test_large_bombs_end_with_an_error_within_memory_and_time(name: str, tmp_pat
 
 
 def _columns(names: tuple[str, ...]) -> hw.Columns:
-    signals = "".join(f'[sensors.{name}]\ncolumn = "{name}"\nunit = "1"\n' for name in names)
+    signals = "".join(f'[sensors.{name}]\ncolumn = "{name}"\nunit = "rad"\n' for name in names)
     return hw.parse_columns(f'[time]\ncolumn = "t"\nunit = "s"\n{signals}')
 
 
@@ -132,7 +132,7 @@ def test_large_logs_are_read(case: str, tmp_path: Path) -> None:
     """Two million rows of noise, 40 MB: nothing that is legal meets a bound."""
     path = log_files.write(case, tmp_path, log_files.table(2_000_000))
     before, clock = log_files.WRITERS[case][3:]
-    columns = hw.parse_columns(f'[time]\ncolumn = "{clock}"\n[sensors.a]\ncolumn = "{before}angle"\nunit = "1"\n')
+    columns = hw.parse_columns(f'[time]\ncolumn = "{clock}"\n[sensors.a]\ncolumn = "{before}angle"\nunit = "rad"\n')
     assert len(hw.read(path, columns)) == 2_000_000
 
 
@@ -211,3 +211,33 @@ def test_a_wide_table_and_many_row_groups_are_read_within_the_usual_memory(tmp_p
     """With little memory they are refused; nothing ends the process."""
     done = subprocess.run([sys.executable, "-c", WIDE, str(tmp_path)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+RESERVES = """
+import sys
+from pathlib import Path
+import pandas, pyarrow as pa
+from crossbody.hw import formats
+if sys.argv[2] == "first":
+    pa.allocate_buffer(1 << 20)
+reader = formats.open_log(Path(sys.argv[1]))
+with reader.budget.guard():  # as some of Arrow does while it reads
+    held = pa.allocate_buffer(1 << 20, memory_pool=pa.mimalloc_memory_pool())
+for block in reader.blocks(reader.groups[0], list("abcdefgh")):
+    pass
+"""
+
+
+@pytest.mark.parametrize("when", ["first", "later"])
+def test_what_arrow_reserves_does_not_count(when: str, tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if "mimalloc" not in pa.supported_memory_backends():
+        pytest.skip("Arrow is built without its own allocator.")
+    noise = np.random.default_rng(0).standard_normal((8, 200_000))
+    pq.write_table(pa.table({name: noise[i] for i, name in enumerate("abcdefgh")}), tmp_path / "log.parquet")
+    ended = subprocess.run(
+        [sys.executable, "-c", RESERVES, tmp_path / "log.parquet", when], capture_output=True, text=True
+    )
+    assert ended.returncode == 0, ended.stderr

@@ -10,8 +10,9 @@ from log_motions import KINDS, Motion, draw
 
 from crossbody import hw
 from crossbody.cases import LogFormatError
-from crossbody.hw.checks.jumps import JumpCheck, unwrapped
+from crossbody.hw.checks.finding import first_of_each
 from crossbody.hw.checks.rates import RateCheck
+from crossbody.hw.checks.smooth import JumpCheck, unwrapped
 from crossbody.hw.checks.values import ValueCheck
 
 MOVING = ("sines", "moves", "swing", "bounces")
@@ -27,7 +28,7 @@ def findings(motion: Motion, q: np.ndarray, v: np.ndarray | None = None, cut: in
         value.see(rows[part], motion.t[part], q[part])
         jumps.see(rows[part], motion.t[part], q[part])
         rate.see(rows[part], motion.t[part], q[part], (motion.v if v is None else v)[part])
-    return [*value.findings(), *jumps.findings(), *rate.findings()]
+    return first_of_each([*value.findings(), *jumps.findings(), *rate.findings()])
 
 
 def speed(motion: Motion, row: int) -> float:
@@ -60,11 +61,90 @@ def _slips(seed: int, kind: str) -> None:
     motion, random = draw(seed, kind), np.random.default_rng([seed, 2])
     row = int(random.integers(5, len(motion.q) - 5))
     q = motion.q.copy()
-    size = 0.5 + 12.0 * speed(motion, row)
-    size += 2.0 if abs(size - 2.0 * np.pi * np.rint(size / (2.0 * np.pi))) < 1.0 else 0.0  # a turn is a wrap
-    q[row:] += random.choice([-1.0, 1.0]) * size
+    q[row:] += random.choice([-1.0, 1.0]) * no_turn(0.5 + 12.0 * speed(motion, row))
     found = [f for f in findings(motion, q) if f.check in ("slips", "wraps")]
     assert [(f.check, f.row, f.t, f.count) for f in found] == [("slips", row, motion.t[row], 1)]
+
+
+def no_turn(size: float) -> float:
+    """A size that is not that of whole turns."""
+    return size + (2.0 if abs(size - 2.0 * np.pi * np.rint(size / (2.0 * np.pi))) < 1.0 else 0.0)
+
+
+def _slow_slips(seed: int, kind: str) -> None:
+    """A slip that takes up to eight samples, in a motion whose rate is not recorded."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 4])
+    row, span = int(random.integers(40, len(motion.q) - 60)), int(random.integers(2, 9))
+    ways = motion.q[row - 24 : row + 40] - motion.q[row - 32 : row + 32]  # of 8 samples
+    size = 0.5 + 12.0 * (float(np.ptp(ways)) + 60.0 * motion.noise + 30.0 * motion.grid)
+    if size > 2.0 * span:
+        return  # steps of a turn
+    share = np.clip(np.arange(1 - row, len(motion.q) + 1 - row) / span, 0.0, 1.0)
+    share = share if random.random() < 0.5 else share**2 * (3.0 - 2.0 * share)
+    q = motion.q + random.choice([-1.0, 1.0]) * size * share
+    found = [f for f in findings(motion, q, np.full(len(q), np.nan)) if f.check in ("slips", "wraps", "spikes")]
+    assert [(f.check, f.count) for f in found] == [("slips", 1)]
+    assert row - 1 <= found[0].row < row + span
+
+
+def _long_slips(seed: int, kind: str) -> None:
+    """A slip that takes up to eighty samples, which the recorded rate does not know."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 5])
+    row, span = int(random.integers(400, len(motion.q) - 500)), int(random.integers(9, 81))
+    fastest = float(np.abs(motion.v[row - 60 : row + 140]).max())
+    size = 0.5 + 12.0 * (motion.noise + motion.grid + motion.step * fastest * 16.0)
+    share = np.clip(np.arange(1 - row, len(motion.q) + 1 - row) / span, 0.0, 1.0)
+    found = [f for f in findings(motion, motion.q + size * share) if f.check not in ("stuck", "saturated")]
+    if judged(motion):
+        assert [f.check for f in found] in (["slips"], ["rates"], ["gain"], ["delay"])  # as many spans as disagree
+        assert abs(found[0].row - row) <= 130
+
+
+def _spikes(seed: int, kind: str) -> None:
+    """A sample or two that leave a smooth motion and come back."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 6])
+    row, span = int(random.integers(5, len(motion.q) - 6)), int(random.integers(1, 3))
+    q, size = motion.q.copy(), no_turn(0.5 + 15.0 * speed(motion, row))
+    q[row : row + span] += random.choice([-1.0, 1.0]) * size
+    found = [f for f in findings(motion, q) if f.check not in ("stuck", "saturated")]
+    assert [(f.check, f.row, f.t, f.count) for f in found] == [("spikes", row, motion.t[row], 1)]
+
+
+def _degrees(seed: int, kind: str) -> None:
+    """An angle of one turn in degrees that is taken for radians, or the reverse."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 7])
+    q = np.mod(motion.q + random.uniform(-np.pi, np.pi) + np.pi, 2.0 * np.pi) - np.pi
+    at = np.flatnonzero(np.abs(np.diff(q)) > np.pi) + 1
+    apart = (
+        len(at)
+        and np.rad2deg(np.abs(np.diff(motion.q)).max()) < 2.0
+        and np.diff(np.concatenate(([-40], at, [len(q) + 40]))).min() > 40
+    )
+    if not apart or len(at) < 2:
+        return
+    for factor in (180.0 / np.pi, np.pi / 180.0):
+        found = [f for f in findings(motion, factor * q, factor * motion.v) if f.fault]
+        assert [(f.check, f.row) for f in found] == [("unit", at[0])]
+
+
+def _gains(seed: int, kind: str) -> None:
+    """A gain that is off by a few per cent, or a rate that is some samples late."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 8])
+    bend = np.sqrt(np.mean(np.gradient(motion.v, motion.step) ** 2) / max(np.mean(motion.v**2), 1e-30))
+    late = int(random.integers(4, 9))
+    if not judged(motion) or late * motion.step * bend > 0.5:
+        return  # it rests, or so late is no small delay
+    if (
+        late * motion.step * np.std(motion.v[16:] - motion.v[:-16]) * np.sqrt(len(motion.q) / 16.0)
+        < 12.0 * motion.noise
+    ):
+        return  # noise hides it
+    gain = 1.0 + random.choice([-1.0, 1.0]) * random.uniform(0.05, 0.3)
+    assert [f.check for f in findings(motion, motion.q, motion.v / gain)] == ["gain"]
+    delayed = np.concatenate((np.full(late, motion.v[0]), motion.v[:-late]))
+    (found,) = findings(motion, motion.q, delayed)
+    assert found.check == "delay"
+    assert abs(float(found.text.split("(")[1].split(" ")[0]) - late) <= 0.5 * late
 
 
 def _stuck(seed: int, kind: str) -> None:
@@ -123,6 +203,8 @@ def judged(motion: Motion) -> bool:
 
 LAWS = {
     "clean": (_clean, KINDS), "wraps": (_wraps, (*MOVING, "spin")), "slips": (_slips, KINDS[:-1]),
+    "slow-slips": (_slow_slips, KINDS), "long-slips": (_long_slips, MOVING), "spikes": (_spikes, KINDS),
+    "degrees": (_degrees, (*MOVING, "spin")), "gains": (_gains, MOVING[:3]),
     "stuck": (_stuck, MOVING), "saturated": (_saturated, ("sines", "swing")), "swapped": (_swapped, MOVING[:3]),
 }  # fmt: skip
 CASES = [(law, kind) for law, (_, kinds) in LAWS.items() for kind in kinds]
@@ -166,6 +248,14 @@ def test_a_wrapped_log_is_refused_and_unwrapped_when_asked(tmp_path: Path) -> No
     (repair,) = log.provenance.repairs
     assert (repair.name, repair.row, repair.rows) == ("unwrap", first, np.count_nonzero(np.abs(np.diff(q)) > np.pi))
     assert not [f for f in log.findings if f.check in ("wraps", "slips")]
+
+
+@pytest.mark.parametrize("size", [1e150, 1e200, 1e308])
+def test_values_whose_squares_overflow_are_no_crash(size: float) -> None:
+    motion = draw(0, "sines")
+    for q, v in ((size * motion.q, motion.v), (motion.q, size * motion.v), (size * motion.q, size * motion.v)):
+        with np.errstate(over="ignore", invalid="ignore"):
+            findings(motion, q, v)
 
 
 def test_a_wrap_does_not_hide_a_wrong_rate(tmp_path: Path) -> None:

@@ -164,13 +164,7 @@ def test_a_fit_that_is_worse_where_it_was_not_fitted_is_outside(
     capsys.readouterr()
 
 
-@pytest.mark.parametrize(
-    ("limits", "expected"),
-    [
-        (["fit=1"], 0), (["fit=99.9999"], 1), (["rmse=1"], 0), (["rmse=1e-9"], 1), (["rmse_th1=1", "rmse=1e-9"], 0),
-        (["windows_failed=0"], 0), (["autocorrelation_inside=0"], 0),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("limits", "expected"), [(["fit=1", "windows_failed=0"], 0), (["fit=1", "rmse=1e-9"], 1)])
 def test_replay_has_limits_and_an_exit_code(
     limits: list[str], expected: int, two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -179,9 +173,18 @@ def test_replay_has_limits_and_an_exit_code(
     assert code(*asked) == expected
     rows = json.loads(capsys.readouterr().out)["metrics"]
     judged = [row["verdict"] for row in rows if row["verdict"] != "not judged"]
-    assert judged
-    assert ("outside" in judged) == bool(expected)
-    assert set(judged) <= {"within", "outside"}
+    assert set(judged) == ({"outside", "within"} if expected else {"within"})
+
+
+def test_a_limit_on_any_metric_is_its_verdict(two_frictions: Path) -> None:
+    found = hw.replay(hw.read(two_frictions), "single_pendulum", restart=1.0, wanted=("reference",))
+    for metric, value, outside in (
+        ("fit", 1.0, False), ("fit", 99.9999, True), ("rmse", 1.0, False), ("rmse", 1e-9, True),
+        ("rmse_th1", 1.0, False), ("windows_failed", 0.0, False), ("autocorrelation_inside", 0.0, False),
+    ):  # fmt: skip
+        rows = verdicts(found, "a command", (Limit(metric=metric, value=value),))
+        judged = set(rows.loc[rows["metric"].str.startswith(metric), "verdict"]) - {"not judged"}
+        assert judged == {"outside" if outside else "within"}, metric
 
 
 @pytest.mark.parametrize(
@@ -214,3 +217,13 @@ def test_a_search_ends_within_its_time(two_frictions: Path) -> None:
     assert np.isfinite(fit["k1"].value)
     with pytest.raises(ValueError, match="budget is 0"):
         hw.identify(hw.read(two_frictions), "single_pendulum", ["k1"], budget=0)
+
+
+def test_an_identification_that_is_stopped_is_told_and_outside(
+    two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ("identify", two_frictions, *ONE, "-f", "k1", "--time-limit", "1e-6", "--json", "--out", tmp_path / "out")
+    assert code(*asked) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert [row["identifiable"] for row in told["identify"]] == [False]
+    assert "Stopped at the time limit of 1e-06 s" in told["warnings"][0]["text"]

@@ -280,11 +280,11 @@ def strike(out: Path, suite: str, runs: int, jobs: int, rng: random.Random) -> b
 
 
 def test_a_sweep_that_is_killed_goes_on_to_the_same_table(tmp_path: Path) -> None:
-    ended(tmp_path / "whole", "damping", 100)
+    ended(tmp_path / "whole", "damping", 40)
     rng = random.Random(3)
-    hits = sum(strike(tmp_path / "killed", "damping", 100, 1, rng) for _ in range(2))
+    hits = sum(strike(tmp_path / "killed", "damping", 40, 1, rng) for _ in range(2))
     assert hits
-    ended(tmp_path / "killed", "damping", 100)
+    ended(tmp_path / "killed", "damping", 40)
     same(tmp_path / "whole", tmp_path / "killed")
 
 

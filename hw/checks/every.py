@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from crossbody.hw.checks.clock import ClockCheck
-from crossbody.hw.checks.finding import Finding
-from crossbody.hw.checks.jumps import JumpCheck
+from crossbody.hw.checks.finding import Finding, first_of_each
 from crossbody.hw.checks.rates import RateCheck
+from crossbody.hw.checks.smooth import JumpCheck
 from crossbody.hw.checks.values import ValueCheck
 from crossbody.hw.reading.columns import Role
 from crossbody.hw.reading.plan import PURE, ROTATES, Source
@@ -37,13 +37,10 @@ class Checks:
             if s.role is Role.COORDINATES and s.conversion.si != PURE
         ]
         names = [s.name for s in sources if s.role is Role.COORDINATES and (Role.VELOCITIES, s.name) in at]
+        pairs = [(n, at[Role.COORDINATES, n], at[Role.VELOCITIES, n]) for n in names]
         self._rates = [
-            (
-                RateCheck(n, sources[at[Role.COORDINATES, n]].conversion.si == ROTATES),
-                at[Role.COORDINATES, n],
-                at[Role.VELOCITIES, n],
-            )
-            for n in names
+            (RateCheck(n, sources[q].conversion.si == ROTATES, sources[v].signal.delay - sources[q].signal.delay), q, v)
+            for n, q, v in pairs
         ]
 
     def see(self, block: Rows) -> None:
@@ -82,4 +79,4 @@ class Checks:
             f.fault and f.check != "wraps" for f in found
         ):  # with a broken clock or holes, rates tell nothing new
             found += [f for check, _, _ in self._rates for f in check.findings()]
-        return tuple(sorted(found, key=lambda f: (not f.fault, f.row)))
+        return tuple(sorted(first_of_each(found), key=lambda f: (not f.fault, f.row)))

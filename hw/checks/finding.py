@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from crossbody.cases import LogFormatError
@@ -15,7 +16,7 @@ class Finding:
 
     Attributes:
         check: name of the check: "samples", "time", "finite", "range", "rates", "sample_time", "dropped", "jitter",
-            "drift", "stuck", "saturated", "wraps", "slips".
+            "drift", "stuck", "saturated", "wraps", "slips", "spikes", "unit", "gain", "delay".
         fault: True if the log cannot be used so; False for what one should know.
         channel: `role.name` of the channel, or "time".
         row: row of the file, counted from 0.
@@ -36,3 +37,8 @@ class Finding:
         """The error that refuses a log because of it."""
         when = f"t = {self.t:.9g} s: " if math.isfinite(self.t) else ""
         return LogFormatError(path, when + self.text, self.row, self.channel)
+
+
+def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
+    """The first finding of every check and channel: a slip may be seen in the coordinate and against its rate."""
+    return list({(f.channel, f.check): f for f in reversed(list(findings))}.values())[::-1]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from crossbody.cases import UnknownName, Value
 from crossbody.engines._equations import system_of
 from crossbody.hw.fitting.covariance import Layout
+from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.rk4 import march
 from crossbody.hw.models._contract import Model
 from crossbody.hw.replaying.lift import check_measured, lift
@@ -46,6 +47,7 @@ class Exact:
     most = 200
     tolerance = 1e-3
     ftol = 1e-12
+    deadline = Deadline()
 
     def __init__(
         self, model: Model, numbers: Mapping[str, Value], free: Sequence[str], cut: Sequence[Window], starts: bool,
@@ -121,6 +123,7 @@ class Exact:
 
     def _window(self, j: int, x: Floats, column: int | None) -> tuple[Floats, Floats]:
         """Residuals of one window (k m,), and their derivative by one unknown."""
+        self.deadline.check()
         z = x.astype(np.complex128)
         if column is not None:
             z[column] += 1j * STEP

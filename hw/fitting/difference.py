@@ -14,6 +14,7 @@ from scipy import stats
 
 from crossbody.cases import InvalidValue, UnknownName, Value
 from crossbody.hw.fitting.covariance import Layout
+from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.derivative import apart
 from crossbody.hw.models._contract import Model
 from crossbody.hw.replaying.replay import run_window
@@ -40,6 +41,7 @@ class Differences:
     most = 30
     tolerance = 0.5
     ftol = 1e-4
+    deadline = Deadline()
 
     def __init__(
         self, model: Model, numbers: Mapping[str, Value], free: Sequence[str], cut: Sequence[Window], starts: bool,
@@ -117,6 +119,7 @@ class Differences:
         return slope
 
     def _window(self, numbers: Mapping[str, Value], window: Window, grid: NDArray[np.int64]) -> Floats:
+        self.deadline.check()
         run, _ = run_window(self.model, numbers, window, self.engine, self.profile, {})
         yhat, _ = self.model.see(self.model, run, np.ascontiguousarray(window.age[grid, 0]))
         found = self.model.differ(window.y[grid], yhat)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+CONVERGED, UNCONVERGED, STOPPED = "converged", "unconverged", "stopped"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,7 +83,8 @@ class Fit:
         covariance: how the intervals were found.
         warnings: what the data cannot tell, and what does not fit.
         evaluations: runs of all windows.
-        success: whether the search converged; whether the estimates are worth anything, `worse` tells.
+        outcome: "converged"; "unconverged" where the search ended before that, with intervals about where it ended; or
+            "stopped" at the time limit: the best so far, without intervals and errors.
         message: of the search.
     """
 
@@ -102,8 +104,13 @@ class Fit:
     covariance: str
     warnings: tuple[str, ...]
     evaluations: int
-    success: bool
+    outcome: str
     message: str
+
+    @property
+    def success(self) -> bool:
+        """Whether the search converged and was judged; whether the estimates are worth anything, `worse` tells."""
+        return self.outcome == CONVERGED
 
     def __getitem__(self, name: str) -> Estimate:
         """One estimate by its name."""

@@ -10,10 +10,11 @@ import numpy as np
 
 from crossbody.cases import InvalidValue, SceneError, Value, _arguments
 from crossbody.hw import models
+from crossbody.hw.fitting.deadline import Deadline, TimeOver
 from crossbody.hw.fitting.derivative import DELAY, Exact
 from crossbody.hw.fitting.difference import Differences
 from crossbody.hw.fitting.fit import Fit, Floats
-from crossbody.hw.fitting.judged import Search, judged
+from crossbody.hw.fitting.judged import Search, judged, unjudged
 from crossbody.hw.fitting.search import search
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
@@ -31,7 +32,7 @@ def identify(
     log: Log | Sequence[Log], model: str | Model, free: Sequence[str], *, parameters: Mapping[str, Value] | None = None,
     restart: float | None = None, horizon: float | None = None, starts: str = "auto", hold: int = 2,
     stride: int = 1, bounds: Mapping[str, tuple[float, float]] | None = None, engine: str = "",
-    delay: float = 0.0, budget: float = BUDGET,
+    delay: float = 0.0, budget: float = BUDGET, time_limit: float = math.inf,
 ) -> Fit:  # fmt: skip
     """Fit parameters to a log.
 
@@ -52,7 +53,10 @@ def identify(
         bounds: name -> lowest and highest value, inside those of the model.
         engine: what runs a model whose contacts open: E or E:PROFILE.
         delay: of the measured coordinates beyond what the column map says, s; a free one is beyond this.
-        budget: time that the search may take, s; the best so far is what it then gives, with `success` False.
+        budget: time that the search may take, s; the best so far is what it then gives, with its intervals and the
+            outcome "unconverged".
+        time_limit: time that all of it may take, s: looked at before every run of a window, in the search and when its
+            end is judged; the outcome is then "stopped", with the best so far and no intervals.
 
     Raises:
         UnknownName: for a model or parameter that does not exist.
@@ -67,6 +71,10 @@ def identify(
         _arguments.whole("stride", stride),
     )
     budget = _arguments.real("budget", budget)
+    time_limit = _arguments.real("time_limit", time_limit)
+    if not time_limit > 0.0:
+        raise InvalidValue(f"time_limit is {time_limit!r} s; it must be above 0.")
+    deadline = Deadline(time_limit)
     _arguments.instance("starts", starts, str, "measured or free")
     _arguments.instance("engine", engine, str, "E or E:PROFILE")
     for name, pair in _arguments.instance("bounds", bounds or {}, Mapping, "a table of names and pairs").items():
@@ -88,15 +96,32 @@ def identify(
     problem = kind(chosen, numbers, free, [cut[i] for i in fitted], joint, stride, *more)
     limits = _limits(chosen, free, bounds or {}, len(problem.first()))
     x0 = np.clip(problem.first(), *limits)
-    found = search(problem, limits, lambda x: _sizes(x, *limits), len(free), budget)
     sides = [
         kind(chosen, numbers, free, [cut[i] for i in part], False, stride, *more) if part else None
         for part in (fitted, held)
     ]
-    return judged(Search(
-        model=chosen, numbers=numbers, free=tuple(free), problem=problem, x0=x0, found=found, limits=limits,
-        sizes=_sizes(found.x, *limits), sides=tuple(sides), fitted=tuple(fitted), held=tuple(held),
-    ))  # fmt: skip
+    for part in (problem, *sides):
+        if part is not None:
+            part.deadline = deadline
+    found = search(problem, limits, lambda x: _sizes(x, *limits), len(free), budget)
+    ended = Search(
+        model=chosen,
+        numbers=numbers,
+        free=tuple(free),
+        problem=problem,
+        x0=x0,
+        found=found,
+        limits=limits,
+        sizes=_sizes(found.x, *limits),
+        sides=tuple(sides),
+        fitted=tuple(fitted),
+        held=tuple(held),
+    )
+    try:
+        deadline.check()
+        return judged(ended)
+    except TimeOver:
+        return unjudged(ended, time_limit)
 
 
 def _check(model: Model, free: Sequence[str], starts: str, hold: int, stride: int, budget: float) -> None:

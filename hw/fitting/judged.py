@@ -13,7 +13,7 @@ from crossbody.cases import Value
 from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Scatter, scatter
 from crossbody.hw.fitting.derivative import DELAY, Exact
-from crossbody.hw.fitting.fit import Agreement, Estimate, Fit
+from crossbody.hw.fitting.fit import CONVERGED, STOPPED, UNCONVERGED, Agreement, Estimate, Fit
 from crossbody.hw.fitting.information import WEIGHT, in_words, information, unseen_by, weak
 from crossbody.hw.fitting.search import Found
 from crossbody.hw.fitting.start_noise import moves
@@ -22,6 +22,7 @@ from crossbody.hw.models._contract import Model
 Floats = NDArray[np.float64]
 TOGETHER = 0.999
 """Correlation from which on two parameters are told apart by nothing but noise."""
+ERRORS = ("rmse", "end_median", "end_90")
 EFFECTIVE = 4.0
 """Degrees of freedom below which a standard deviation is itself hardly known."""
 MEASURED = "The windows start as measured: no interval counts the noise of a start; {}."
@@ -85,12 +86,36 @@ def judged(search: Search) -> Fit:
         parameters=dict(search.numbers) | values, delay=float(x[free.index(DELAY)]) if DELAY in free else 0.0,
         fitted=search.fitted, held=search.held, before=before, after=after,
         sensitivities=f"{problem.how}; central differences at the solution differ by {off:.1e} of their size",
-        covariance=spread.how, warnings=(), evaluations=found.evaluations, success=found.success,
-        message=found.message,
+        covariance=spread.how, warnings=(), evaluations=found.evaluations,
+        outcome=CONVERGED if found.success else UNCONVERGED, message=found.message,
     )  # fmt: skip
     about = [] if problem.starts else [MEASURED.format(COUNTED if isinstance(problem, Exact) else NEVER)]
     warnings = (*_warnings(fit, unseen, found, flat, off, problem.tolerance), *about)
     return replace(fit, warnings=warnings)
+
+
+def unjudged(search: Search, seconds: float) -> Fit:
+    """The fit of a search that was stopped, or that nobody had the time to judge: the best so far and nothing else."""
+    found, free = search.found, search.free
+    ended = "its search had converged and was not judged" if found.success else found.message
+    message = f"Stopped at the time limit of {seconds:g} s: {ended}"
+    estimates = tuple(
+        Estimate(
+            name=name, unit="s" if name == DELAY else search.model.parameters[name].unit, value=float(found.x[i]),
+            std=np.inf, low=-np.inf, high=np.inf, start=float(search.x0[i]), identifiable=False, kept_low=-np.inf,
+            kept_high=np.inf, freedom=0.0, bounds=(float(search.limits[0][i]), float(search.limits[1][i])),
+        ) for i, name in enumerate(free)
+    )  # fmt: skip
+    values = {e.name: e.value for e in estimates if e.name != DELAY}
+    nothing = dict.fromkeys(ERRORS, (np.nan, np.nan))
+    return Fit(
+        model=search.model.name, estimates=estimates, correlation=np.full((len(free), len(free)), np.nan), kept=(),
+        unseen=(), agreement=(), parameters=dict(search.numbers) | values,
+        delay=float(found.x[free.index(DELAY)]) if DELAY in free else 0.0, fitted=search.fitted, held=search.held,
+        before=nothing, after=dict(nothing), sensitivities=search.problem.how, covariance="none: stopped",
+        warnings=(f"{message} No interval and no error was found.",), evaluations=found.evaluations, outcome=STOPPED,
+        message=message,
+    )  # fmt: skip
 
 
 def _estimates(
@@ -189,8 +214,7 @@ def _errors(sides: Sequence[Any], x: Floats) -> dict[str, tuple[float, float]]:
         found.append(
             (float(np.sqrt(np.mean(r * r))), float(np.median(last)), float(np.percentile(last, 90.0)))
         )  # fmt: skip
-    names = ("rmse", "end_median", "end_90")
-    return {name: (found[0][i], found[1][i]) for i, name in enumerate(names)}
+    return {name: (found[0][i], found[1][i]) for i, name in enumerate(ERRORS)}
 
 
 def _ends(r: Floats, k: int) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from crossbody.hw.fitting.deadline import TimeOver
 from crossbody.hw.fitting.information import information, to_keep, unseen_by
 
 Floats = NDArray[np.float64]
@@ -79,6 +80,15 @@ class _Timed:
             raise _Spent
         return self.derivatives(self.whole(part))[:, self.free]
 
+    def best_so_far(self, kept: Sequence[int], message: str, limits: tuple[Floats, Floats]) -> Found:
+        """Where a search was that did not come to its end; its start, without residuals, if it had not begun."""
+        _, x, r = self.best or (np.inf, self.x, np.zeros(0))
+        active = ((x <= limits[0]) | (x >= limits[1])) & ~np.isin(np.arange(len(x)), kept)
+        return Found(
+            x=x, residual=r, kept=tuple(kept), active=active, evaluations=self.evaluations, success=False,
+            message=message,
+        )  # fmt: skip
+
     def derivatives(self, x: Floats) -> Floats:
         """Derivatives by all unknowns (N, P); those at the last place are not computed again."""
         if self.last is None or not np.array_equal(self.last[0], x):
@@ -102,13 +112,16 @@ def search(problem: Any, limits: tuple[Floats, Floats], scale: Any, count: int, 
     low, high = limits
     x = np.clip(problem.first(), low, high)
     timed = _Timed(problem, x, time.monotonic() + budget)
-    kept = _kept(timed.derivatives(x), scale(x), count)
-    found = _descend(timed, limits, scale, kept)
-    if kept and found.success:
-        still = _kept(timed.derivatives(found.x), scale(found.x), count)
-        if len(still) < len(kept):
-            timed.x = found.x
-            found = _descend(timed, limits, scale, still)
+    try:
+        kept = _kept(timed.derivatives(x), scale(x), count)
+        found = _descend(timed, limits, scale, kept)
+        if kept and found.success:
+            still = _kept(timed.derivatives(found.x), scale(found.x), count)
+            if len(still) < len(kept):
+                timed.x = found.x
+                found = _descend(timed, limits, scale, still)
+    except TimeOver:
+        return timed.best_so_far((), f"The search was stopped after {timed.evaluations} runs of all windows.", limits)
     return found
 
 
@@ -136,14 +149,8 @@ def _descend(timed: _Timed, limits: tuple[Floats, Floats], scale: Any, kept: Seq
             xtol=problem.ftol, ftol=ftol, gtol=1e-12, max_nfev=problem.most,
         )  # fmt: skip
     except _Spent:
-        assert timed.best is not None  # the first residual is never refused
-        _, x, r = timed.best
-        active[part] = (x[part] <= bounds[0]) | (x[part] >= bounds[1])
         message = f"The time for the search was over after {timed.evaluations} runs of all windows."
-        return Found(
-            x=x, residual=r, kept=tuple(kept), active=active, evaluations=timed.evaluations, success=False,
-            message=message,
-        )  # fmt: skip
+        return timed.best_so_far(kept, message, limits)
     active[part] = ended.active_mask != 0
     return Found(
         x=timed.whole(ended.x), residual=ended.fun, kept=tuple(kept), active=active, evaluations=timed.evaluations,

@@ -104,6 +104,19 @@ class Budget:
             if before is not None:
                 _set(before)
 
+    @contextmanager
+    def lifted(self) -> Iterator[None]:
+        """Do not count what is taken in here: addresses that a library reserves once for all, and does not use."""
+        before = _private()
+        bounds = _raised()
+        try:
+            yield
+        finally:
+            grown = max(_private() - before, 0)
+            self._ceiling = min(self._ceiling + grown, sys.maxsize)
+            if bounds is not None:
+                _set((min(bounds[0] + grown, sys.maxsize), bounds[1]))
+
     def _hint(self, limit: int) -> str:
         return f"the limit is {_shown(limit)} for a file of {_shown(self.size)} (`memory` raises it)."
 
@@ -142,6 +155,19 @@ def _lowered(ceiling: int) -> tuple[int, int] | None:
     if soft != resource.RLIM_INFINITY and soft <= ceiling:
         return None
     _set((ceiling if hard == resource.RLIM_INFINITY else min(ceiling, hard), hard))
+    return soft, hard
+
+
+def _raised() -> tuple[int, int] | None:
+    """Raise the bound of this process's private memory as far as it goes; what it was, None if there was none."""
+    if not _private():
+        return None
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if soft == resource.RLIM_INFINITY:
+        return None
+    _set((hard, hard))
     return soft, hard
 
 

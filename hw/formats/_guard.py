@@ -10,9 +10,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 from crossbody.cases import CrossbodyError, LogFormatError
+from crossbody.hw.formats._budget import current
 
 LENGTH = 160  # of a library's own words
 LOGGERS = ("asammdf", "nptdms")
+
+_reserved = False  # whether Arrow's own allocator has its addresses
 
 
 @contextmanager
@@ -47,15 +50,21 @@ def fault(path: Path, what: str, error: Exception, row: int | None = None, colum
 
 
 @contextmanager
-def plain_allocator() -> Iterator[None]:
+def plain_allocator(path: Path) -> Iterator[None]:
     """Let Arrow allocate as the C library does, so that what is bounded is what it uses.
 
-    Its own allocator reserves a gigabyte for its first byte. Within a bound on the process's memory that leaves too
-    little for the rest, and some of Arrow's threads and destructors abort the process where memory is denied to them.
+    Its own allocator reserves a gigabyte for its first byte, and some of Arrow asks it all the same. Within a bound on
+    the process's memory that leaves too little for the rest, and some of Arrow's threads and destructors abort the
+    process where memory is denied to them: that byte is asked for first, outside of the bound.
     """
     import pyarrow as pa
 
+    global _reserved
     before = pa.default_memory_pool()
+    if not _reserved:
+        _reserved = True
+        with current(path).lifted():
+            pa.allocate_buffer(1, memory_pool=before)
     pa.set_memory_pool(pa.system_memory_pool())
     try:
         yield

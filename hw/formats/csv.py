@@ -105,7 +105,7 @@ class CsvReader:
         import pyarrow as pa
 
         try:
-            with parsing(self._path, "CSV file"), plain_allocator(), self._stream() as stream:
+            with parsing(self._path, "CSV file"), plain_allocator(self._path), self._stream() as stream:
                 return next(iter(stream), None), stream.schema
         except LogFormatError as error:
             if isinstance(error.__cause__, pa.ArrowException):

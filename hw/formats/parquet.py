@@ -39,7 +39,7 @@ class ParquetReader:
         import pyarrow.parquet as pq
 
         self._path = path
-        with parsing(path, "Parquet file"), plain_allocator():
+        with parsing(path, "Parquet file"), plain_allocator(self._path):
             self._file = pq.ParquetFile(path, buffer_size=BUFFER, pre_buffer=False)
             schema, rows = self._file.schema_arrow, self._file.metadata.num_rows
         self.library = library("pyarrow")
@@ -50,10 +50,10 @@ class ParquetReader:
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`."""
         row = 0
-        with parsing(self._path, "Parquet file"), plain_allocator():
+        with parsing(self._path, "Parquet file"), plain_allocator(self._path):
             batches = self._file.iter_batches(BLOCK_ROWS, columns=list(columns), use_threads=False)
         while True:
-            with parsing(self._path, "Parquet file", row), plain_allocator():
+            with parsing(self._path, "Parquet file", row), plain_allocator(self._path):
                 batch = next(batches, None)
                 if batch is None:
                     return

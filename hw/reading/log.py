@@ -99,7 +99,7 @@ class Log:
         channels: in the order of the map.
         sample_time: nominal time between samples, s; the median of the first rows where the map does not say.
         provenance: file, hash, map, reader, repairs.
-        findings: what the checks noticed and did not refuse: dropped samples, jitter, drift, stuck, saturated.
+        findings: what the checks noticed and did not refuse: see `Finding.check`.
         filled (m,): rows that a repair made up, and no measurement.
     """
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw.checks.clock import GAP
-from crossbody.hw.checks.jumps import unwrapped
+from crossbody.hw.checks.smooth import unwrapped
 from crossbody.hw.reading.columns import Role
 from crossbody.hw.reading.log import Repair
 from crossbody.hw.reading.rows import Floats, Rows

@@ -83,7 +83,7 @@ def truth_of(case: Case) -> Truth:
         CrossbodyError: if the reference cannot run the case.
     """
     from crossbody import engines
-    from crossbody.engines._equations import builder
+    from crossbody.engines._equations import known
 
     _arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
@@ -98,7 +98,7 @@ def truth_of(case: Case) -> Truth:
         at=motion,
         agreement={},
     )
-    if "reference" not in engines.names() or builder(case.mechanism) is None:
+    if "reference" not in engines.names() or not known(case):
         return truth
     second = _tight(case)
     told = _held_against(truth, second, case, case.tight)

@@ -49,13 +49,17 @@ def _replayed(command: _Work) -> _Work:
     return command
 
 
+def _time_limit(text: str) -> Callable[[_Work], _Work]:
+    return click.option(
+        "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=3660.0, show_default=True,
+        metavar="S", help=text,
+    )  # fmt: skip
+
+
 @click.command()
 @_replayed
 @click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
-@click.option(
-    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=3660.0, show_default=True, metavar="S",
-    help="An engine that has not come back by then is ended, s.",
-)  # fmt: skip
+@_time_limit("An engine that has not come back by then is ended, s.")
 @click.option("--closed-loop", is_flag=True, help="Recorded references through the model's controller.")
 @speaks
 def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, **log: Any) -> int:
@@ -72,12 +76,15 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 @click.option("--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True)
 @click.option("--stride", type=int, default=1, show_default=True, help="Of so many samples one is compared.")
 @click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time of the search, s.")
+@_time_limit("All is stopped by then, with the best so far; a run that does not come back is ended, s.")
 @speaks
-def identify(free: tuple[str, ...], hold: int, starts: str, stride: int, budget: float, out: Path, **log: Any) -> int:
+def identify(
+    free: tuple[str, ...], hold: int, starts: str, stride: int, budget: float, limit: float, out: Path, **log: Any
+) -> int:
     """Identify parameters of a model from LOG, with intervals, judged on windows that were held out."""
     from crossbody.reports.replay.command import Ask, run_identify
 
-    return run_identify(Ask(**log), free, hold, starts, stride, budget, out, _command())
+    return run_identify(Ask(**log), free, hold, starts, stride, budget, out, _command(), limit)
 
 
 def _command() -> str:

@@ -23,6 +23,9 @@ from crossbody.reports.runs import jobs, output, study, watch
 from crossbody.reports.runs.jobs import DEFAULT_ENGINES
 from crossbody.reports.runs.provenance import provenance
 
+GRACE = 2.0
+"""Times the limit on an identification after which its process is ended: it stops by itself between two runs."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
@@ -105,8 +108,9 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
 
 
 def run_identify(
-    ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, budget: float, out: Path, command: str
-) -> int:
+    ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, budget: float, out: Path, command: str,
+    limit: float = watch.LIMIT,
+) -> int:  # fmt: skip
     """Identify parameters, replay the log with them, and write the report.
 
     Args:
@@ -118,6 +122,7 @@ def run_identify(
         budget: time that the search may take, s.
         out: folder to write.
         command: what was typed, for provenance.
+        limit: time after which it is stopped, s; its process is ended where it does not stop then.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -126,18 +131,23 @@ def run_identify(
     output.check(out, "identify")
     asked = limits.parse(ask.limits)
     log, given = ask.log(), jobs.parse_settings(ask.pairs)
+    label = f"{ask.model} identified from {ask.path}"
+    if why := watch.lost(label):
+        raise CaseUnsupported(f"{label}: {why}")
+    watch.limited(label, GRACE * (1.0 + limit))
     fit = hw.identify(
         log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
-        stride=stride, delay=ask.delay, budget=budget,
+        stride=stride, delay=ask.delay, budget=budget, time_limit=limit,
     )  # fmt: skip
     found = hw.replay(
         log, model, wanted=(model.engine,), parameters=fit.parameters, restart=ask.restart, horizon=ask.horizon,
         delay=ask.delay + fit.delay,
     )  # fmt: skip
+    watch.unlimited()
     tables = {"identify": estimates(fit), "held_out": held_out(fit)}
     told = {
         "sensitivities": fit.sensitivities, "covariance": fit.covariance, "warnings": list(fit.warnings),
-        "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message,
+        "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message, "outcome": fit.outcome,
     }  # fmt: skip
     limits.check(asked, found, (limits.HELD,))
     rows = replay.verdicts(found, command, asked, fit)
