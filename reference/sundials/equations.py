@@ -205,6 +205,12 @@ class Equations:
             self.active, self._index[: len(active)] = active, active
             self._H[:] = 0.0
 
+    def held(self, t: float, q: Floats, v: Floats, rows: list[int]) -> tuple[Floats, Floats]:
+        """M (n, n), a view that the next call overwrites, and H (m, n) of the given rows, active or not."""
+        with self._selected(rows):
+            M, _ = self.terms(t, q, v)
+            return M, self.rows(t, q, v)[0].copy()
+
     def mobility(self, t: float, q: Floats, v: Floats, rows: list[int]) -> tuple[Floats, Floats]:
         """H (m, n) of the given rows, active or not, and M^-1 H^T (n, m).
 
