@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
+from crossbody.cases._arrays import is_number
 from crossbody.engines import _settings
 from crossbody.engines._equations import known, module, system_of
 from crossbody.engines._reference_audit import audit, listed
@@ -117,7 +118,7 @@ class Reference:
         if reason is not None:
             raise CaseUnsupported(reason)
         solver = _settings.profile_of(self.name, self.profiles, profile)
-        times = {k: v for k, v in settings.items() if k == "samples" and np.ndim(v)}
+        times = {k: v for k, v in settings.items() if k == "samples" and not (v is None or is_number(v))}
         numbers = {k: v for k, v in settings.items() if k not in times}
         used = _settings.chosen(self.name, solver, _known(solver), numbers)
         options = _options(case, solver, {**used, **times})
@@ -153,7 +154,7 @@ def _options(case: Case, solver: str, used: Mapping[str, Any]) -> Options:
     """The settings in the words of `simulate`."""
     given: dict[str, Any] = {name: bool(value) if name in SWITCHES else value for name, value in used.items()}
     given["atol"] = given["atol"] or None
-    if np.ndim(given["samples"]) == 0:
+    if is_number(given["samples"]):
         count = given["samples"]
         given["samples"] = np.linspace(0.0, case.t_end, count) if count else None
     if given["fsm"] == OF_THE_CASE:

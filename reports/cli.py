@@ -15,6 +15,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -98,18 +99,20 @@ _LIMIT = click.option(
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
 @_LIMIT
 @_AGAINST
 @_WITH
 @speaks
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, settings: tuple[str, ...], limit: float, against: Path | None, others: tuple[Path, ...],
+    rtol: float | None, settings: tuple[str, ...], strict: bool, limit: float, against: Path | None,
+    others: tuple[Path, ...],
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
     from crossbody.reports.commands import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit)
+    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit, strict)
 
 
 @cli.command()
@@ -320,6 +323,7 @@ def main(arguments: list[str] | None = None) -> None:
 def _obey(arguments: list[str] | None) -> int:
     try:
         code = cli.main(args=arguments, prog_name="crossbody", standalone_mode=False)
+        sys.stdout.flush()  # what cannot be written is told, not lost with the process
     except (click.exceptions.Abort, KeyboardInterrupt):
         return 130
     except click.ClickException as error:
@@ -334,12 +338,16 @@ def _obey(arguments: list[str] | None) -> int:
         raise
     except Exception as error:
         if isinstance(error, OSError) and error.errno in REFUSED:
+            _drop_what_cannot_be_printed()
             return _say(f"The system refuses: {error.strerror}{f' ({error.filename})' if error.filename else ''}.")
         return _crashed(error)
     return code if isinstance(code, int) else 0
 
 
-REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENOMEM)
+REFUSED = (
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE,
+    errno.ENFILE, errno.ENOMEM,
+)  # fmt: skip
 """What the system may refuse whatever a program does."""
 
 
@@ -349,8 +357,17 @@ def _enough() -> int:
     return 0
 
 
+def _drop_what_cannot_be_printed() -> None:
+    """Let what waits for a full disk go nowhere: the end of the process would try it again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _enough()
+
+
 def _say(text: str, code: int = 2) -> int:
-    click.echo("crossbody: " + " ".join(text.split()), err=True)
+    with suppress(OSError):  # the code tells where stderr cannot
+        click.echo("crossbody: " + " ".join(text.split()), err=True)
     return code
 
 
@@ -362,7 +379,8 @@ def _crashed(error: Exception) -> int:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
     except OSError:
-        click.echo(text, err=True)
+        with suppress(OSError):
+            click.echo(text, err=True)
         name = "what stands above"
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     return _say(f"This is a fault of crossbody ({what[:300]}). Please report it with {name}.", 3)

@@ -39,12 +39,13 @@ COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold r
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
     rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
-    limit: float = LIMIT,
+    limit: float = LIMIT, strict: bool = False,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
     `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one;
-    `limit` is the time that an engine may take for one case, s.
+    `limit` is the time that an engine may take for one case, s; `strict` makes a number wrong that left its
+    regression band.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -72,7 +73,7 @@ def run(
         print(voice.rows_as_json(rows))
     else:
         show(rows, out)
-    return exit_code(rows["verdict"])
+    return exit_code(rows["verdict"], rows["regression"] if strict else ())
 
 
 def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -41,6 +42,31 @@ def killed_before(call: int, work: Callable[[], None]) -> bool:
             os._exit(0)
     _, status = os.waitpid(child, 0)
     return os.WIFSIGNALED(status)
+
+
+ROOM = ("open", "mkdir", "rename", "replace", "link", "write", "__exit__", "fchmod", "chmod")
+"""Of these, those that may find the disk full."""
+
+
+def refused_before(call: int, work: Callable[[], None]) -> bool:
+    """Do work whose `call`-th call that needs room on the disk finds none; whether it came to its end before."""
+    left = call
+
+    def strike(_: Any, event: str, called: Any) -> None:
+        nonlocal left
+        if event == "c_call" and reaches_the_system(called) and called.__name__ in ROOM:
+            left -= 1
+            if not left:
+                if called.__name__ == "__exit__":
+                    called.__self__.close()  # as the system does that refuses the last bytes
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    sys.setprofile(strike)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return left > 0
 
 
 def everywhere(

@@ -172,6 +172,17 @@ def test_what_has_no_content_that_can_be_told_is_refused(value):
         fingerprint(_source("def f(x):\n    return x, G\n", G=value))
 
 
+def test_what_numba_compiles_in_place_of_a_function_counts():
+    def made(value: float) -> types.FunctionType:
+        scope: dict[str, object] = {"numba": numba}
+        text = "def g():\n    return 0.0\n@numba.extending.overload(g)\ndef of_g():\n    return lambda: VALUE\n"
+        exec(text.replace("VALUE", repr(value)), scope)
+        return _source("def f():\n    return g()\n", g=scope["g"])
+
+    assert fingerprint(made(1.0)) == fingerprint(made(1.0))
+    assert fingerprint(made(1.0)) != fingerprint(made(2.0))
+
+
 def test_a_helper_that_was_compiled_before_its_constant_changed_has_no_key():
     scope: dict[str, object] = {"G": 1.0}
     exec("def helper(x):\n    return x * G\n", scope)

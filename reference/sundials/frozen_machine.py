@@ -112,6 +112,7 @@ class FrozenMachine(LevelMachine):
         e, rate = self.equations, view.rate
         pressing = [i for i in e.active if not self.switching[i] or view.lam[i] > view.noise[i]]
         held = [i for i in pressing if self.follows[i] < 0]
+        held += [i for i in e.active if self.follows[i] in held]  # their laws keep their rates as well
         touching = [i for i in sorted(self.frozen) if i not in held and self._touches(i, float(view.gap[i]), q)]
         closing = [i for i in touching if self._approaches(i, float(rate[i]))]
         approaching = closing if any(self.modes[i] not in ACTIVE for i in closing) else []
@@ -136,6 +137,7 @@ class FrozenMachine(LevelMachine):
         for i in jump.impulses:
             self._switch(t, i, Mode.COLLISION)
         for i in jump.dropped:
-            self._switch(t, i, self._parted(i, view))
+            if self.follows[i] < 0:
+                self._switch(t, i, self._parted(i, view))
         for i, impulse in jump.impulses.items():
             self._switch(t, i, Mode.CONTACT if i in jump.captured else self._parted(i, view), impulse)

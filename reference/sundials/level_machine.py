@@ -27,7 +27,7 @@ SLOW, DEEP = 1e-9, 1e-9
 TOUCH = 64.0 * ULP  # of the largest position, at least 1: a gap this small is closed
 SAME_INSTANT = 8.0 * ULP
 SIDES = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))  # |x| + |y| <= z: so for each choice of signs
-SAME_CHANGE = 1e-9  # part by which a change of v' must be larger to count as such
+SAME_CHANGE = 1e-9  # part by which changes of v' may differ and count as equal
 
 
 class Watch(IntEnum):
@@ -208,15 +208,14 @@ class LevelMachine:
         return view
 
     def _switch_rows(self, t: float, q: Floats, v: Floats) -> View:
-        """All rows together, judged by one mode set; one at a time, the strongest, once a mode set has repeated."""
+        """All rows together, judged by one mode set; only the strongest once a mode set has repeated."""
         changed: set[int] = set()
         self._repeats(t)
         while True:
             view = self.look(t, q, v)
             wanted = {i: after for i in self.rows if (after := self._wanted(i, view, t, q, v)) != self.modes[i]}
             if self._one_by_one and len(wanted) > 1:
-                strongest = self._strongest(wanted, t, q, v)
-                wanted = {strongest: wanted[strongest]}
+                wanted = {i: wanted[i] for i in self._strongest(wanted, t, q, v)}
             for i, after in wanted.items():
                 self._switch(t, i, after)
             changed.update(wanted)
@@ -229,15 +228,13 @@ class LevelMachine:
                 self._seen.clear()
                 changed.clear()
 
-    def _strongest(self, wanted: dict[int, Mode], t: float, q: Floats, v: Floats) -> int:
-        """The row that changes v' most, first any that only changes its name: the order of rows does not choose."""
-        strongest, most = -1, -1.0
-        for i, after in wanted.items():
-            acts = self.modes[i] in ACTIVE or after in ACTIVE
-            size = self._change_of_acceleration(i, t, q, v) if acts else np.inf
-            if strongest < 0 or size > most * (1.0 + SAME_CHANGE):
-                strongest, most = i, size
-        return strongest
+    def _strongest(self, wanted: dict[int, Mode], t: float, q: Floats, v: Floats) -> list[int]:
+        """The rows that change v' most, first all that only change their name: their order does not choose."""
+        sizes = {
+            i: self._change_of_acceleration(i, t, q, v) if self.modes[i] in ACTIVE or after in ACTIVE else np.inf
+            for i, after in wanted.items()
+        }
+        return [i for i, size in sizes.items() if size >= max(sizes.values()) * (1.0 - SAME_CHANGE)]
 
     def _change_of_acceleration(self, i: int, t: float, q: Floats, v: Floats) -> float:
         """Square of the difference that row i makes to v', in the norm of the mass matrix."""

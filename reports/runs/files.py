@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -39,7 +40,7 @@ def directory(folder: Path, name: str = "", make: bool = False) -> Iterator[int]
 
     Raises:
         OutputError: if it is a link or no folder.
-        OSError: if it is not there.
+        OSError: if it is not there, or the system refuses.
     """
     outer = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
@@ -65,9 +66,9 @@ def _is_there(where: int, name: str) -> bool:
 def _inside(where: int, name: str, folder: Path) -> int:
     try:
         return os.open(name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=where)
-    except FileNotFoundError:
-        raise
-    except OSError:
+    except OSError as error:
+        if error.errno not in (errno.ELOOP, errno.ENOTDIR):
+            raise
         raise OutputError(f"{folder / name} is a link or no folder; crossbody follows no link there.") from None
 
 

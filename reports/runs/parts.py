@@ -39,12 +39,14 @@ class Parts:
     def __init__(self, out: Path, command: str, identity: Mapping[str, Any]) -> None:
         digest = hashlib.sha256(json.dumps(identity, sort_keys=True, default=repr).encode()).hexdigest()[:16]
         self.out, self.path = out.absolute(), out.absolute() / f"{PARTS}{digest}"
-        self.command, self.found = command, 0
+        self.command, self.found, self.lock = command, 0, -1
         try:
             self._open()
         except OutputError:
             raise
         except OSError as error:
+            if self.lock >= 0:
+                self.__exit__(OutputError)
             raise OutputError(f"Output folder {out} cannot be written: {error.strerror or error}.") from None
 
     def _open(self) -> None:
@@ -60,8 +62,11 @@ class Parts:
                 shutil.rmtree(self.path / name, ignore_errors=True)
         self.found = len([name for name in files.listed(self.path) if name != ABOUT])
         manifest.replace_text(self.path / ABOUT, json.dumps({"command": self.command}))
-        watch.resumable(f"Nothing was replaced; what is complete is kept in {self.out}, and the same command goes on.")
+        watch.resumable(f"Nothing was replaced; {self._kept()}")
         self._tell()
+
+    def _kept(self) -> str:
+        return f"what is complete is kept in {self.out}, and the same command goes on."
 
     def _tell(self) -> None:
         """Say what is there already, of this command and of others."""
@@ -99,11 +104,13 @@ class Parts:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Take the parts away when what they were for is written, and where there are none."""
+        """Take the parts away when what they were for is written, and where there are none; else say that they stay."""
         if kind is None or not self.found:
             shutil.rmtree(self.path, ignore_errors=True)
             with suppress(OSError):
                 self.out.rmdir()  # if it is empty
+        elif issubclass(kind, OutputError):
+            voice.note(self._kept())
         os.close(self.lock)
 
 

@@ -130,8 +130,9 @@ def _name(number: int) -> str:
 
 
 def _say(text: str, code: int) -> int:
-    sys.stderr.write(f"crossbody: {text}\n")
-    sys.stderr.flush()
+    with suppress(OSError):  # the code tells where stderr cannot
+        sys.stderr.write(f"crossbody: {text}\n")
+        sys.stderr.flush()
     return code
 
 
