@@ -56,10 +56,6 @@ _OF: Mapping[str, Bounds] = {
     },
 }
 
-_HOPS = (
-    "At its default tolerance CVODE leaves a face by a sequence of hops of microseconds: where lam is 0 the gap is "
-    "too, to the tolerance, and every hop counts as a touch."
-)
 _LANDS = ("outside", "solve")
 """Variants in which a ball lands on a face."""
 
@@ -82,5 +78,4 @@ def _known(variant: str) -> Iterator[Limit]:
     for metric in ("*", "audit"):
         yield Limit(metric=metric, engine="mujoco", profile="default", known=OBVIOUS)
     if variant in _LANDS:
-        yield Limit(metric="*", engine="reference", profile="cvode", known=_HOPS)
         yield Limit(metric="*", engine="mujoco", profile="matched", known=TENDON)
