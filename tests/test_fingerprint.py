@@ -23,6 +23,7 @@ from hypothesis import strategies as st
 
 from crossbody.reference import core, linear, systems
 from crossbody.reference._fingerprint import Unreadable, fingerprint
+from crossbody.reference.core._struct import bundle_type
 from crossbody.reference.kernels import NAMES
 
 MODULES = ("hw.fitting.rk4", "engines._delta.forces")
@@ -196,3 +197,10 @@ def test_a_helper_that_was_compiled_before_its_constant_changed_has_no_key():
     assert inner(2.0) == 2.0  # numba has frozen it
     with pytest.raises(Unreadable, match="before what it reads changed"):
         fingerprint(outer)
+
+
+def test_two_layouts_of_one_name_are_two_types() -> None:
+    """Code that was compiled for the places of fields in an older layout is not that of the new one."""
+    layouts = ({"x": "Floats", "y": "Floats"}, {"y": "Floats", "x": "Floats"}, {"x": "Floats", "y": "Floats2"})
+    kinds = [bundle_type(type("Work", (), {"__annotations__": layout})) for layout in layouts]
+    assert len({str(kind) for kind in kinds}) == 3

@@ -10,7 +10,6 @@ all of them are at or below zero.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from enum import IntEnum
 from functools import cache
@@ -111,10 +110,7 @@ class Workspace:
     undecided: Index  # (guards,) whether a guard may fire inside the step
 
 
-# Machine code is kept on disk by the name of its types: the name tells the layout, or an older one would be read back.
-_layout = Workspace.__annotations__
-_digest = hashlib.sha256(repr(_layout).encode()).hexdigest()[:16]
-WORKSPACE = bundle_type(type(f"Workspace_{_digest}", (), {"__annotations__": _layout}))
+WORKSPACE = bundle_type(Workspace)
 open_work = opener(WORKSPACE)
 
 
