@@ -1,12 +1,14 @@
 # make run    set up and run the main job: the bouncing ball on every engine, judged, with a report
 # make test   set up and pass the tests
+# make strict the main job, failing too where a number left its regression band; make bands stores the bands anew
+# make faults plant faults in a copy of the sources and see whether runs and tests fail (JOBS=2: two at a time)
 # make docs   build the pages into build/docs; a broken link is an error
 PYTHON ?= $(firstword $(shell command -v python3.11 python3.12 python3.13 python3 2>/dev/null))
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test slow bench bands check docs wheel-check picture format clean
+.PHONY: run test slow bench peers faults strict bands check docs wheel-check picture format clean
 
 run: $(READY)
 	$(BIN)/crossbody run --out out
@@ -20,6 +22,17 @@ slow: $(READY)
 bench: $(READY)
 	$(BIN)/pytest -m bench
 	$(BIN)/crossbody bench --out out/bench
+
+peers: $(READY)
+	$(BIN)/python -m pip install --quiet --editable '.[peers]'
+	$(BIN)/pytest tests/test_peers.py tests/test_bench.py tests/test_engine_contract.py -m "not bench"
+
+JOBS ?= 1
+faults: $(READY)
+	$(BIN)/python tests/plant_faults.py --jobs $(JOBS)
+
+strict: $(READY)
+	$(BIN)/crossbody run --strict --out build/strict
 
 bands: $(READY)
 	$(BIN)/python -m crossbody.reports.judging.stored

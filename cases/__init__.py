@@ -12,6 +12,7 @@ A case is one module here with three public names:
 from __future__ import annotations
 
 from importlib import import_module
+from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import _registry
@@ -33,7 +34,10 @@ from crossbody.cases._outcome import Outcome
 if TYPE_CHECKING:
     from crossbody.cases._case import Case, Chaos, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
     from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
+    from crossbody.cases.scene import Scene
 
+_VOCABULARY = ("files", "scene")
+"""Modules of this folder that are no cases."""
 _LAZY = {
     **dict.fromkeys(
         ("Case", "Chaos", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"
@@ -69,6 +73,8 @@ __all__ = [
     "Trajectory",
     "UnknownName",
     "Value",
+    "from_file",
+    "from_scene",
     "load",
     "names",
     "summary",
@@ -85,7 +91,7 @@ def __getattr__(name: str) -> Any:
 
 def names() -> tuple[str, ...]:
     """Names of all cases, those of other distributions too; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _registry.plugin_names(__name__, list(__path__), _VOCABULARY)
 
 
 def summary(name: str) -> str:
@@ -115,3 +121,26 @@ def load(name: str, variant: str | None = None, **overrides: Value) -> Case:
     from crossbody.cases._load import build
 
     return build(name, variant, overrides)
+
+
+def from_file(path: str | PathLike[str], key: str | None = None, **overrides: Value) -> Case:
+    """Build a case from a robot's file.
+
+    Args:
+        path: of an MJCF file.
+        key: one of its keyframes; the first if not given.
+        overrides: t_end, a0, a1, ctrl and without, as in `crossbody.cases.files.case.PARAMETERS`.
+
+    Raises:
+        UnknownName: if there is no such file, keyframe or parameter.
+        SceneError: for what a scene does not have, by name.
+        InvalidValue: if a parameter lies outside what it admits.
+    """
+    return load(fspath(path), key, **overrides)
+
+
+def from_scene(scene: Scene, **given: Any) -> Case:
+    """Build a case from a scene; see `crossbody.cases.files.case.case_of` for what else may be given."""
+    from crossbody.cases.files.case import case_of
+
+    return case_of(scene, **given)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import Floats, frozen
 from crossbody.cases._errors import InvalidValue, SceneError
 from crossbody.cases._trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from crossbody.cases.scene import Scene
 
 Value = float | int | str | bool
 
@@ -38,7 +42,7 @@ class Parameter:
         doc: what it is.
         low, high: bounds of a number.
         open_low: whether `low` itself is excluded.
-        choices: the words admitted, for a word.
+        choices: the words admitted, for a word; any text if there are none.
     """
 
     default: Value
@@ -56,7 +60,7 @@ class Parameter:
             InvalidValue: if it has another type, is not finite or lies outside the bounds.
         """
         if isinstance(self.default, str):
-            if not isinstance(value, str) or value not in self.choices:
+            if not isinstance(value, str) or (self.choices and value not in self.choices):
                 raise InvalidValue(f"{where} is {shown(value)}; valid: {', '.join(self.choices)}.")
             return value
         try:
@@ -236,6 +240,8 @@ class Case:
         inputs: what acts from outside; None for nothing.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
+        scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
+            `findings` what is strange in it.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
             show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
@@ -265,6 +271,9 @@ class Case:
     tight: float = 1e-13
     chaos: Chaos | None = None
     consistent: bool = True
+    scene: Scene | None = None
+    file: str = ""
+    findings: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:

@@ -19,6 +19,7 @@ def default_limits(case: Case) -> tuple[Limit, ...]:
 
 
 def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
+    yield "start_error", 1e-12, "the case's own numbers, put into an engine's coordinates and back: rounding"
     yield "position", 1e-6, _TOLERANCE
     yield "velocity", 1e-5, _FASTER
     yield "energy_drift", 1e-6, _TOLERANCE

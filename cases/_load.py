@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +17,14 @@ from crossbody.cases import _registry
 from crossbody.cases._arguments import path
 from crossbody.cases._case import Case, Parameter, Value
 from crossbody.cases._errors import CrossbodyError, SceneError, UnknownName
+from crossbody.cases.files.case import open_file
+from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
 
 
-def module(name: str) -> ModuleType:
-    """The module of a case: a plug-in's or an installed one by its name, a user's own by the path of its file."""
+def module(name: str) -> Any:
+    """What defines a case: a plug-in or an installed one by its name, a user's own or a robot's file by its path."""
+    if name.endswith(ROBOT_FILES):
+        return open_file(name)
     found = from_file("case", Path(name)) if name.endswith(".py") else _named(name)
     for wanted in ("PARAMETERS", "VARIANTS", "build"):
         if not hasattr(found, wanted):
@@ -28,7 +33,7 @@ def module(name: str) -> ModuleType:
 
 
 def _named(name: str) -> ModuleType:
-    return _registry.load_plugin("case", cases.__name__, list(cases.__path__), name)
+    return _registry.load_plugin("case", cases.__name__, list(cases.__path__), name, cases._VOCABULARY)
 
 
 def from_file(kind: str, path: Path) -> ModuleType:

@@ -6,6 +6,7 @@ effect `delay` samples later (spec 3.6).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from crossbody.cases._case import Case, Claim, Parameter, Tier, Value
 from crossbody.cases._delta import pose
 from crossbody.cases._delta import scene as delta
-from crossbody.cases._delta.limits import ON_THE_CIRCLE, TRACKING
+from crossbody.cases._delta.limits import TRACKING, on_the_circle
 
 PARAMETERS = {
     **delta.ROBOT,
@@ -54,24 +55,36 @@ SETTLED = 4.0
 """Horizon from which on the last third of a run shows the circle alone, s."""
 
 
+def _lag(p: Mapping[str, float]) -> float:
+    """Radius by which sampling and delay miss a steady circle, m: |s A/(s^3 + kd s^2 + kp s + ki)| at s = i w.
+
+    The acceleration R w^2 is commanded delay + 1/2 periods late, and damped by a rate that is half a period old: two
+    errors A at right angles to each other.
+    """
+    w = 2.0 * math.pi * p["frequency"]
+    acceleration = p["radius"] * w * w
+    late, old = w * (p["delay"] + 0.5) * p["period"], 0.5 * p["kd"] * p["period"]
+    s = 1j * w
+    return acceleration * math.hypot(late, old) * w / abs(s**3 + p["kd"] * s**2 + p["kp"] * s + p["ki"])
+
+
 def _claims(variant: str, parameters: Mapping[str, Value]) -> tuple[Claim, ...]:
-    """What sampling and delay leave of the error on the default circle, once the start is forgotten."""
+    """What sampling and delay leave of the error on the default circle."""
     preset = {k: VARIANTS[variant].get(k, parameter.default) for k, parameter in PARAMETERS.items()}
-    settled = float(parameters["t_end"]) >= SETTLED
-    if variant == "pd" or not settled or dict(parameters) != preset | {"t_end": parameters["t_end"]}:
+    shown = float(parameters["t_end"]) >= float(preset["t_end"])
+    if variant == "pd" or not shown or dict(parameters) != preset | {"t_end": parameters["t_end"]}:
         return ()
-    return (
-        Claim(
-            metric="tracking_error", expected=1e-4, tier=Tier.B, source="about 0.1 mm on a circle of 50 mm at 1 Hz"
-        ),
-    )  # fmt: skip
+    source = "the lag of sampling and delay; about 0.1 mm as published"
+    return (Claim(metric="tracking_error", expected=_lag(delta.numbers(parameters)), tier=Tier.A, source=source),)
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene: at rest in the middle of the circle."""
     p, claims = delta.numbers(parameters), _claims(variant, parameters)
+    settled = p["t_end"] >= SETTLED
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
     return delta.scene(
         "delta_tracking", variant, _TITLES[variant], PARAMETERS, parameters, q0, np.zeros(9),
-        claims=claims, limits=(*TRACKING, ON_THE_CIRCLE) if claims else TRACKING,
+        claims=claims,
+        limits=(*TRACKING, *(on_the_circle(claim.expected, settled) for claim in claims)),
     )  # fmt: skip

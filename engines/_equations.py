@@ -29,10 +29,17 @@ def builder(mechanism: str) -> Callable[..., System] | None:
 
 
 @cache
-def module(mechanism: str) -> ModuleType:
-    """Where the equations stand."""
+def module(mechanism: str) -> ModuleType | None:
+    """Return where the equations stand; None for a scene, whose equations are those of every scene."""
+    if mechanism == "scene":
+        return None
     own = mechanism.endswith(".py")
     return from_file("mechanism", Path(mechanism)) if own else import_module(f"{SYSTEMS}.{mechanism}")
+
+
+def known(case: Case) -> bool:
+    """Return whether the reference has equations of a case."""
+    return case.scene is not None or builder(case.mechanism) is not None
 
 
 def system_of(case: Case) -> System:
@@ -41,6 +48,10 @@ def system_of(case: Case) -> System:
     Raises:
         CaseUnsupported: if the reference has no equations of it.
     """
+    if case.scene is not None:
+        from crossbody.reference.tree.system import system
+
+        return system(case.scene, case.law)
     build = builder(case.mechanism)
     if build is None:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import Scene
 from crossbody.reference import System
 
 
@@ -44,3 +45,8 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
 
     constants = dict(zip(("a0", "a1", "a2"), law.T, strict=True))
     return {"constants": constants, "q0": q0, "v0": v0, "M": M, "bias": bias, "H": H, "lam": lam, "gap": gap}
+
+
+def listed(scene: Scene) -> dict[str, Any]:
+    """Return masses, kg, and gravity, m/s^2, of a scene."""
+    return {"masses": np.array([body.mass for body in scene.bodies]), "gravity": float(np.linalg.norm(scene.gravity))}

@@ -58,7 +58,10 @@ def _along(
         block = slice(b, b + system.mass_block)
         a[block] = np.linalg.lstsq(M[block], f[block], rcond=None)[0] if np.all(np.isfinite(M[block])) else 0.0
     for step in (ahead * 0.5 ** np.arange(LOOKS)[::-1]).tolist():
-        yield step, q + step * v + 0.5 * step**2 * a, v + step * a
+        there, speed = q + step * (v + 0.5 * step * a), v + step * a
+        if not (np.all(np.isfinite(there)) and np.all(np.isfinite(speed))):
+            return  # no kernel is to blame for what it gives beyond all numbers
+        yield step, there, speed
 
 
 def _values(

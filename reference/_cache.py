@@ -12,6 +12,7 @@ import os
 import pickle
 import platform
 import re
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -114,7 +115,7 @@ class Compiled(Lean):
         """
         plain = self.py_func.__qualname__
         try:
-            found = "" if changed(self) else fingerprint(self.py_func)
+            found = "" if changed(self) or not _has_home(self.py_func) else fingerprint(self.py_func)
             if not self.overloads:
                 self.frozen_values = frozen_values(self.py_func)
         except Unreadable:
@@ -155,6 +156,11 @@ class Compiled(Lean):
                 return self.overloads[wanted].entry_point
         self._types_active_call.clear()
         return self._explain_matching_error(*args, **kws)
+
+
+def _has_home(function: Any) -> bool:
+    """Whether another process finds the module that code names; what `exec` makes may have none."""
+    return function.__globals__.get("__name__") == function.__module__ and function.__module__ in sys.modules
 
 
 def _converts(given: Any, wanted: Any) -> bool:

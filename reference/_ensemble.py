@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
-from crossbody.cases._arguments import instance
-from crossbody.cases._arrays import frozen
+from crossbody.cases._arrays import frozen, numbers
 from crossbody.reference._cache import embedding
 from crossbody.reference._check import check_once
+from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import Options, checked
 from crossbody.reference._program import address, kept_with_kernels
@@ -53,6 +53,7 @@ class Ensemble:
     wall_s: float
 
 
+@checked_arguments
 def ensemble(
     system: System,
     q0: ArrayLike,
@@ -82,10 +83,9 @@ def ensemble(
         UnknownName: for a parameter or constant that the system does not have.
         InvalidValue: for an option or a number of threads outside its range.
     """
-    instance("system", system, System, "a crossbody.reference.System")
     settings = replace(checked(t_end, options), samples=(), events=False)
     job = _Job(system, q0, v0, parameters or {}, law or {})
-    count = threads or len(os.sched_getaffinity(0))
+    count = len(os.sched_getaffinity(0)) if threads is None else threads
     if not 1 <= count <= 1024:
         raise InvalidValue(f"threads is {threads}; valid: 1 to 1024.")
     check_once(system, job.starts[0, : system.n], job.starts[0, system.n :], t_end)
@@ -144,7 +144,7 @@ class _Job:
     def _put_constant(self, name: str, values: ArrayLike) -> None:
         if name not in CONSTANTS:
             raise UnknownName("constant", name, CONSTANTS)
-        array = np.asarray(values, dtype=float)
+        array = numbers("ensemble", name, values)
         full = np.repeat(array[:, None], self.system.nc, axis=1) if array.ndim == 1 else array
         full = frozen("ensemble", name, full, (self.size, self.system.nc))
         if not np.all(np.isfinite(full)) or np.any(full < 0.0):
@@ -157,7 +157,7 @@ class _Job:
         try:
             loop(
                 first, last, run.template, run.state, *run.tables, self.p, self.laws, self.starts,
-                initial_modes(self.system), self.out, self.counts, min(run.options.max_steps, 2**62),
+                initial_modes(self.system), self.out, self.counts, int(min(run.options.max_steps, 2**62)),
             )  # fmt: skip
         finally:
             spaces.put(run)
@@ -183,14 +183,17 @@ def _loop(functions: tuple[Any, ...]) -> Any:
         s = state[0]
         for r in range(first, last):
             state[0] = template[0]
-            m.p[:] = p[r]
-            m.alpha[:] = laws[r, 0]
-            m.beta[:] = laws[r, 1]
-            b.mode[:] = modes
-            w.y[:] = starts[r]
-            w.u[:] = 0.0
-            w.s[:] = 0.0
-            w.z[:] = 0.0
+            # Entry by entry: what an array of another shape would be told takes seconds to compile.
+            for i in range(len(m.p)):
+                m.p[i] = p[r, i]
+            for i in range(len(modes)):
+                b.mode[i] = modes[i]
+                for j in range(3):
+                    m.alpha[i, j], m.beta[i, j] = laws[r, 0, i, j], laws[r, 1, i, j]
+            for i in range(len(w.y)):
+                w.y[i] = starts[r, i]
+            for z in (w.u, w.s, w.z):
+                z.fill(0.0)
             code = MORE
             while code == MORE and s.steps < limit:
                 code = advance(
@@ -198,7 +201,8 @@ def _loop(functions: tuple[Any, ...]) -> Any:
                     state, model, work, buffers, min(SLICE, limit - s.steps),
                 )  # fmt: skip
             out[r, 0] = s.t
-            out[r, 1:] = w.y
+            for i in range(len(w.y)):
+                out[r, 1 + i] = w.y[i]
             counts[r, 0], counts[r, 1], counts[r, 2] = code, s.steps, s.events + s.dropped
 
     return embedding(runs, nogil=True)

@@ -22,7 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.core import types
 from numba.core.dispatcher import Dispatcher
+from numba.core.errors import TypingError
 from numba.core.extending import _Intrinsic
+from numba.core.registry import cpu_target
 
 LIBRARIES = frozenset({"numba", "numpy", "llvmlite", "scipy"})
 _NAMED = (ModuleType, type, FunctionType, BuiltinFunctionType, type(np.sum))
@@ -144,6 +146,8 @@ class _Walk:
         elif isinstance(value, FunctionType):
             self.put("function")
             self.function(value)
+            for overload in _overloads(value):
+                self.function(overload)
         elif isinstance(value, type):
             self.cls(value, names)
         else:
@@ -265,10 +269,22 @@ def _library(value: Any) -> str | None:
     """The library that a module, function or class belongs to, with its version; None if to no library."""
     if isinstance(value, np.ufunc):
         return _version("numpy")
-    if not isinstance(value, _NAMED):
-        return None
+    if not isinstance(value, _NAMED) or (isinstance(value, FunctionType) and value.__module__ is None):
+        return None  # what `exec` makes may have no module
     home = value.__name__ if isinstance(value, ModuleType) else value.__module__ or "builtins"
     return _version(home.partition(".")[0])
+
+
+def _overloads(function: FunctionType) -> list[FunctionType]:
+    """What numba compiles in place of a function that is not compiled itself (`numba.extending.overload`)."""
+    context = cpu_target.typing_context
+    context.refresh()  # what was declared since the last compilation
+    try:
+        kind = context.resolve_value_type(function)
+    except (TypingError, ValueError):  # numba knows nothing of it
+        return []
+    found = [getattr(template, "_overload_func", None) for template in getattr(kind, "templates", ())]
+    return [part for part in found if isinstance(part, FunctionType)]
 
 
 def _functions(module: ModuleType) -> Iterator[FunctionType]:

@@ -90,7 +90,9 @@ class Options:
             raise InvalidValue(f"max_steps is {self.max_steps!r}; it must be a whole number, or infinite.")
         within("time_limit", self.time_limit, 0.0, math.inf, open_low=True, infinite=True)
         for name in ("consistent", "ledger", "events", "shortcuts", "implicit"):
-            flag(name, getattr(self, name))
+            object.__setattr__(self, name, flag(name, getattr(self, name)))
+        for name in ("t_end", "rtol", "max_step", "time_limit"):
+            object.__setattr__(self, name, float(getattr(self, name)))
         if (
             not isinstance(self.index, (int, np.integer))
             or self.index not in (1, 3)

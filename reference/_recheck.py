@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import Mode, Trajectory, _arguments
+from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.sundials.compiled import evaluation
@@ -56,6 +57,7 @@ class Violation:
     reason: str
 
 
+@checked_arguments
 def recheck(
     system: System,
     run: Trajectory,
@@ -77,8 +79,6 @@ def recheck(
         The worst place of each row, mode and reason. Where a controller acts or `switch` keeps numbers that a motion
         does not record, only the motion's own rows are looked at.
     """
-    _arguments.instance("system", system, System, "a mechanism (reference.System)")
-    _arguments.instance("run", run, Trajectory, "a motion")
     rtol = _arguments.real("rtol", rtol)
     rows = np.flatnonzero(np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
     if not rows or not len(run.t) or (run.mode < 0).any():

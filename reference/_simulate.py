@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba.core.config as numba_config
 from numpy.typing import ArrayLike
 
-from crossbody.cases import Trajectory
-from crossbody.cases._arguments import instance
+from crossbody.cases import InvalidValue, Trajectory
 from crossbody.reference._check import check_once
+from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._options import Options, checked
 from crossbody.reference._start import check_start
 from crossbody.reference._system import System
@@ -37,9 +38,11 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
     return motion
 
 
+@checked_arguments
 def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> Any:
     """A run that can be repeated: everything that does not depend on time is decided here."""
-    instance("system", system, System, "a crossbody.reference.System")
+    if numba_config.DISABLE_JIT:
+        raise InvalidValue("A run needs compiled kernels; NUMBA_DISABLE_JIT in the environment leaves them Python.")
     start = system.checked_state("q0", q0), system.checked_state("v0", v0)
     check_once(system, *start, options.t_end)
     check_start(system, *start, options)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Mode, SceneError
-from crossbody.reference._check import State, started
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference._options import Options
+from crossbody.reference._state import State, started
 from crossbody.reference._system import System
 
 EXPLAINED = 1e3  # times the tolerance of q and v, by which a start may be off

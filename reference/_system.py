@@ -6,13 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numba.core.config as numba_config
 import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError
-from crossbody.cases._arguments import shown
-from crossbody.cases._arrays import frozen
+from crossbody.cases._arguments import flag, shown
+from crossbody.cases._arrays import frozen, full, is_number
 from crossbody.reference import kernels as kernel_types
+from crossbody.reference._entry_points import checked_arguments, finite
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
 
@@ -23,6 +25,10 @@ LARGEST = 1_000_000
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
 class System:
     """The equations of one mechanism, ready for `simulate`.
+
+    A system that is deleted takes its kernels with it, but LLVM gives no memory back that holds machine code: 1.5 to
+    3 MB stay of each system with kernels of its own (`pytest tests/test_kernels_released.py -m bench -s`). Where many
+    are made, give one set of kernels other parameters.
 
     Attributes:
         n: number of coordinates.
@@ -86,10 +92,18 @@ class System:
     def __post_init__(self) -> None:
         """Bring every field to its shape and check it once."""
         put = object.__setattr__
-        nc = np.size(self.a0)
         self._check_sizes()
+        for name in ("gaps", "rows", "energy", "power"):
+            put(self, name, getattr(_none, name) if getattr(self, name) is None else getattr(self, name))
+        self._check_kernels()
+        put(self, "tick", finite("System.tick", self.tick))
+        for name in ("constant_mass", "affine"):
+            put(self, name, flag(f"System.{name}", getattr(self, name)))
+        nc = len(frozen("System", "a0", [self.a0] if is_number(self.a0) else self.a0, (None,)))
         for name in ("a0", "a1", "a2", "b0", "b1", "b2"):
             put(self, name, self._row_field(name, nc, np.float64))
+        if not np.all(np.isin(self._row_field("unilateral", nc, np.float64), (0.0, 1.0))):
+            raise SceneError(f"System.unilateral is {shown(self.unilateral)}; valid: True, False.")
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
@@ -102,7 +116,6 @@ class System:
         put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
         put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
         self._check_values()
-        self._check_kernels()
 
     @property
     def nc(self) -> int:
@@ -116,9 +129,7 @@ class System:
         return {name: getattr(_none, name, None) if kernel is None else kernel for name, kernel in given.items()}
 
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
-        value = getattr(self, name)
-        full = np.full(nc, value) if np.ndim(value) == 0 else value
-        return frozen("System", name, full, (nc,), dtype)
+        return full("System", name, getattr(self, name), nc, dtype)
 
     def _spans(self, nc: int) -> Index:
         """Columns that each row may touch, widened to whole blocks of the mass matrix."""
@@ -152,13 +163,14 @@ class System:
         follows: Index = np.asarray(self.follows)
         if np.any(follows >= self.nc) or np.any(follows[follows >= 0] == np.flatnonzero(follows >= 0)):
             raise SceneError(f"System.follows is {follows.tolist()}; it must name other rows, below {self.nc}.")
-        if self.control is not None and not self.tick > 0.0:
+        if self.tick < 0.0 or (self.control is not None and self.tick == 0.0):
             raise SceneError(f"System.tick is {self.tick}; a system with a controller needs a period above 0 s.")
 
     def _check_kernels(self) -> None:
         for name, kernel in self.kernels.items():
             wanted = kernel_types.REAL[name]
-            if wanted.args not in getattr(kernel, "signatures", ()):
+            plain = numba_config.DISABLE_JIT and (kernel is None or callable(kernel))
+            if not plain and wanted.args not in getattr(kernel, "signatures", ()):
                 raise SceneError(
                     f"System.{name} is not a kernel of the right signature; "
                     f"declare it with @crossbody.reference.kernels.{name}."
@@ -168,6 +180,7 @@ class System:
         """M(q) as a dense (n, n) matrix."""
         return self.terms(q, v, u)[0]
 
+    @checked_arguments
     def terms(
         self, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None, t: float = 0.0
     ) -> tuple[Floats, Floats]:
@@ -196,6 +209,7 @@ class System:
         self.gaps(0.0, *self._state(q, v), np.array(self.p), h, hd)
         return h, hd
 
+    @checked_arguments
     def check(self, q: ArrayLike, v: ArrayLike | None = None, *, states: int = 100, t_end: float = 1.0) -> None:
         """Check the kernels at a state and at random ones near it.
 
@@ -205,7 +219,7 @@ class System:
             q: positions (n,).
             v: velocities (n,); zeros if not given.
             states: number of random states.
-            t_end: the random states lie at times in [0, t_end], s.
+            t_end: the random states lie at times in [0, t_end], s; gaps are looked at there, and at t_end.
 
         Raises:
             SceneError: naming the kernel, the entry and both values: if h, H, h' and H'v do not belong together, if M

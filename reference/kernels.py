@@ -24,7 +24,8 @@ allocated. A run checks this, and that rows, gaps and mass matrix belong togethe
 
 Each is compiled for float64, and for complex128 when a derivative is first asked for, which is a complex step: use np
 functions only, and neither abs, hypot, atan2 nor a branch on a complex value. `control` and `solve` are float64 alone.
-With CROSSBODY_DEBUG=1 in the environment every index is checked.
+With CROSSBODY_DEBUG=1 in the environment every index is checked. With NUMBA_DISABLE_JIT=1 kernels stay Python, which
+`System.check` runs as they are, and a debugger steps through; runs need compiled ones.
 
 Gaps must not depend on time (scleronomic): h' = H v. Discrete variables stand at the end of p, as numbers: what a
 kernel branches on is constant between events. A row that cannot be touched in the present discrete state reports a

@@ -68,7 +68,9 @@ def _shared(command: _Work) -> _Work:
     options = (
         click.argument("names", metavar="[CASE]...", nargs=-1),
         click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable."),
-        click.option("--variant", metavar="V", help="Variant of the case; all if not given."),
+        click.option(
+            "--variant", "--key", metavar="V", help="Variant of the case, keyframe of a robot's file; all if not given."
+        ),
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
         click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR"),
     )
@@ -97,18 +99,20 @@ _LIMIT = click.option(
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
 @_LIMIT
 @_AGAINST
 @_WITH
 @speaks
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, settings: tuple[str, ...], limit: float, against: Path | None, others: tuple[Path, ...],
+    rtol: float | None, settings: tuple[str, ...], strict: bool, limit: float, against: Path | None,
+    others: tuple[Path, ...],
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
     from crossbody.reports.commands import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit)
+    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit, strict)
 
 
 @cli.command()
@@ -213,7 +217,7 @@ def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
 
 @cli.command()
 @click.argument("name", metavar="CASE")
-@click.option("--variant", metavar="V", help="Variant of the case; the first if not given.")
+@click.option("--variant", "--key", metavar="V", help="Variant of the case; the first if not given.")
 @click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
 @click.option("--at", metavar="K=V", multiple=True, help="Where to look: x, y, z of the flange, m; repeatable.")
 @click.option("--bode", is_flag=True, help="Frequency responses too.")

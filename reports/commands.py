@@ -9,8 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from crossbody import engines
 from crossbody.cases import Case, InvalidValue
+from crossbody.cases.files.reading import SUFFIXES
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
@@ -24,6 +27,8 @@ from crossbody.reports.voice import progress
 if TYPE_CHECKING:
     import pandas as pd
 
+OF_USERS = (".py", *SUFFIXES)
+"""How names of files end that are cases."""
 GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
 WRONG = [Word.OUTSIDE, Word.CRASHED]
 WIDTH = 120  # of the table in a file or a pipe
@@ -34,12 +39,13 @@ COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold r
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
     rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
-    limit: float = LIMIT,
+    limit: float = LIMIT, strict: bool = False,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
     `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one;
-    `limit` is the time that an engine may take for one case, s.
+    `limit` is the time that an engine may take for one case, s; `strict` makes a number wrong that left its
+    regression band.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -47,6 +53,8 @@ def run(
     if rtol is not None and not 1e-14 <= rtol <= 1e-1:
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
+    for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in case.findings):
+        click.echo(f"note: {sentence}", err=True)
     picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
     output.check(out, "run")
     site.check(against, others)
@@ -65,14 +73,14 @@ def run(
         print(voice.rows_as_json(rows))
     else:
         show(rows, out)
-    return exit_code(rows["verdict"])
+    return exit_code(rows["verdict"], rows["regression"] if strict else ())
 
 
 def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:
     """What decides what a command computes: the sources too, and case files of one's own."""
     from crossbody.reports.sweep.store import code
 
-    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in names if name.endswith(".py")]
+    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in names if name.endswith(OF_USERS)]
     scenes = [[case.label, dict(case.parameters)] for case in cases]
     return {"kind": kind, "code": code(), "cases": scenes, "files": own, **more}
 
@@ -123,7 +131,8 @@ def repeat(
     case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
 ) -> str:
     """The command that reproduces the rows of one case, but for its engine."""
-    source = next((name for name in names if name.endswith(".py") and Path(name).stem == case.name), case.name)
+    own = (name for name in names if name.endswith(OF_USERS) and case.name in (Path(name).stem, Path(name).name))
+    source = next(own, case.name)
     words = ["crossbody", "run", source, "--variant", case.variant]
     words += [word for pair in pairs for word in ("--set", pair)]
     words += [word for pair in settings for word in ("--setting", pair)]

@@ -51,13 +51,15 @@ def energy(q, v, p, e):
     e[1] = p[0] * p[2] * q[1]
 
 
-def block(slip=1e5, a0=1e4, a1=200.0, b0=1e8, b1=2e3, force=0.0, torque=0.0, rate=10.0, drag=0.0, damping=0.0):
+def block(
+    slip=1e5, a0=1e4, a1=200.0, b0=1e8, b1=2e3, force=0.0, torque=0.0, rate=10.0, drag=0.0, damping=0.0, width=WIDTH
+):
     """The block; a corner's slip row (slip 1/s) follows its normal row."""
     mass = 1.0
-    inertia = mass * (WIDTH**2 + HEIGHT**2) / 3.0
+    inertia = mass * (width**2 + HEIGHT**2) / 3.0
     return System(
         n=3, mass_block=1, dynamics=dynamics, gaps=gaps, rows=rows, energy=energy,
-        parameters=[mass, inertia, 9.81, force, rate, drag, torque, damping, WIDTH, HEIGHT],
+        parameters=[mass, inertia, 9.81, force, rate, drag, torque, damping, width, HEIGHT],
         a0=[a0, a0, 0.0, 0.0], a1=[a1, a1, slip, slip], b0=[b0, b0, 0.0, 0.0], b1=[b1, b1, 0.0, 0.0],
         follows=[-1, -1, 0, 1],
     )  # fmt: skip

@@ -14,14 +14,19 @@ from crossbody.cases._load import module
 CASE = str(Path(next(iter(crossbody.reports.suites.__path__))) / "_springs_and_walls.py")
 
 
-def outside(seed: int) -> Any:
-    """A case started outside of all its walls, with its exact truth."""
-    rng = np.random.default_rng([14, seed])
-    return load(
-        CASE, "outside", n=int(rng.integers(1, 4)), walls=int(rng.integers(1, 4)), draw=int(rng.integers(2**32)),
-        a0=10.0 ** rng.uniform(2.0, 5.0), zeta=rng.uniform(0.0, 1.0) * rng.choice([0, 1, 1]),
-        stiffness=10.0 ** rng.uniform(0.0, 1.5),
-    )  # fmt: skip
+def parameters_outside(seed: int, stream: int = 14) -> dict[str, Any]:
+    """Parameters of a case started outside of all its walls."""
+    rng = np.random.default_rng([stream, seed])
+    return {
+        "n": int(rng.integers(1, 4)), "walls": int(rng.integers(1, 4)), "draw": int(rng.integers(2**32)),
+        "a0": 10.0 ** rng.uniform(2.0, 5.0), "zeta": rng.uniform(0.0, 1.0) * rng.choice([0, 1, 1]),
+        "stiffness": 10.0 ** rng.uniform(0.0, 1.5),
+    }  # fmt: skip
+
+
+def outside(seed: int, stream: int = 14) -> Any:
+    """Such a case, with its exact truth."""
+    return load(CASE, "outside", **parameters_outside(seed, stream))
 
 
 def system_of(case: Any) -> Any:
@@ -45,3 +50,20 @@ def inside(seed: int) -> tuple[Any, float, float]:
     deep = 10.0 ** rng.uniform(-4.0, -1.0, len(x.H))
     a0 = 10.0 ** rng.uniform(2.0, 5.0)
     return x._replace(c=-deep - x.H @ x.q0), a0, 2.0 * rng.uniform(0.0, 1.0) * np.sqrt(a0)
+
+
+def mirrored(seed: int) -> tuple[Any, float, float]:
+    """The same of two pairs of walls, mirrored at the space in which the motion starts."""
+    rng = np.random.default_rng([17, seed])
+    zero = np.zeros((2, 2))
+
+    def block() -> Any:
+        parts = [A @ A.T + np.diag(rng.uniform(0.3, 2.0, 2)) for A in rng.normal(size=(2, 2, 2))]
+        return np.block([[parts[0], zero], [zero, parts[1]]])
+
+    along, across = rng.normal(size=(2, 2, 2))
+    H = np.block([[along, across], [along, -across]])
+    q0, v0, g = (np.r_[scale * rng.normal(size=2), 0.0, 0.0] for scale in (0.2, 2.0, 10.0))
+    deep, a0 = 10.0 ** rng.uniform(-4.0, -1.0, 2), 10.0 ** rng.uniform(2.0, 5.0)
+    x = module(CASE).Numbers(block(), 5.0 * block(), g, H, -np.r_[deep, deep] - H @ q0, q0, v0)
+    return x, a0, 2.0 * rng.uniform(0.0, 1.0) * np.sqrt(a0)

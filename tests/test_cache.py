@@ -117,6 +117,30 @@ def test_a_constant_and_a_helper_of_another_file_are_never_stale(tmp_path):
     assert run()[0] == pytest.approx("29.43")
 
 
+MADE = """
+    from crossbody.reference import kernels
+
+    scope = {"kernels": kernels, **eval(HOME)}
+    exec("@kernels.energy\\ndef energy(q, v, p, e):\\n    e[0], e[1] = 3.0, 0.0\\n", scope)
+    import numpy as np
+    z, e = np.zeros(1), np.zeros(2)
+    scope["energy"](z, z, z, e)
+    print(e[0])
+"""
+
+
+@pytest.mark.parametrize("home", ["{}", "{'__name__': 'nowhere'}", "{'__name__': None}", "globals()"])
+def test_kernels_made_of_text_run_again_without_a_word(tmp_path, home):
+    code = textwrap.dedent(MADE).replace("HOME", repr(home))
+    for _ in range(2):  # from a command and from stdin
+        for arguments in (["-c", code], ["-"]):
+            done = subprocess.run(
+                [sys.executable, "-W", "error", *arguments], cwd=tmp_path, input=code, capture_output=True, text=True,
+                check=False,
+            )  # fmt: skip
+            assert (done.stdout, done.stderr) == ("3.0\n", "")
+
+
 def test_damaged_files_are_dropped_told_and_compiled_again(folder, capsys):
     draw = random.Random(3)
     for trial in range(8):

@@ -103,3 +103,18 @@ def test_a_torque_is_bounded(maker):
     bounded = torques(maker, case, replace(free, limit=limit), angles)
     np.testing.assert_array_equal(bounded, np.clip(unbounded, -limit, limit))
     assert (np.abs(unbounded) > limit).any()
+
+
+@pytest.mark.parametrize("maker", MAKERS)
+def test_the_integral_of_the_error_is_bounded(maker):
+    case = load("circle")
+    free = replace(scene.sampling_of(case.parameters), delay=0, limit=None, bits=None)
+    x, y, z = (float(case.parameters[name]) for name in "xyz")
+    aside = inverse(scene.robot_of(case.parameters), [x, y, z + 0.02])
+    wide, tight = (
+        torques(maker, cases.load("delta_tracking", variant="circle", clamp=clamp), free, [aside] * 40)
+        for clamp in (1e3, 4.0 * 0.02 * free.period)
+    )
+    grown = np.abs(wide - tight).max(axis=1)
+    assert grown[:3].max() < 1e-12 * np.abs(wide).max(), "the bound is not reached in the first samples"
+    assert grown[-1] > 1e-3

@@ -15,7 +15,6 @@ pin = pytest.importorskip("pinocchio")
 from crossbody.engines._level_machine import LevelMachine  # noqa: E402 - they import the engine's package
 from crossbody.engines._log import Log  # noqa: E402
 from crossbody.engines.pinocchio._flow import Flow  # noqa: E402
-from crossbody.engines.pinocchio._impulse import capture_speed  # noqa: E402
 from crossbody.engines.pinocchio._rows import PinRows  # noqa: E402
 
 FREE, CONTACT, BALLISTIC, COLLISION = Mode.FREE, Mode.CONTACT, Mode.BALLISTIC, Mode.COLLISION
@@ -124,11 +123,31 @@ def test_an_impulse_has_the_restitution_of_the_law(a1: float) -> None:
 
 @pytest.mark.parametrize("factor", [0.999, 1.001])
 def test_an_impulse_captures_below_the_threshold_speed(factor: float) -> None:
-    e = closed_forms.restitution(closed_forms.damping_ratio(1e4, 20.0))
-    speed = factor * capture_speed(9.81, 1e4, e)
+    speed = factor * closed_forms.threshold_speed(1e4, 20.0, 9.81)
     found = run(ball("linear", height=0.0, speed=speed, t_end=1e-3), "impulse")
     assert found.events[-1].after == (CONTACT if factor < 1 else FREE)
     assert found.lam[-1, 0] == pytest.approx(9.81 if factor < 1 else 0.0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_several_rows_are_struck_each_with_its_own_restitution(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    case = cases.load("newtons_cradle", variant="sliders")
+    rows = engines.load("pinocchio").prepare(case, "impulse").scene.rows
+    n = len(case.q0)
+    struck = sorted(draw.choice(rows.nc, draw.integers(1, rows.nc + 1), replace=False).tolist())
+    v, e = draw.normal(size=n), draw.choice([0.0, 0.3, 0.8], len(struck))
+    after, p = rows.strike(np.zeros(n), v, struck, e.tolist())
+    H = rows.jacobian(np.zeros(n))[struck]
+    np.testing.assert_allclose(H @ after, -e * (H @ v), atol=1e-12)
+    np.testing.assert_allclose(rows.delassus(np.zeros(n))[np.ix_(struck, struck)] @ p, H @ (after - v), atol=1e-12)
+
+
+@pytest.mark.parametrize(("h", "v", "after"), [(-1e-3, 1.0, BALLISTIC), (1e-9, 1.0, FREE), (-1e-3, -1.0, CONTACT)])
+def test_a_contact_that_pulls_is_released_wherever_it_is(h: float, v: float, after: Mode) -> None:
+    rows = engines.load("pinocchio").prepare(ball("linear")).scene.rows
+    settled = LevelMachine(rows).settle(np.array([h]), np.array([v]), (int(CONTACT),))
+    assert settled.modes == (after,)
 
 
 def test_impulses_lose_energy_only_by_restitution() -> None:

@@ -10,9 +10,10 @@ import pytest
 
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Outcome, Tier, Trajectory, UnknownName, load
 from crossbody.cases._arrays import Floats
+from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.truth import Truth, _held_against, truth_of
-from crossbody.reports.judging.verdict import Word
+from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.metrics._contacts import CLOSED
 from crossbody.reports.runs import jobs
 
@@ -199,3 +200,40 @@ def test_an_engine_that_throws_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None
     assert [(row.profile, row.metric) for row in crashed] == [("cvode", "run")]
     assert "ZeroDivisionError: planted" in crashed[0].why
     assert any(row.profile == "compiled" and row.metric == "position" for row in rows)
+
+
+@pytest.mark.parametrize("name", ["position", "lam_impulse_path", "bounces"])
+def test_a_metric_that_throws_is_a_row(name: str, recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+
+    def measure(truth: Truth, run: Trajectory, case: Case) -> float:
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr(metrics.load(name), "measure", measure)
+    rows = judged(case, [entries["mujoco:matched"]], truth, "")
+    crashed = [row for row in rows if row.verdict == Word.CRASHED]
+    assert {row.metric.partition(" ")[0] for row in crashed} == {name}
+    assert all("ZeroDivisionError: planted" in row.why for row in crashed)
+    assert {"velocity", "energy_drift"} <= {row.metric for row in rows}
+    assert exit_code(row.verdict for row in rows) == 1
+
+
+@pytest.mark.parametrize("who", ENGINES)
+@pytest.mark.parametrize("scene", SCENES, ids=":".join)
+def test_a_shipped_run_stays_in_its_regression_bands(recorded: Recorded, scene: tuple[str, str], who: str) -> None:
+    case, truth, entries = recorded[scene]
+    rows = judged(case, [entries[who]], truth, "")
+    assert sum(row.regression == Regression.KEPT for row in rows) > 8
+    assert [row.metric for row in rows if row.regression == Regression.LOST] == []
+
+
+def test_a_number_that_left_its_band_is_wrong_if_that_is_asked_for(recorded: Recorded) -> None:
+    case, truth, entries = recorded["newtons_cradle", "sliders"]
+    entry = entries["reference:compiled"]
+    assert entry.run is not None
+    worse = replace(entry, run=replace(entry.run, q=entry.run.q * (1.0 + 1e-11)))
+    rows = judged(case, [worse], truth, "")
+    assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == []
+    assert "position" in {row.metric for row in rows if row.regression == Regression.LOST}
+    words, regressions = [row.verdict for row in rows], [row.regression for row in rows]
+    assert (exit_code(words), exit_code(words, regressions)) == (0, 1)

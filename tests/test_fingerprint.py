@@ -23,6 +23,7 @@ from hypothesis import strategies as st
 
 from crossbody.reference import core, linear, systems
 from crossbody.reference._fingerprint import Unreadable, fingerprint
+from crossbody.reference.core._struct import bundle_type
 from crossbody.reference.kernels import NAMES
 
 MODULES = ("hw.fitting.rk4", "engines._delta.forces")
@@ -172,6 +173,17 @@ def test_what_has_no_content_that_can_be_told_is_refused(value):
         fingerprint(_source("def f(x):\n    return x, G\n", G=value))
 
 
+def test_what_numba_compiles_in_place_of_a_function_counts():
+    def made(value: float) -> types.FunctionType:
+        scope: dict[str, object] = {"numba": numba}
+        text = "def g():\n    return 0.0\n@numba.extending.overload(g)\ndef of_g():\n    return lambda: VALUE\n"
+        exec(text.replace("VALUE", repr(value)), scope)
+        return _source("def f():\n    return g()\n", g=scope["g"])
+
+    assert fingerprint(made(1.0)) == fingerprint(made(1.0))
+    assert fingerprint(made(1.0)) != fingerprint(made(2.0))
+
+
 def test_a_helper_that_was_compiled_before_its_constant_changed_has_no_key():
     scope: dict[str, object] = {"G": 1.0}
     exec("def helper(x):\n    return x * G\n", scope)
@@ -185,3 +197,10 @@ def test_a_helper_that_was_compiled_before_its_constant_changed_has_no_key():
     assert inner(2.0) == 2.0  # numba has frozen it
     with pytest.raises(Unreadable, match="before what it reads changed"):
         fingerprint(outer)
+
+
+def test_two_layouts_of_one_name_are_two_types() -> None:
+    """Code that was compiled for the places of fields in an older layout is not that of the new one."""
+    layouts = ({"x": "Floats", "y": "Floats"}, {"y": "Floats", "x": "Floats"}, {"x": "Floats", "y": "Floats2"})
+    kinds = [bundle_type(type("Work", (), {"__annotations__": layout})) for layout in layouts]
+    assert len({str(kind) for kind in kinds}) == 3

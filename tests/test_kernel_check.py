@@ -90,6 +90,11 @@ FAULTS = [
     ("dynamics", "w[0] = 1.0", ["dynamics", "writes beyond w", "(0,)", "CROSSBODY_DEBUG"]),
     ("dynamics", "M[0, 1] += 0.1", ["dynamics", "M[0, 1]", "mirror"]),
     ("dynamics", "M[:, :] = -M", ["dynamics", "positive definite", "eigenvalue"]),
+    ("dynamics", "M[0, 2] = np.nan", ["dynamics", "M[0, 2]", "nan"]),
+    ("dynamics", "M[1, 1] += 0.1 * v[0] * v[0]", ["dynamics", "M[1, 1]", "must not depend on v"]),
+    ("gaps", "h[0] += 1e-3 * v[1]", ["gaps", "h[0]"]),
+    ("gaps", "h[0] += 0.1 * max(t - 0.9, 0.0)", ["gaps", "must not depend on time", "h[0]"]),
+    ("rows", "H[0, 0] -= 1e-3 * v[0]", ["rows", "H[0, 0]"]),
     ("dynamics", "q[0] = 0.5", ["dynamics", "writes q"]),
     ("dynamics", "f[2] = np.inf", ["dynamics", "f[2]", "inf"]),
     ("energy", "e[1] = np.nan", ["energy", "e[1]"]),
@@ -135,6 +140,44 @@ def test_every_untrue_declaration_is_named(changes, words):
     with pytest.raises(SceneError) as caught:
         check_kernels(_bead(**changes), np.array([0.2, 0.3, 0.4]), np.zeros(3))
     assert all(word in str(caught.value) for word in words), caught.value
+
+
+@kernels.gaps
+def _both_gaps(t, q, v, p, h, hd):  # the second is too far to be touched
+    _gaps(t, q, v, p, h, hd)
+    h[1], hd[1] = 50.0 + q[2], v[2]
+
+
+@kernels.rows
+def _disordered(t, q, v, p, w, idx, na, H, h, Hdv):  # in the order of the rows, not in that of idx
+    at = 0
+    for i in range(2):
+        for j in range(na):
+            if idx[j] == i:
+                if i == 0:
+                    _rows(t, q, v, p, w, idx[j : j + 1], 1, H[at : at + 1], h[at : at + 1], Hdv[at : at + 1])
+                else:
+                    H[at, 2], h[at], Hdv[at] = 1.0, 50.0 + q[2], 0.0
+                at += 1
+
+
+def test_rows_in_another_order_than_asked_for_are_named():
+    system = _bead(gaps=_both_gaps, rows=_disordered, a0=[1e4, 1e4])
+    for seed in range(3):
+        with pytest.raises(SceneError, match=r"Kernel rows gives H\[\d, \d\] = .* but row \d of all, which idx = \["):
+            check_kernels(system, np.array([0.2, 0.3, 0.4]), np.zeros(3), seed=seed)
+
+
+@kernels.gaps
+def _late_gaps(t, q, v, p, h, hd):  # a wall that is away from where it began between 0.4 s and 0.5 s alone
+    _gaps(t, q, v, p, h, hd)
+    if 0.4 < t < 0.5:
+        h[0] += 0.1
+
+
+def test_a_wall_that_moves_for_a_while_is_found_by_many_states():
+    with pytest.raises(SceneError, match=r"must not depend on time"):
+        _bead(gaps=_late_gaps).check([0.2, 0.3, 0.4], t_end=1.0)
 
 
 def test_a_row_that_reaches_beyond_its_span_is_named():
@@ -216,6 +259,53 @@ DEBUG = """
     except Exception as error:
         print(type(error).__name__, error)
 """
+
+
+SHIPPED = """
+    import numpy as np
+    from importlib import import_module
+    from mechanisms import sliders
+    from crossbody import cases
+    from crossbody.reference import System, kernels
+
+    count = 0
+    for name in cases.names():
+        for variant in import_module(f"crossbody.cases.{name}").VARIANTS:
+            case = cases.load(name, variant)
+            system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
+            system.check(case.q0, case.v0, states=5, t_end=case.t_end)
+            q, v, p = (np.array(x) for x in (case.q0, case.v0, system.p))
+            u, s, mode = np.zeros(system.inputs), np.zeros(system.memory), np.zeros(system.nc, np.int8)
+            if system.control is not None:
+                for tick in range(3):
+                    system.control(tick * system.tick, q, v, u, s, p)
+            if system.switch is not None:
+                for fired in (kernels.START, kernels.TOUCHED):
+                    system.switch(0.0, q, v, p, mode, fired)
+            count += 1
+    print(count)
+
+    @kernels.energy
+    def energy(q, v, p, e):
+        e[0], e[1] = p[2], 0.0
+
+    try:
+        System(n=1, dynamics=sliders(1).dynamics, energy=energy, mass_block=1, parameters=[1.0, 9.81]).check([1.0])
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+def test_every_shipped_kernel_stays_inside_its_arrays(tmp_path):
+    # As Python the kernels need not be compiled, and NumPy looks at every index.
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(SHIPPED)], cwd=Path(__file__).parent,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    count, found = done.stdout.splitlines()
+    assert int(count) == len(VARIANTS)
+    assert found.startswith("SceneError Kernel energy reads or writes beyond an array: index")
 
 
 def test_with_debugging_on_kernels_check_their_indices(tmp_path):

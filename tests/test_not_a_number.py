@@ -136,3 +136,17 @@ def test_an_energy_that_nobody_gives_is_no_fault(solver: str) -> None:
     fields = {name: kernel for name, kernel in ball.KERNELS.items() if name != "energy"}
     system = System(n=1, parameters=[1.0, 9.81], a0=[1e4], a1=20.0, **fields)
     assert simulate(system, [1.0], [0.0], 0.6, solver=solver).outcome is Outcome.FINISHED
+
+
+@kernels.dynamics
+def _upper(t: float, q: Any, v: Any, u: Any, p: Any, M: Any, f: Any, w: Any) -> None:
+    M[0, 0], M[1, 1], M[1, 0], M[0, 1] = 2.0, 2.0, 0.5, 0.5
+    f[0] = f[1] = -1.0
+    if q[0].real < LOW:
+        M[0, 1] = np.nan
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_nan_in_the_half_of_the_mass_matrix_that_is_not_read(solver: str) -> None:
+    run = simulate(System(n=2, parameters=[1.0], dynamics=_upper), [1.0, 1.0], [0.0, 0.0], 2.0, solver=solver)
+    assert run.outcome in (Outcome.NOT_FINITE, Outcome.ILL_POSED)

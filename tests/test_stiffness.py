@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from mechanisms import ball, flyby
 
-from crossbody.reference import simulate
+from crossbody.cases import Mode
+from crossbody.reference import System, kernels, simulate
 from crossbody.reference.core import esdirk
+from crossbody.reference.systems import ball as ball_kernels
 
 
 def test_order_conditions():
@@ -68,3 +70,22 @@ def test_a_ball_at_rest_in_closed_form_does_not_creep(a0, a1, speed):
     assert run.counts["exact_steps"] == run.steps == 1
     assert abs(run.q[-1, 0]) < 1e-20
     assert abs(run.v[-1, 0]) < 1e-20
+
+
+@kernels.dynamics
+def _lifted(t, q, v, u, p, M, f, w):
+    M[0, 0], f[0] = p[0], -p[0] * p[1] * np.cos(3.0 * t)
+
+
+@pytest.mark.parametrize("implicit", [True, False])
+@pytest.mark.parametrize("zeta", [0.2, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("a0", [1e6, 1e8])
+def test_a_body_at_rest_lifts_off_where_nothing_presses_it(a0, zeta, implicit):
+    """At 3 t = pi/2, whatever the tolerance: a0 times what a gap at rest is off by must not drown the multiplier."""
+    system = System(
+        n=1, parameters=[1.0, 9.81], a0=[a0], a1=2.0 * zeta * a0**0.5, **ball_kernels.KERNELS | {"dynamics": _lifted}
+    )
+    for rtol in (1e-3, 1e-4, 1e-6):
+        run = simulate(system, [0.002], [0.0], 0.6, rtol=rtol, implicit=implicit, ledger=False)
+        lifted = [event.t for event in run.events if event.before is Mode.CONTACT][-1]
+        assert lifted == pytest.approx(np.pi / 6.0, abs=2e-7)

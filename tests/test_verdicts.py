@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from crossbody import cases as cases_
+from crossbody import engines
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
+from crossbody.cases._defaults import limits_of
 from crossbody.reports.judging.audit import audit, difference
-from crossbody.reports.judging.comparison import Entry, compare
-from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.verdict import Word, exit_code, judge, limit_for
+from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
+from crossbody.reports.judging.stored import deviations
+from crossbody.reports.judging.truth import _held_against, truth_of
+from crossbody.reports.judging.verdict import Word, band, exit_code, judge, limit_for
 
 LIMIT = Limit(metric="position", value=1e-3, why="because")
 KNOWN = replace(LIMIT, known="it is known to do that", known_size=1.0)
@@ -177,3 +182,106 @@ def test_model_error_stands_apart_from_discretisation(case: Case, motion: Trajec
     values = rows.set_index("metric")["value"]
     assert values["position (model)"] == pytest.approx(1e-3, rel=1e-6)
     assert values["position (discretisation)"] == pytest.approx(1e-3, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("off", "word"), [(0.4, Word.OUTSIDE), (0.6, Word.EXPECTED), (1.9, Word.EXPECTED), (2.1, Word.OUTSIDE)]
+)
+def test_a_stored_size_bounds_a_known_deviation_on_both_sides(off: float, word: Word) -> None:
+    assert judge(off, KNOWN, None, stored=1.0)[0] == word
+
+
+@pytest.mark.parametrize(("size", "word"), [(1.0, Word.EXPECTED), (0.5, Word.OUTSIDE), (math.inf, Word.INFO)])
+def test_a_size_that_a_case_names_is_the_bound_where_none_is_stored(size: float, word: Word) -> None:
+    assert judge(0.9, replace(KNOWN, known_size=size), None)[0] == word
+
+
+def test_a_band_is_ten_times_what_was_stored() -> None:
+    assert band(1.0, LIMIT) == 10.0
+    assert band(0.0, LIMIT) == 1e-12
+    assert band(0.0, replace(LIMIT, value=0.0)) == 0.0
+    assert math.isnan(band(None, LIMIT))
+
+
+@pytest.mark.parametrize("word", [Word.OUTSIDE, Word.CRASHED])
+def test_what_is_wrong_is_the_exit_code(word: Word) -> None:
+    assert exit_code([Word.WITHIN, word]) == 1
+    assert exit_code([Word.WITHIN], ["kept", "lost"]) == 1
+    assert exit_code([Word.WITHIN], ["kept", ""]) == 0
+
+
+@pytest.mark.parametrize(("share", "word"), [(0.3, Word.INFO), (0.7, Word.WITHIN)])
+def test_the_part_that_was_compared_is_told_and_too_little_is_not_judged(
+    share: float, word: Word, case: Case, motion: Trajectory
+) -> None:
+    truth = replace(truth_of(case), trusted=share * case.t_end)
+    rows = {row.metric: row for row in judged(case, [Entry(engine="fake", profile="", run=motion)], truth, "")}
+    assert rows["position"].verdict == word
+    assert rows["position"].compared == pytest.approx(share, abs=0.02)
+    assert rows["truth"].verdict == Word.OUTSIDE, "it must be trusted to the horizon"
+
+
+@pytest.mark.parametrize(("off", "parts", "word"), [(1e-11, False, Word.WITHIN), (3e-7, False, Word.OUTSIDE),
+                                                    (1e-3, True, Word.OUTSIDE)])  # fmt: skip
+def test_two_truths_must_agree_to_a_multiple_of_the_tolerance(
+    off: float, parts: bool, word: Word, case: Case, motion: Trajectory
+) -> None:
+    truth = truth_of(case)
+    second = replace(motion, q=motion.q * (1.0 + off * motion.t / case.t_end)[:, None])
+    found = _held_against(replace(truth, trusted=math.inf), second, case, 1e-13)
+    assert (found.trusted < case.t_end) == parts
+    (row,) = truth_row(case, found, "")
+    assert row.verdict == word
+
+
+@pytest.mark.parametrize("change", [{"parameters": {"height": 2.0}}, {"settings": {"rtol": 1e-3}}])
+def test_what_was_stored_of_other_parameters_or_settings_is_not_taken(change: dict[str, Any]) -> None:
+    engine = engines.load("reference")
+    shipped = load("bouncing_ball", "linear")
+    entry = Entry(engine="reference", profile="compiled", settings=engine.prepare(shipped, "compiled").settings)
+    assert deviations(shipped, entry)
+    other = load("bouncing_ball", "linear", **change.get("parameters", {}))
+    settings = {**entry.settings, **change.get("settings", {})}
+    assert deviations(other, replace(entry, settings=settings)) == {}
+
+
+def test_a_number_that_is_missing_is_expected_only_where_it_was_missing_before(case: Case, motion: Trajectory) -> None:
+    silent = replace(motion, ledger=None)
+    known = replace(case, limits=(Limit(metric="*", known="it is known to do that"),))
+    for each in (case, known):
+        rows = judged(each, [Entry(engine="fake", profile="", run=silent)], truth_of(case), "")
+        assert {row.metric: row.verdict for row in rows}["energy_integrator"] == Word.OUTSIDE
+
+
+@pytest.mark.parametrize(("off", "same"), [(1e-12, True), (1e-8, False)])
+def test_the_audit_allows_rounding_alone(off: float, same: bool, case: Case) -> None:
+    mine = {**PHYSICS, "M": lambda q: np.array([[1.0 + off]])}
+    assert all(row.ok for row in audit(mine, PHYSICS, case)) == same
+
+
+def test_the_largest_difference_counts() -> None:
+    assert difference([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]) == 0.25
+
+
+def test_every_case_is_limited_in_all_that_it_has() -> None:
+    every = {
+        "start_error",
+        "position",
+        "velocity",
+        "energy_drift",
+        "energy_integrator",
+        "energy_residual",
+        "rate_residual",
+    }
+    rows = {"gap_residual", "law_residual", "lam_impulse_path"}
+    opening = {"gap_error", "complementarity", "event_times", "touch_count", "release_count"}
+    for name in cases_.names():
+        for variant in cases_.variants(name):
+            each = load(name, variant)
+            found = {
+                limit.metric: limit.value for limit in limits_of(each) if (limit.engine, limit.profile) == ("*", "*")
+            }
+            wanted = every | (rows if each.contacts else set()) | (opening if each.law.unilateral.any() else set())
+            assert wanted <= set(found), each.label
+            assert found["position"] <= 1e-3, each.label
+            assert found["velocity"] <= 1e-1, each.label

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import random
 from collections import defaultdict
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from wrong_calls import _logs, calls, failure
+from wrong_calls import Call, _logs, arguments_of_entry_points, calls, failure, fields_of_a_system
 
 from crossbody import cases
 from crossbody.cases import CrossbodyError, InvalidValue, Outcome, SceneError, UnknownName
@@ -66,6 +67,12 @@ def test_wrong_arguments_for_logs_are_refused_in_a_sentence(tmp_path: Path) -> N
     rng = random.Random(3)
     found = [text for _ in range(LOG_CALLS) if (text := failure(_logs(rng, tmp_path)))]
     assert not found, "\n\n".join(found[:5])
+
+
+@pytest.mark.parametrize("kind", [fields_of_a_system, arguments_of_entry_points])
+def test_every_argument_refuses_every_wrong_value_in_a_sentence(kind: Callable[[], Iterator[Call]]) -> None:
+    found = [text for call in kind() if (text := failure(call))]
+    assert not found, "\n".join(text[:300] for text in found[:20])
 
 
 @pytest.mark.slow

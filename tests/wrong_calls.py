@@ -6,7 +6,7 @@ import math
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ import numpy as np
 
 from crossbody import cases, engines, hw, reports
 from crossbody.cases import Case, CrossbodyError, Parameter
+from crossbody.cases._arrays import is_number
 from crossbody.engines._equations import system_of
-from crossbody.reference import Options, System, ensemble, recheck, simulate
+from crossbody.reference import Options, System, ensemble, linear, prepare, recheck, simulate
 from crossbody.reports import cli
 
 BOUNDED = {"max_steps": 300, "time_limit": 2.0}
@@ -42,16 +43,18 @@ def failure(call: Call) -> str:
     return ""
 
 
+WRONG: tuple[Any, ...] = (
+    None, "", "x", "1e3", b"7", True, math.nan, math.inf, -math.inf, 0, -1, 10**400, 1e308, -1e-308, 3 + 4j,
+    [], [1, 2, 3], ["a"], [[1.0]], [[1.0], [1.0, 2.0]], (), {}, {"a": 1}, {1, 2}, object(), int, len, np.zeros(0),
+    np.zeros((2, 2)), np.array("x"), np.array([None]), np.float32(1.5), np.int64(3), Path("x"), range(3), "\0",
+    "../..", "ä" * 300, lambda: 0,
+)  # fmt: skip
+"""Values of a type, a shape or a size that few arguments admit."""
+
+
 def wrong(rng: random.Random) -> Any:
-    """A value of a type, a shape or a size that few arguments admit."""
-    return rng.choice(
-        (
-            None, "", "x", "1e3", b"7", True, math.nan, math.inf, -math.inf, 0, -1, 10**400, 1e308, -1e-308, 3 + 4j,
-            [], [1, 2, 3], ["a"], [[1.0]], (), {}, {"a": 1}, {1, 2}, object(), int, len, np.nan, np.zeros(0),
-            np.zeros((2, 2)), np.array("x"), np.array([None]), np.float32(1.5), np.int64(3), Path("x"), range(3), "\0",
-            "../..", "ä" * 300, lambda: 0,
-        )
-    )  # fmt: skip
+    """One of them."""
+    return rng.choice(WRONG)
 
 
 def number(rng: random.Random, parameter: Parameter) -> Any:
@@ -152,7 +155,7 @@ def _simulate(rng: random.Random, costly: bool) -> Call:
     if rng.random() < 0.4:
         start[rng.randrange(4)] = wrong(rng)
     if not isinstance(given["max_steps"], int) or isinstance(given["max_steps"], bool) or given["max_steps"] > 300:
-        start[3] = start[3] if start[3] is not None and np.ndim(start[3]) else 1e-3
+        start[3] = start[3] if start[3] is not None and not is_number(start[3]) else 1e-3
     text = f"simulate({start!r}, **{given!r})"
     if rng.random() < 0.1 and given.keys() <= Options.__dataclass_fields__.keys():
         return Call(f"Options(t_end={start[3]!r}, **{given!r})", lambda: Options(t_end=start[3], **given))
@@ -173,6 +176,56 @@ def _system(rng: random.Random) -> Call:
     given = {name: getattr(own, name) for name in names if name not in ("alpha", "beta")}
     changed = {name: wrong(rng) for name in rng.sample(names, rng.choice((1, 1, 2)))}
     return Call(f"System(**ball | {changed!r})", lambda: System(**given | changed))
+
+
+def fields_of_a_system() -> Iterator[Call]:
+    """Every field of a system with every wrong value; a system that this makes is run for a moment."""
+    own = system_of(ball())
+    names = [name for name, one in System.__dataclass_fields__.items() if one.init]
+    given = {name: getattr(own, name) for name in names}
+    for name in names:
+        for value in WRONG:
+            yield Call(f"System(**ball | {{{name!r}: {value!r}}})", partial(_short, given | {name: value}))
+
+
+def _short(given: dict[str, Any]) -> None:
+    simulate(System(**given), [1.0], [0.0], 0.01, **BOUNDED)
+
+
+def arguments_of_entry_points() -> Iterator[Call]:
+    """Every argument of the functions that take a system or a linear model, with every wrong value."""
+    own, model = system_of(ball()), linear.linearise(system_of(ball()), [1.0], [0.0])
+    start: dict[str, Any] = {"system": own, "q": [1.0]}
+    record = {"system": own, "t": [0.0, 0.1], "unknown": linear.Unknown(rows=(0,))}
+    run = {"system": own, "q0": [1.0], "v0": [0.0], "t_end": 0.01, "max_steps": 300}
+    points: tuple[tuple[Callable[..., Any], dict[str, Any], str], ...] = (
+        (linear.linearise, start, "v u active outputs reduce names t colliding"),
+        (linear.trim, start, "v u active free rates inputs t"),
+        (linear.tangents, start | {"q": [[1.0]]}, "v u active t threads"),
+        (linear.poses, start | {"q": [[1.0]], "hold": (), "active": [0]}, "u t threads"),
+        (linear.sensitivity, run, "parameters u rtol collisions"), (linear.modes, {"model": model}, ""),
+        (linear.controllable, {"model": model}, "tolerance"), (linear.observable, {"model": model}, "tolerance"),
+        (linear.filtered, record | {"y": [[1.0], [1.0]], "measured": [0], "std_y": 1e-3, "q0": [1.0],
+         "std_force": 1.0, "time_force": 0.1}, "u v0 active std_q0 std_v0 smooth"),
+        (linear.balanced, record | {"q": [[1.0], [1.0]], "v": [[0.0], [0.0]], "vd": [[0.0], [0.0]], "std_vd": 1.0},
+         "u active std_q std_v std_u"),
+        (linear.Unknown, {}, "inputs rows"), (_poles_over, {"values": [1.0]}, ""),
+        (ensemble, run | {"q0": [[1.0]], "v0": [[0.0]]}, "parameters law threads"),
+        (prepare, {"system": own, "q0": [1.0], "v0": [0.0], "options": Options(t_end=0.1)}, ""),
+        (own.check, {"q": [1.0]}, "v t_end states"), (own.gap, {"q": [1.0]}, "v"),
+        (own.constraint, {"q": [1.0]}, "v"), (own.terms, {"q": [1.0]}, "v u t"), (own.project, {"q": [1.0]}, "v"),
+    )  # fmt: skip
+    for entry, given, others in points:
+        entry(**given)
+        for name in (*given, *others.split()):
+            for value in WRONG:
+                text = f"{entry.__qualname__}(good | {{{name!r}: {value!r}}})"
+                yield Call(text, partial(entry, **given | {name: value}))
+
+
+def _poles_over(values: Any) -> None:
+    model = linear.linearise(system_of(ball()), [1.0], [0.0])
+    linear.locus(lambda _: model, values)
 
 
 def _compare(rng: random.Random) -> Call:

@@ -45,6 +45,12 @@ _LOCATED = "tolerances of 1e-9 and 1e-10, from touch to touch"
 _RESTING = "rows that touch at rest let go and touch again by rounding: touches are not matched with certainty"
 _KEPT = "what acts on one ball acts on its neighbour"
 
+_OTHER_PHYSICS = (
+    ("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT), ("pinocchio", "impulse_simultaneous", IMPACT),
+    ("pinocchio", "admm", STEPPING),
+)  # fmt: skip
+"""Engines whose constants are a restitution, or their own: the others must pass the audit."""
+
 Bounds = Mapping[str, tuple[float, str]]
 
 _SLIDERS: Bounds = {
@@ -118,6 +124,5 @@ def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
         for (engine, profile), (value, why) in _DISCRETISATION.items():
             yield Limit(metric="position (discretisation)", value=value, engine=engine, profile=profile, why=why)
         yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")
-    for (engine, profile), known in {**_OTHERS[rule], ("pinocchio", "impulse"): IMPACT}.items():
+    for engine, profile, known in _OTHER_PHYSICS:
         yield Limit(metric="audit", engine=engine, profile=profile, known=known)
-    yield Limit(metric="audit", engine="pinocchio", profile="impulse_simultaneous", known=IMPACT)

@@ -23,10 +23,12 @@ SAME_INSTANT = 100
 
 
 def integrator(model: Any, data: Any) -> Callable[[], None]:
-    """What mj_step does after its forward pass, for the integrator that the model names (RK4 or Euler)."""
+    """Return what mj_step does after its forward pass, for the integrator that the model names."""
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         return lambda: mujoco.mj_RungeKutta(model, data, 4)
-    return lambda: mujoco.mj_Euler(model, data)
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
+        return lambda: mujoco.mj_Euler(model, data)
+    return lambda: mujoco.mj_implicit(model, data)
 
 
 class March:

@@ -55,6 +55,7 @@ def segments(case: Case, model: Any, data: Any) -> dict[str, Any]:
     found = _shown(case, model, data, range(4), look)
     if case.parameters["controller"] != "off":
         del found["bias"]
+        found["hidden"]["bias"] = "The controller's torque is in it, by a hook that belongs to a run."
     return {**found, "constants": {"solref": model.geom_solref[0].copy()}}
 
 

@@ -46,14 +46,16 @@ class Flow:
         self.steps = self.rhs = self.still = 0
         self.outcome, self.message = Outcome.FINISHED, ""
         self.modes = first_modes(self.rows)
-        options = {"rtol": rtol, "atol": atol, "method": method, "max_num_steps": PER_SOLVE}
+        options: dict[str, Any] = {"rtol": rtol, "atol": atol, "method": method, "max_num_steps": PER_SOLVE}
         watched = WATCHED * self.rows.nc
 
         def watch(_t: float, y: NDArray[Any], out: NDArray[Any]) -> None:  # CVODE hangs attributes on it
             self._watch(y, out)
             out[out == 0.0] = TINY
 
-        self.solver = CVODE(self._rhs, eventsfn=watch, num_events=watched, **options)
+        if watched:
+            options |= {"eventsfn": watch, "num_events": watched}
+        self.solver = CVODE(self._rhs, **options)
 
     def run(self, q0: Floats, v0: Floats, t_end: float) -> None:
         """Integrate from (q0, v0) to t_end, s."""

@@ -7,6 +7,7 @@ to the Python object, which must outlive the call, as it does.
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any
 
 import numba
@@ -26,7 +27,10 @@ class BundleType(types.Type):
     def __init__(self, name: str, fields: tuple[tuple[str, Any], ...]) -> None:
         self.fields = fields
         self.index = {field: i for i, (field, _) in enumerate(fields)}
-        super().__init__(name=f"Bundle.{name}")
+        # Machine code is kept on disk by the names of its types: without its layout in the name, code for an older one
+        # would be read back.
+        layout = hashlib.sha256(repr([(field, str(kind)) for field, kind in fields]).encode()).hexdigest()[:16]
+        super().__init__(name=f"Bundle.{name}.{layout}")
 
 
 @register_model(BundleType)

@@ -229,39 +229,26 @@ def _remember_step(s: Any, method: int) -> None:
 
 
 @inlined
-def _first_rows(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
-    """Write the start down, after everything has settled."""
+def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Settle the start and write it down, or go on with an instant that found no room for its events."""
+    lost = False
+    if not s.started:
+        s.started = 1
+        for i in range(s.nc):
+            s.switching |= m.unilateral[i]
+        s.history_t, s.collision_t = np.inf, np.inf
+        lost = s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST
+        _take_inputs(K, s, m, w, b)
+        if s.audited:
+            audit.begin_account(K, s, m, w)
+    code = _restart(K, s, m, w, b)
+    if code != 0:
+        return code
     record.here(K, s, m, w, b.mode, b.out, b.modes)
     while s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:
         record.write_row(K, s, m, w, b.mode, s.t, w.y, w.lam0, w.z, b.out, b.modes)
         s.next_sample += 1
-
-
-@inlined
-def _begin_run(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    s.started = 1
-    for i in range(s.nc):
-        s.switching |= m.unilateral[i]
-    s.history_t, s.collision_t = np.inf, np.inf
-    lost = s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST
-    _take_inputs(K, s, m, w, b)
-    if s.audited:
-        audit.begin_account(K, s, m, w)
-    code = _restart(K, s, m, w, b)
-    if code == 0:
-        _first_rows(K, s, m, w, b)
-        if lost:
-            return LOST
-    return code
-
-
-@inlined
-def _settle_again(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Go on with an instant that found no room for its events."""
-    code = _restart(K, s, m, w, b)
-    if code == 0:
-        _first_rows(K, s, m, w, b)
-    return code
+    return LOST if lost else 0
 
 
 @inlined
@@ -288,12 +275,8 @@ def advance(
     s = state[0]
     K = Kernels(dynamics, gaps, rows, energy, power, solve, control, watch, switch)
     m, w, b = open_model(model), open_work(work), open_buffers(buffers)
-    if not s.started:
-        code = _begin_run(K, s, m, w, b)
-        if code != 0:
-            return code
-    elif s.unsettled:
-        code = _settle_again(K, s, m, w, b)
+    if not s.started or s.unsettled:
+        code = _begin(K, s, m, w, b)
         if code != 0:
             return code
     for _ in range(budget):

@@ -12,6 +12,7 @@ from crossbody.reference.core.algebra import solve_schur
 from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, Model, Work
 
 CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one's residue vanish in rounding
+RESOLVED = 2.0  # |p| h of the rows' fastest pole p, above which a step tells a gap worse than its law does
 ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's
 
 
@@ -56,15 +57,22 @@ def state(s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
         _quintic(s.n, s.end, w, theta, s.hs, out)
 
 
+@inlined
+def long_for_rows(s: Any) -> bool:
+    """Whether the step is an implicit one, or an explicit one close to its limit of stability."""
+    return bool(s.method == IMPLICIT or (s.method == EXPLICIT and s.hs * s.row_rate > RESOLVED))
+
+
 @compiled
 def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
-    """Move out = (q, v), at the part theta of an implicit step, to where the active rows' law has their gaps.
+    """Move out = (q, v), at the part theta of a step that is long for the rows, to where their law has their gaps.
 
-    A gap under a linear law is known in closed form whatever the masses do. An implicit step knows it to the tolerance
-    only, and the interpolant across curved rows no better: times a0 that drowns the multiplier of a stiff row. The
-    correction is the least one in the metric of M. Rows with a cubic term that counts are left as they are.
+    A gap under a linear law is known in closed form whatever the masses do. A long step knows it to the tolerance only,
+    and the interpolant across curved rows no better: times a0 that drowns the multiplier of a stiff row, and its root
+    is the rate of a row that is let go from rest and falls back. The correction is the least one in the metric of M.
+    Rows with a cubic term that counts are left as they are.
     """
-    if s.method != IMPLICIT or s.na == 0 or not exact.is_linear(s, w):
+    if not long_for_rows(s) or s.na == 0 or not exact.is_linear(s, w):
         return
     q, v = out[: s.n], out[s.n :]
     t = theta * s.hs

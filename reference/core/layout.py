@@ -86,6 +86,7 @@ STATE = np.dtype(
         ("trial_rhs", "i8"),
         ("trial_t", "f8"),
         ("explicit_rate", "f8"),
+        ("row_rate", "f8"),  # fastest pole of the active rows, at an explicit step's start
         ("have_jacobian", "i8"),
         ("full_jacobian", "i8"),
         ("jacobian_scale", "f8"),

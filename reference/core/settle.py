@@ -17,7 +17,7 @@ from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
 TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
-SAME_CHANGE = 1e-9  # part by which a change of v' must be larger to count as such: rounding does not choose
+SAME_CHANGE = 1e-9  # part by which changes of v' may differ and count as equal: rounding does not choose
 SWITCH_ROUNDS = 32  # switches that follow one another at one instant
 
 
@@ -44,23 +44,25 @@ def _want(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
 
 @inlined
 def _keep_strongest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
-    """Of the rows that want to switch let one: any that only changes its name, else the one that changes v' most."""
-    strongest, most = -1, -1.0
+    """Of the rows that want to switch let those that only change their name, else those that change v' most.
+
+    Rows that change it equally switch together, so that their order does not choose. The changes stand in w.hit.
+    """
+    most = -1.0
     for i in range(s.nc):
         if w.struck[i] != b.mode[i]:
-            size = np.inf
+            w.hit[i] = np.inf
             if is_active(b.mode[i]) or is_active(w.struck[i]):
-                size = change_of_acceleration(K, s, m, w, b.mode, i)
-            if size > most * (1.0 + SAME_CHANGE) or strongest < 0:
-                strongest, most = i, size
+                w.hit[i] = change_of_acceleration(K, s, m, w, b.mode, i)
+            most = max(most, w.hit[i])
     for i in range(s.nc):
-        if i != strongest:
+        if w.struck[i] != b.mode[i] and not w.hit[i] >= most * (1.0 - SAME_CHANGE):
             w.struck[i] = b.mode[i]
 
 
 @inlined
 def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Switch every row that wants to (only one once all together repeated); how many did.
+    """Switch every row that wants to (only the strongest once all together repeated); how many did.
 
     All are judged before any is switched, so that the order of the rows does not matter.
     """

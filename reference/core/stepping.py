@@ -48,6 +48,16 @@ def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
 
 
 @inlined
+def _finite_mass(s: Any, w: Work) -> bool:
+    """Whether M is finite where nothing reads it: above the diagonal of its blocks."""
+    total = 0.0
+    for i in range(s.n if s.k > 1 else 0):
+        for j in range(i % s.k + 1, s.k):
+            total += w.M[i, j] - w.M[i, j]
+    return total == 0.0
+
+
+@inlined
 def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Evaluate the end of the step, derivative, multipliers, gaps, and check it."""
     n = s.n
@@ -67,7 +77,7 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     copy(w.lam0, w.lams[0])
     if not (all_finite(w.gaps[last]) and all_finite(w.rates[last]) and all_finite(w.lams[last])):
         return NOT_FINITE
-    if not all_finite(w.k[end]):
+    if not all_finite(w.k[end]) or not _finite_mass(s, w):
         return NOT_FINITE
     y1 = w.y1
     for i in range(2 * n):
@@ -93,8 +103,9 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     clipped = False
     rejected = False
     ill = 0
+    longest = choice.longest_step(s, w)
     for _ in range(MAX_REJECTIONS):
-        h = min(s.h, s.h_max)
+        h = min(s.h, longest)
         left = s.stop - s.t
         clipped = h >= left or left - h < 0.01 * h
         if clipped:

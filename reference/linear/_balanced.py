@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._arrays import frozen
+from crossbody.cases._arrays import frozen, full
+from crossbody.reference._entry_points import LARGEST, checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.linear._derivatives import STEP, Point, dense, residual, terms
 from crossbody.reference.linear._unmeasured import Estimate, Record, Unknown, input_columns
 
 
+@checked_arguments
 def balanced(
     system: System, t: ArrayLike, q: ArrayLike, v: ArrayLike, vd: ArrayLike, u: ArrayLike | None = None, *,
     unknown: Unknown, active: Sequence[int] | None = None, std_q: ArrayLike = 0.0, std_v: ArrayLike = 0.0,
@@ -43,9 +45,12 @@ def balanced(
     record = Record(system, t, u, unknown, active)
     n, na = system.n, len(record.held)
     Q, V, VD = (frozen("balanced", k, x, (len(record.t), n)) for k, x in (("q", q), ("v", v), ("vd", vd)))
-    spread = np.concatenate([np.broadcast_to(np.asarray(s, dtype=float), n) for s in (std_q, std_v, std_vd)])
-    inputs = np.broadcast_to(np.asarray(std_u, dtype=float), system.inputs)
-    if not (spread.any() or inputs.any()):
+    stated = (("std_q", std_q), ("std_v", std_v), ("std_vd", std_vd))
+    spread = np.concatenate([full("balanced", name, value, n) for name, value in stated])
+    inputs = full("balanced", "std_u", std_u, system.inputs)
+    if not np.all((whole := np.concatenate([spread, inputs])) >= 0.0) or not np.all(whole <= LARGEST):
+        raise InvalidValue(f"balanced: deviations are {whole.tolist()}; valid: 0 to {LARGEST:g}.")
+    if not whole.any():
         raise InvalidValue("balanced: give the deviation of at least one of q, v, vd, u.")
     found, covariance = np.zeros((len(Q), na + len(unknown))), np.zeros((len(Q), na + len(unknown), na + len(unknown)))
     for k in range(len(Q)):
@@ -53,7 +58,7 @@ def balanced(
         E, e, M = _imbalance(at, record, VD[k])
         first: Floats = np.linalg.lstsq(E, e, rcond=None)[0].astype(np.float64)
         J = _noise_paths(at, record, VD[k], first, M)
-        W = J * np.concatenate([spread, inputs])
+        W = J * whole
         left, size, _ = np.linalg.svd(W @ W.T)
         whiten = left.T / np.sqrt(np.maximum(size, 1e-12 * size[0]))[:, None]
         pinv = np.linalg.pinv(whiten @ E)

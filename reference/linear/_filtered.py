@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._arrays import frozen
+from crossbody.cases._arrays import frozen, full
+from crossbody.reference._entry_points import LARGEST, checked_arguments, different
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.linear._kalman import Filter
@@ -16,6 +17,7 @@ from crossbody.reference.linear._linearise import point
 from crossbody.reference.linear._unmeasured import Estimate, Record, Unknown
 
 
+@checked_arguments
 def filtered(
     system: System, t: ArrayLike, y: ArrayLike, u: ArrayLike | None = None, *, unknown: Unknown,
     measured: Sequence[int], std_y: ArrayLike, q0: ArrayLike, v0: ArrayLike | None = None, std_force: ArrayLike,
@@ -47,17 +49,19 @@ def filtered(
     """
     record = Record(system, t, u, unknown, active)
     Y = frozen("filtered", "y", y, (len(record.t), len(measured)))
-    noise = np.broadcast_to(np.asarray(std_y, dtype=float), len(measured))
-    strength = np.broadcast_to(np.asarray(std_force, dtype=float), len(unknown))
-    _check_positive(std_y=noise, std_force=strength, time_force=np.array([time_force]))
+    noise = full("filtered", "std_y", std_y, len(measured))
+    strength = full("filtered", "std_force", std_force, len(unknown))
+    times = np.array([time_force, std_q0, std_v0])
+    _check_positive(**{"std_y": noise, "std_force": strength, "time_force, std_q0, std_v0": times})
     if np.any(np.diff(record.t) <= 0.0):
         raise InvalidValue("filtered: the instants t must increase.")
     start = point(system, q0, v0, None, record.held.tolist(), float(record.t[0]))
-    run = Filter(record, start, np.asarray(measured, dtype=np.int64), noise, strength, time_force, (std_q0, std_v0))
+    places = different("filtered.measured", measured, system.n)
+    run = Filter(record, start, places, noise, strength, time_force, (std_q0, std_v0))
     return run.through(Y, smooth)
 
 
 def _check_positive(**given: Floats) -> None:
     for name, values in given.items():
-        if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
-            raise InvalidValue(f"filtered: {name} is {values.tolist()}; it must be finite and above 0.")
+        if not (np.all(values > 0.0) and np.all(values <= LARGEST)):
+            raise InvalidValue(f"filtered: {name} is {values.tolist()}; it must be above 0, and at most {LARGEST:g}.")

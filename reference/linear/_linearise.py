@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError, UnknownName
 from crossbody.cases._arrays import frozen
+from crossbody.reference._entry_points import checked_arguments, different
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._analytic import check_analytic
@@ -18,6 +19,7 @@ from crossbody.reference.linear._model import LinearModel
 OUTPUTS = ("q", "v", "gap", "lam")
 
 
+@checked_arguments
 def linearise(
     system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
     active: Sequence[int] | None = None, *, outputs: Sequence[str] = OUTPUTS, reduce: bool = False,
@@ -78,9 +80,8 @@ def point(
         SceneError: for a state of another shape, rows that do not exist, rows that collide without being on, or
             kernels that are not analytic.
     """
-    rows = np.flatnonzero(np.asarray(system.unilateral) == 0) if active is None else np.asarray(active, dtype=np.int64)
-    if np.any(rows < 0) or np.any(rows >= system.nc) or len(np.unique(rows)) != len(rows):
-        raise SceneError(f"linearise.active is {rows.tolist()}; valid: different rows below {system.nc}.")
+    on = np.flatnonzero(np.asarray(system.unilateral) == 0).tolist() if active is None else active
+    rows = different("active", on, system.nc)
     if not set(colliding) <= set(rows.tolist()):
         raise SceneError(f"linearise.colliding is {list(colliding)}; valid: rows of those on, {rows.tolist()}.")
     alpha = np.array(system.alpha)
@@ -88,9 +89,7 @@ def point(
     inputs: Floats = np.array(frozen("linearise", "u", np.zeros(system.inputs) if u is None else u, (system.inputs,)))
     q, v = system.checked_state("q", q), system.checked_state("v", np.zeros(system.n) if v is None else v)
     check_analytic(system, t, q, v, inputs)
-    return Point(
-        system=system, t=t, q=q, v=v, u=inputs, active=rows.astype(np.int64), alpha=alpha if len(colliding) else None
-    )
+    return Point(system=system, t=t, q=q, v=v, u=inputs, active=rows, alpha=alpha if len(colliding) else None)
 
 
 def _outputs(

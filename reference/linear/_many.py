@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
 from crossbody.cases._arrays import frozen
+from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear import _compiled
@@ -43,6 +44,7 @@ class Tangents:
     well_posed: Array
 
 
+@checked_arguments
 def tangents(
     system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
     active: Sequence[int] | None = None, *, t: float = 0.0, threads: int | None = None,

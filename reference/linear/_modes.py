@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
+from crossbody.cases._arguments import instance
+from crossbody.cases._arrays import frozen, is_number
+from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference.linear._model import Complex, LinearModel
 
@@ -45,6 +48,7 @@ class Modes:
         return ratio
 
 
+@checked_arguments
 def modes(model: LinearModel) -> Modes:
     """Poles and eigenvectors; those of a defective eigenvalue nearly coincide."""
     values, right = np.linalg.eig(model.A)
@@ -80,12 +84,14 @@ def _span(columns: Floats, known: Floats, scale: float, tolerance: float) -> Flo
     return kept
 
 
+@checked_arguments
 def controllable(model: LinearModel, tolerance: float = RANK) -> int:
     """Number of states that the inputs reach; states are scaled to like sizes first."""
     scale = _scales(model.A)
     return int(reached(model.A * scale / scale[:, None], model.B / scale[:, None], tolerance).shape[1])
 
 
+@checked_arguments
 def observable(model: LinearModel, tolerance: float = RANK) -> int:
     """Number of states that the outputs show."""
     scale = _scales(model.A)
@@ -118,6 +124,7 @@ class Locus:
         return largest
 
 
+@checked_arguments
 def locus(build: Callable[[float], LinearModel], values: Sequence[float] | ArrayLike) -> Locus:
     """Poles of build(value) at every value, joined to branches so that neighbours lie as near as they can.
 
@@ -126,12 +133,12 @@ def locus(build: Callable[[float], LinearModel], values: Sequence[float] | Array
     """
     from scipy.optimize import linear_sum_assignment
 
-    grid = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    grid: Floats = frozen("locus", "values", [values] if is_number(values) else values, (None,))
     if not len(grid):
         raise InvalidValue("locus: values is empty; give the values of the parameter.")
     found: list[Array] = []
     for value in grid.tolist():
-        poles = build(value).poles()
+        poles = instance("What locus.build returns", build(value), LinearModel, "a LinearModel").poles()
         if found and len(poles) != len(found[0]):
             raise InvalidValue(f"locus: the model has {len(poles)} states at {value:g} and {len(found[0])} before.")
         if found:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError
+from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear import _held
@@ -45,6 +46,7 @@ class Poses:
         return largest
 
 
+@checked_arguments
 def poses(
     system: System, q: ArrayLike, hold: Sequence[int], active: Sequence[int] | None = None, *,
     u: ArrayLike | None = None, t: float = 0.0, threads: int | None = None,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
+from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
@@ -86,6 +87,7 @@ class Sensitivity:
         return found[np.argsort(-np.abs(found))]
 
 
+@checked_arguments
 def sensitivity(
     system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, *, parameters: Sequence[str] = (),
     u: ArrayLike | None = None, rtol: float = 1e-11, collisions: str = "sequential", max_steps: int = 1_000_000,

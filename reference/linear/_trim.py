@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import Outcome
+from crossbody.reference._entry_points import checked_arguments, different
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._derivatives import STEP, Point, terms
@@ -42,6 +43,7 @@ class Trim:
     pulling: tuple[int, ...]
 
 
+@checked_arguments
 def trim(
     system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
     active: Sequence[int] | None = None, *, free: Sequence[int] | None = None, rates: Sequence[int] = (),
@@ -68,8 +70,9 @@ def trim(
     """
     at = point(system, q, v, u, active, t)
     n, nu, na = system.n, system.inputs, len(at.active)
-    moved = [*(range(n) if free is None else free), *(n + i for i in rates), *(2 * n + i for i in inputs)]
-    unknown = np.array([*moved, *range(2 * n + nu, 2 * n + nu + na)], dtype=np.int64)
+    places = different("trim.free", range(n) if free is None else free, n)
+    moved = [places, n + different("trim.rates", rates, n), 2 * n + different("trim.inputs", inputs, nu)]
+    unknown = np.concatenate([*moved, np.arange(2 * n + nu, 2 * n + nu + na)])
     x = np.concatenate([at.q, at.v, at.u, np.zeros(na)])
     x[2 * n + nu :] = _multipliers(at, x)
     outcome, left, force = _solved(at, x, unknown)

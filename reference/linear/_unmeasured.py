@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases._arrays import frozen
+from crossbody.reference._entry_points import different, wholes
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._derivatives import STEP, Point, terms
@@ -58,6 +59,11 @@ class Unknown:
     inputs: tuple[int, ...] = ()
     rows: tuple[int, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Check that both name whole numbers."""
+        for name in ("inputs", "rows"):
+            object.__setattr__(self, name, wholes(f"Unknown.{name}", getattr(self, name)))
+
     def __len__(self) -> int:
         """Number of forces."""
         return len(self.inputs) + len(self.rows)
@@ -73,7 +79,10 @@ class Record:
         self.t = frozen("estimate", "t", t, (None,))
         given = np.zeros((len(self.t), system.inputs)) if u is None else u
         self.u = frozen("estimate", "u", given, (len(self.t), system.inputs))
-        on = np.flatnonzero(np.asarray(system.unilateral) == 0).tolist() if active is None else list(active)
+        on = np.flatnonzero(np.asarray(system.unilateral) == 0).tolist() if active is None else active
+        different("active", on, system.nc)
+        different("unknown.rows", unknown.rows, system.nc)
+        different("unknown.inputs", unknown.inputs, system.inputs)
         self.held: Index = np.array([i for i in on if i not in unknown.rows], dtype=np.int64)
         self.all: Index = np.concatenate([self.held, np.array(unknown.rows, dtype=np.int64)])
 

@@ -1,13 +1,15 @@
 """One smooth arc between two events: CVODE on the reduced equations, or IDA on the DAE.
 
     cvode            q' = v, v' from the KKT matrix
-    ida, index 1     q' = v, M v' = f + H_A^T lam_A, active rows H v' + H' v + a1 h' + a0 h + a2 h^3 = 0, else lam = 0
+    ida, index 1     q' = v, M v' = f + H_A^T lam_A, active rows H M^-1 (f + H_A^T lam_A) + H' v + a1 h' + a0 h + a2 h^3
+                     = 0, else lam = 0; the multipliers are out of the error control
     ida, index 3     for bilateral rows h = 0 in the stabilised form of index 2 (Gear, Leimkuhler and Gupta 1985):
                      q' = v + H^T mu, h = 0, H v = 0; unilateral rows keep their law
 
 The work of rows, inputs and damping is integrated beside the motion (z), in the same error control. SUNDIALS' own root
 finding sees changes of sign between the ends of its steps alone: it is not used. Every step is examined on the solver's
-dense output (`roots`), unless a bound says that no guard can fire inside it (`evaluation`).
+dense output (`roots`), unless a bound says that no guard can fire inside it (`evaluation`). That bound stands in the
+place of a root function, so that the library goes on by itself: it is zero at the end of a step that needs a look.
 """
 
 from __future__ import annotations
@@ -34,13 +36,13 @@ CHUNK = 500  # internal steps between two looks at the clock
 TOO_MUCH_WORK = -1
 ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
 STALLED, DAMPED = 200, 0.3  # steps bound by stability; damping ratio: beyond both the arc is stiff
-UNWATCHED = 1e6  # in units of a multiplier's size: at index 2 errors of lam are errors of the motion over the step
-LOOSE = 1e3  # the same at index 1, where they are those of the motion times a0: they must not steer the step
+UNWATCHED = 1e6  # N: multipliers follow from the state; at index 2 their errors are errors of the motion over the step
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 FAR = 1e30  # beyond this a motion has diverged
 SAME_INSTANT = 8.0 * ULP
 NOISY = 64.0  # rounding of a multiplier along a step, in units of its bound at the start
 MOST_TERMS = 5  # of the guards of one row
+ENDLESS = 2**62
 
 
 @dataclass(slots=True)
@@ -107,20 +109,27 @@ class Arc:
         start: where the arc begins.
         view: what holds there.
         longest: bound on the step, s.
+        single: whether every step is asked for: the solver never goes on by itself.
     """
 
-    def __init__(self, scene: Scene, start: State, view: View, longest: float) -> None:
+    def __init__(self, scene: Scene, start: State, view: View, longest: float, single: bool) -> None:
         self.scene, self.options, self.n = scene, scene.options, scene.equations.system.n
+        self.single, self.fresh = single, True
         self.guards = [*scene.machine.guards, *scene.discrete.watched()]
         scene.looks.begin(self.guards, scene.machine.frozen)
         self.ask = scene.looks.ask
         scene.work["clock"][:2] = -np.inf, _damped_pole(scene.equations)
-        scene.work["count"][2] = 0
-        self.common = {
+        scene.work["count"][2:] = 0, ENDLESS, 0
+        left = max(1, self.options.max_steps - scene.steps)
+        self.common: dict[str, Any] = {
             "rtol": SHARE * self.options.rtol,
-            "max_num_steps": CHUNK,
+            "max_num_steps": min(CHUNK, left),
             "max_step": longest if np.isfinite(longest) else 0.0,
         }
+        self.events = None if single or not self.guards else self._events()
+        if self.events is not None:
+            self.events.terminal, self.events.direction = (True,), (0,)
+            self.common |= {"eventsfn": self.events, "num_events": 1}
         self.solver, y = self._begin(start, view)
         self.t0, self.t1, self.y0, self.y1 = start.t, start.t, y, y
         self._defect: Floats | None = None
@@ -152,19 +161,29 @@ class Arc:
         share = SHARE * self.options.tolerance
         return np.concatenate([np.full(2 * self.n, share), np.full(self.scene.nz, share * self.scene.scale)])
 
-    def step(self, stop: float) -> tuple[State, Fired]:
-        """Go on by one step of the solver's own, never beyond `stop`, or to the first guard that fires inside it.
+    def _events(self) -> Any:
+        """The bound in the place of a root function, in the form that the library calls."""
+        raise NotImplementedError
+
+    def step(self, stop: float, target: float) -> tuple[State, Fired]:
+        """Go on to the first guard that fires, or to `target` or earlier; by one step if the arc is single or new.
+
+        A step never goes beyond `stop`.
 
         Raises:
             Ended: with the outcome if the solver gives up.
         """
-        done = self.solver.step(stop, "onestep", stop)
+        alone = self.single or self.fresh
+        self.fresh = False
+        done = self.solver.step(stop if alone else target, "onestep" if alone else "normal", stop)
         if done.status < 0 and done.status != TOO_MUCH_WORK:
             raise Ended(Outcome.STEP_TOO_SMALL)
         self._check(done.y)
-        self.t0, self.y0, self.t1, self.y1 = self.t1, self.y1, float(done.t), done.y
-        self._defect = None
-        t, fired = self._examine()
+        if self.events is not None:
+            for found in vars(self.events).values():
+                if isinstance(found, list):  # the library keeps all that it stopped at
+                    found.clear()
+        t, fired = self._examine(float(done.t), done.y)
         return self.at(t), fired
 
     def _check(self, y: Floats) -> None:
@@ -172,14 +191,16 @@ class Arc:
         if not size < FAR**2:
             raise Ended(Outcome.DIVERGED if np.isfinite(y).all() else Outcome.NOT_FINITE)
 
-    def _examine(self) -> tuple[float, Fired]:
-        """The end of the step, or the first instant inside it at which guards fire, and these."""
-        t1 = self.t1
-        if not self.guards or t1 <= self.t0:
-            self.ask(evaluation.BEGIN, t1, self.y1)
-            return t1, Fired([], [])
-        left = self.ask(evaluation.SCAN, t1, self.y1)
-        return self._search() if left else (t1, Fired([], []))
+    def _examine(self, t: float, y: Floats) -> tuple[float, Fired]:
+        """The end of the last step, or the first instant inside it at which guards fire, and these."""
+        work = self.scene.work
+        if t > work["clock"][2]:  # the library has not asked
+            self.ask(evaluation.SCAN if self.guards else evaluation.BEGIN, t, y)
+        self.t1, self.t0 = work["clock"][2:].tolist()
+        self.y1, self._defect = y, None
+        self.y0 = work["ends"][0, : len(y)].copy()
+        left, work["count"][4] = work["count"][4], 0
+        return self._search() if left else (t, Fired([], []))
 
     def _search(self) -> tuple[float, Fired]:
         """The first of the guards that may fire inside the step, and all that fire with it."""
@@ -233,6 +254,15 @@ class CvodeArc(Arc):
 
     method = "Adams"
 
+    def _events(self) -> Any:
+        call, lines, equations = self.scene.looks.call, self.scene.looks.lines, self.scene.equations
+
+        def events(t: float, y: Floats, out: Floats) -> None:
+            if code := call(evaluation.WATCHED, t, y, out, lines):
+                raise Ended(ENDS[-code], equations.active)
+
+        return events
+
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
         scene, call, lines = self.scene, self.scene.looks.call, self.scene.looks.lines
 
@@ -240,6 +270,8 @@ class CvodeArc(Arc):
             if code := call(evaluation.DERIVATIVE, t, y, yp, lines):
                 raise Ended(ENDS[code], scene.equations.active)
 
+        if self.method == "Adams":
+            scene.work["count"][3] = STALLED
         order = {"max_order": ORDER_IN_CONTACT if scene.equations.active else ORDER} if self.method == "Adams" else {}
         solver = CVODE(rhs, method=self.method, atol=self._tolerances(), **self.common, **order)
         y = np.concatenate([start.q, start.v, start.z])
@@ -260,37 +292,53 @@ class BdfArc(CvodeArc):
 class IdaArc(Arc):
     """IDA on (q, v, lam), with the multipliers mu of the stabilised form where bilateral rows are rigid."""
 
+    def _events(self) -> Any:
+        call, lines, equations = self.scene.looks.call, self.scene.looks.lines, self.scene.equations
+
+        def events(t: float, y: Floats, yp: Floats, out: Floats) -> None:
+            if code := call(evaluation.WATCHED, t, y, out, lines):
+                raise Ended(ENDS[-code], equations.active)
+
+        return events
+
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
-        n, nc, e = self.n, self.scene.equations.system.nc, self.scene.equations
+        n, nc, nz, e = self.n, self.scene.equations.system.nc, self.scene.nz, self.scene.equations
         bilateral = ~np.asarray(e.system.unilateral, dtype=bool)
         self.rigid = np.flatnonzero(bilateral).tolist() if self.options.index == 3 else []
         nb = len(self.rigid)
         self.lam, self.mu = slice(2 * n, 2 * n + nc), slice(2 * n + nc, 2 * n + nc + nb)
         self.work = slice(2 * n + nc + nb, None)
-        self.q, self.v = start.q.copy(), start.v.copy()
-        count, clock = self.scene.work["count"], self.scene.work["clock"]
+        looks = self.scene.looks
+        call, lines, slopes = looks.call, looks.lines, looks.work["slopes"][: 2 * n + nc + nb + nz]
+        looks.work["rigid"][:] = -1
+        looks.work["rigid"][self.rigid] = range(nb)
+        looks.work["scale"][e.active] = self._masses(start)
 
         def residual(t: float, y: Floats, yp: Floats, out: Floats) -> None:
-            self.q[:], self.v[:] = y[:n], y[n : 2 * n]
-            if t != clock[0]:
-                count[1] += 1
-                clock[0] = t
-            self._residual(t, y, yp, out)
+            slopes[:] = yp
+            if code := call(evaluation.RESIDUAL, t, y, out, lines):
+                raise Ended(ENDS[code], e.active)
 
-        share, size = SHARE * self.options.rtol, np.where(view.size > 0.0, view.size, 1.0)
         own = self._tolerances()
-        atol = np.concatenate(
-            [own[: 2 * n], share * size * (UNWATCHED if self.rigid else LOOSE), np.full(nb, UNWATCHED), own[2 * n :]]
-        )
+        atol = np.concatenate([own[: 2 * n], np.full(nc + nb, UNWATCHED), own[2 * n :]])
         solver = IDA(
             residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), first_step=self._first_step(),
             **self.common,
         )  # fmt: skip
-        powers = e.powers(start.t, start.q, start.v, view.lam) if self.scene.nz else np.zeros(0)
+        powers = e.powers(start.t, start.q, start.v, view.lam) if nz else np.zeros(0)
         zero = np.zeros(nb)
         y = np.concatenate([start.q, start.v, view.lam, zero, start.z])
         solver.init_step(start.t, y, np.concatenate([start.v, view.vd, np.zeros(nc), zero, powers]))
         return solver, y
+
+    def _masses(self, start: State) -> Floats:
+        """What a row moves, 1 / (H M^-1 H^T)_ii, of the active rows: its equation is one of forces then."""
+        e = self.scene.equations
+        if not e.active:
+            return np.zeros(0)
+        H, X = e.mobility(start.t, start.q, start.v, e.active)
+        masses: Floats = 1.0 / np.einsum("ij,ji->i", H, X)
+        return masses
 
     def _first_step(self) -> float:
         """0 to let IDA guess; at index 2 its guess is so short that it sees rounding over the step and nothing else."""
@@ -300,28 +348,7 @@ class IdaArc(Arc):
         fastest = max(1.0, float(np.sqrt(a0).max()), float(a1.max()))
         return float(CAUTIOUS * np.sqrt(SHARE * self.options.rtol) / fastest)
 
-    def _residual(self, t: float, y: Floats, yp: Floats, out: Floats) -> None:
-        n, e, q, v = self.n, self.scene.equations, self.q, self.v
-        lam, vd = y[self.lam], yp[n : 2 * n]
-        M, f = e.terms(t, q, v)
-        H, h, Hdv = e.rows(t, q, v)
-        out[:n] = yp[:n] - v
-        out[n : 2 * n] = M @ vd - f - H.T @ lam[e.active]
-        rows = out[self.lam]
-        rows[:] = lam
-        rows[e.active] = H @ vd + Hdv + e.drive(h, H @ v)
-        if len(self.rigid):
-            places = [e.active.index(i) for i in self.rigid]
-            out[:n] -= H[places].T @ y[self.mu]
-            rows[self.rigid] = h[places]
-            out[self.mu] = H[places] @ v
-        if self.scene.nz:
-            smooth = e.accelerate(t, q, v)[1] if self.rigid else lam
-            out[self.work] = yp[self.work] - e.powers(t, q, v, smooth)
-        if not np.isfinite(out).all():
-            raise Ended(Outcome.NOT_FINITE)
-
     def _state(self, t: float, y: Floats) -> State:
         n = self.n
-        # At index 1 lam follows from the state; what is integrated of it is held to a loose tolerance.
+        # At index 1 lam follows from the state.
         return State(t, y[:n], y[n : 2 * n], y[self.work], y[self.lam] if self.rigid else None)

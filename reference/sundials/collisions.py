@@ -108,19 +108,23 @@ def _captured(e: Equations, t: float, q: Floats, v: Floats, now: Touching, i: in
 def _pushing(e: Equations, t: float, q: Floats, v: Floats, rows: list[int], change: Floats) -> tuple[list[int], Floats]:
     """The rows that push when their rates change so, and the impulses (len(rows),), 0 for every other.
 
+    A row that follows another may pull, and leaves with it.
+
     Raises:
         Ended: ILL_POSED if these rows are dependent.
     """
     H, X = e.mobility(t, q, v, rows)
     G, kept, P = H @ X, list(range(len(rows))), np.zeros(len(rows))
-    may_pull = ~np.asarray(e.system.unilateral, dtype=bool)[rows]
+    follows = np.asarray(e.system.follows)[rows]
+    may_pull = ~np.asarray(e.system.unilateral, dtype=bool)[rows] | (follows >= 0)
     while True:
         P[:] = 0.0
         P[kept] = np.linalg.solve(G[np.ix_(kept, kept)], change[kept])
         pulling = [j for j in kept if not may_pull[j] and P[j] < -NONE * np.abs(P).max()]
         if not pulling:
             return [rows[j] for j in kept], P
-        kept.remove(min(pulling, key=lambda j: float(P[j])))
+        worst = min(pulling, key=lambda j: float(P[j]))
+        kept = [j for j in kept if j != worst and follows[j] != rows[worst]]
 
 
 def _jump(

@@ -144,7 +144,7 @@ class Equations:
         """Let the sampled controller set the inputs."""
         self.system.control(t, q, v, self.u, self.memory, self.p)
 
-    def noise(self, t: float, q: Floats, v: Floats, speed: float = 0.0) -> tuple[Floats, Floats]:
+    def noise(self, t: float, q: Floats, v: Floats, speed: float = 0.0, error: float = 0.0) -> tuple[Floats, Floats]:
         """What rounding may make of each active multiplier, and the size that it has or may take (nc,), N.
 
         Args:
@@ -152,6 +152,7 @@ class Equations:
             q: positions (n,).
             v: velocities (n,).
             speed: rate at which gaps may close, m/s.
+            error: of positions and velocities, beside their rounding.
 
         Raises:
             Ended: ILL_POSED if the active rows are dependent.
@@ -167,7 +168,8 @@ class Equations:
         law, rate = self.law[self.active], H @ v
         spring = np.abs((law[:, 0] + law[:, 2] * h * h) * h)
         terms = np.abs(H @ X[:, -1]) + np.abs(Hdv) + law[:, 1] * np.abs(rate) + spring
-        state = 8.0 * ULP * (law[:, 0] * np.abs(q).max() + law[:, 1] * np.abs(v).max())
+        off_q, off_v = (error + 8.0 * ULP * float(np.abs(x).max()) for x in (q, v))
+        state = law[:, 0] * off_q + law[:, 1] * off_v
         noise[self.active] = (ROUNDING * terms + state) / np.diag(G)
         size[self.active] = (terms + np.sqrt(law[:, 0]) * np.maximum(np.abs(rate), speed)) / np.diag(G)
         return noise, size
@@ -202,6 +204,12 @@ class Equations:
         finally:
             self.active, self._index[: len(active)] = active, active
             self._H[:] = 0.0
+
+    def held(self, t: float, q: Floats, v: Floats, rows: list[int]) -> tuple[Floats, Floats]:
+        """M (n, n), a view that the next call overwrites, and H (m, n) of the given rows, active or not."""
+        with self._selected(rows):
+            M, _ = self.terms(t, q, v)
+            return M, self.rows(t, q, v)[0].copy()
 
     def mobility(self, t: float, q: Floats, v: Floats, rows: list[int]) -> tuple[Floats, Floats]:
         """H (m, n) of the given rows, active or not, and M^-1 H^T (n, m).

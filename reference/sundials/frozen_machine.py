@@ -17,10 +17,9 @@ from crossbody.cases import Mode, Outcome
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.sundials.collisions import RULES, Jump, Touching
-from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
-from crossbody.reference.sundials.level_machine import DEEP, SLOW, LevelMachine, View, Watch
+from crossbody.reference.sundials.equations import ACTIVE, Ended, Equations
+from crossbody.reference.sundials.level_machine import DEEP, SLOW, TOUCH, LevelMachine, View, Watch
 
-TOUCH = 64.0 * ULP  # of the largest position, at least 1: a gap this small is closed
 LOCATED = 0.5  # of the least speed of approach: one that was located is not lost to rounding
 FEW, A_PAIR = 1000, 2  # collisions at one instant; a chain of n equal bodies needs n (n - 1) / 2
 
@@ -96,7 +95,7 @@ class FrozenMachine(LevelMachine):
                 break
             self._seen.clear()  # v is another: a mode set may stand again
             self._one_by_one = False
-        self._arm(view, q)
+        self._arm(view, t, q, v)
         self._located.clear()
         return view
 
@@ -113,6 +112,7 @@ class FrozenMachine(LevelMachine):
         e, rate = self.equations, view.rate
         pressing = [i for i in e.active if not self.switching[i] or view.lam[i] > view.noise[i]]
         held = [i for i in pressing if self.follows[i] < 0]
+        held += [i for i in e.active if self.follows[i] in held]  # their laws keep their rates as well
         touching = [i for i in sorted(self.frozen) if i not in held and self._touches(i, float(view.gap[i]), q)]
         closing = [i for i in touching if self._approaches(i, float(rate[i]))]
         approaching = closing if any(self.modes[i] not in ACTIVE for i in closing) else []
@@ -137,6 +137,7 @@ class FrozenMachine(LevelMachine):
         for i in jump.impulses:
             self._switch(t, i, Mode.COLLISION)
         for i in jump.dropped:
-            self._switch(t, i, self._parted(i, view))
+            if self.follows[i] < 0:
+                self._switch(t, i, self._parted(i, view))
         for i, impulse in jump.impulses.items():
             self._switch(t, i, Mode.CONTACT if i in jump.captured else self._parted(i, view), impulse)

@@ -24,9 +24,10 @@ from crossbody.reference.sundials.compiled.evaluation import Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 
 SLOW, DEEP = 1e-9, 1e-9
+TOUCH = 64.0 * ULP  # of the largest position, at least 1: a gap this small is closed
 SAME_INSTANT = 8.0 * ULP
 SIDES = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))  # |x| + |y| <= z: so for each choice of signs
-SAME_CHANGE = 1e-9  # part by which a change of v' must be larger to count as such
+SAME_CHANGE = 1e-9  # part by which changes of v' may differ and count as equal
 
 
 class Watch(IntEnum):
@@ -83,10 +84,11 @@ class LevelMachine:
         guards: of all rows, as the last `settle` left them.
         deep: depth beyond which a gap that does not close was started in penetration, m.
         work (nc,): done by the impulses of every row so far, J.
+        error: of the integrator's state along a step; times a0 it moves the multiplier of a row that has just let go.
     """
 
     def __init__(self, system: System, equations: Equations) -> None:
-        self.equations = equations
+        self.equations, self.error = equations, 0.0
         self.follows = np.asarray(system.follows).tolist()
         self.switching = np.asarray(system.unilateral, dtype=bool).tolist()
         self.rows = [i for i in range(system.nc) if self.switching[i] and self.follows[i] < 0]
@@ -135,13 +137,13 @@ class LevelMachine:
         vd, lam = e.accelerate(t, q, v)
         return View(gap, rate, vd, lam, noise, size)
 
-    def pressure(self, i: int, t: float, q: Floats, v: Floats) -> tuple[float, float]:
-        """Multiplier of row i if it were active now, and its noise; -inf if that is ill posed."""
+    def pressure(self, i: int, t: float, q: Floats, v: Floats, error: float = 0.0) -> tuple[float, float]:
+        """Multiplier of row i if it were active now, and its noise; -inf if ill posed. `error` is that of `noise`."""
         trial = list(self.modes)
         trial[i] = self._active_mode(i)
         self._activate(trial)
         try:
-            noise, _ = self.equations.noise(t, q, v)
+            noise, _ = self.equations.noise(t, q, v, error=error)
             _, lam = self.equations.accelerate(t, q, v)
             return float(lam[i]), float(noise[i])
         except Ended:
@@ -202,19 +204,18 @@ class LevelMachine:
             Ended: MODE_CYCLE naming the rows, or what the equations raise.
         """
         view = self._switch_rows(t, q, v)
-        self._arm(view, q)
+        self._arm(view, t, q, v)
         return view
 
     def _switch_rows(self, t: float, q: Floats, v: Floats) -> View:
-        """All rows together, judged by one mode set; one at a time, the strongest, once a mode set has repeated."""
+        """All rows together, judged by one mode set; only the strongest once a mode set has repeated."""
         changed: set[int] = set()
         self._repeats(t)
         while True:
             view = self.look(t, q, v)
             wanted = {i: after for i in self.rows if (after := self._wanted(i, view, t, q, v)) != self.modes[i]}
             if self._one_by_one and len(wanted) > 1:
-                strongest = self._strongest(wanted, t, q, v)
-                wanted = {strongest: wanted[strongest]}
+                wanted = {i: wanted[i] for i in self._strongest(wanted, t, q, v)}
             for i, after in wanted.items():
                 self._switch(t, i, after)
             changed.update(wanted)
@@ -227,15 +228,13 @@ class LevelMachine:
                 self._seen.clear()
                 changed.clear()
 
-    def _strongest(self, wanted: dict[int, Mode], t: float, q: Floats, v: Floats) -> int:
-        """The row that changes v' most, first any that only changes its name: the order of rows does not choose."""
-        strongest, most = -1, -1.0
-        for i, after in wanted.items():
-            acts = self.modes[i] in ACTIVE or after in ACTIVE
-            size = self._change_of_acceleration(i, t, q, v) if acts else np.inf
-            if strongest < 0 or size > most * (1.0 + SAME_CHANGE):
-                strongest, most = i, size
-        return strongest
+    def _strongest(self, wanted: dict[int, Mode], t: float, q: Floats, v: Floats) -> list[int]:
+        """The rows that change v' most, first all that only change their name: their order does not choose."""
+        sizes = {
+            i: self._change_of_acceleration(i, t, q, v) if self.modes[i] in ACTIVE or after in ACTIVE else np.inf
+            for i, after in wanted.items()
+        }
+        return [i for i, size in sizes.items() if size >= max(sizes.values()) * (1.0 - SAME_CHANGE)]
 
     def _change_of_acceleration(self, i: int, t: float, q: Floats, v: Floats) -> float:
         """Square of the difference that row i makes to v', in the norm of the mass matrix."""
@@ -274,23 +273,27 @@ class LevelMachine:
             if after != self.modes[i] and i in self.rows:
                 self._switch(t, i, after)
 
-    def _arm(self, view: View, q: Floats) -> None:
+    def _arm(self, view: View, t: float, q: Floats, v: Floats) -> None:
         """Set up the guards that hold until the next event."""
-        inside = [i for i in self.rows if self._touches(i, float(view.gap[i]), q)]
-        self.guards = [guard for i in self.rows for guard in self._guards(i, view, i in inside)]
+        self.guards = [guard for i in self.rows for guard in self._guards(i, view, t, q, v)]
 
-    def _guards(self, i: int, view: View, inside: bool) -> list[Guard]:
-        mode, noise = self.modes[i], float(view.noise[i])
-        # The rate's own zero is the place; one that stands still there already must close first.
+    def _guards(self, i: int, view: View, t: float, q: Floats, v: Floats) -> list[Guard]:
+        mode, closed = self.modes[i], view.gap[i] <= TOUCH * max(1.0, float(np.abs(q).max()))
+        # The rate's own zero is the place; one that stands still there already must close first. So must a gap that has
+        # just opened, whose next values round to either side; a gap that was open cannot close without a rate below 0.
         still = i in self.frozen or view.rate[i] <= self.slow
-        closing = Term(Kind.RATE, i, self.slow if still else 0.0)
+        closing = Term(Kind.RATE, i, self.slow if still and (closed or mode != Mode.FREE) else 0.0)
         if mode in ACTIVE:
-            lam = float(view.lam[i])  # one that starts at or below zero is round-off, or has fired already
-            released = Guard(i, Watch.SWITCH, [Term(Kind.FORCE, i, noise - lam if lam <= 0.0 else 0.0, noise)])
+            lam, noise = float(view.lam[i]), float(view.noise[i])
+            band = max(noise, noise - lam) if lam <= noise else 0.0  # one that starts as zero fires on rounding
+            released = Guard(i, Watch.SWITCH, [Term(Kind.FORCE, i, band, noise)])
             if mode != Mode.COLLISION:
                 return [released]
             return [released, Guard(i, Watch.OTHER, [Term(Kind.SPENT, i, sides=sides) for sides in SIDES])]
         if mode == Mode.FREE:
-            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i), closing] if inside else [Term(Kind.GAP, i)])]
-        catch = [closing] if i in self.frozen else [closing, Term(Kind.PRESS, i)]
+            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i), closing])]
+        catch = [closing]
+        if i not in self.frozen:
+            lam, band = self.pressure(i, t, q, v, self.error)  # likewise: one that has just let go is at zero
+            catch.append(Term(Kind.PRESS, i, band if abs(lam) <= band else 0.0))
         return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i)]), Guard(i, Watch.OTHER, catch)]

@@ -19,7 +19,7 @@ from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
 from crossbody.reference._system import System
-from crossbody.reference.sundials.arcs import Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
+from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
 from crossbody.reference.sundials.compiled.evaluation import entry
 from crossbody.reference.sundials.discrete import START, TOUCHED, Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
@@ -73,8 +73,10 @@ class SundialsRun:
         """Back to the beginning."""
         e = self.equations = Equations(self.system, rigid=bool(self.rigid))
         self.machine = self._machine(e)
+        self.machine.error = SHARE * self.options.tolerance
         self.discrete = Discrete(self.system, e)
         self.folds = Folds(e)
+        self.single = self.natural or bool(self.folds.rows)
         nz = self.system.nc + 2 if self.options.ledger else 0
         energy = np.abs(np.nan_to_num(e.energy(self.q0, self.v0))).sum()
         self.scene = Scene(e, self.machine, self.discrete, self.options, nz, max(float(energy), 1.0))
@@ -127,7 +129,7 @@ class SundialsRun:
                 view = self._settle()
                 arc = self._arc(view)
             elif self.kind is CvodeArc and arc.stiff:
-                arc = BdfArc(self.scene, self.state, view, self.options.max_step)
+                arc = BdfArc(self.scene, self.state, view, self.options.max_step, self.single)
 
     def _check_bounds(self, began: float) -> None:
         if self.scene.steps >= self.options.max_steps:
@@ -177,7 +179,7 @@ class SundialsRun:
         longest = self.options.max_step
         if cautious:
             longest = min(longest, (self.options.t_end - self.state.t) * CAUTION**self.retries)
-        return self.kind(self.scene, self.state, view, longest)
+        return self.kind(self.scene, self.state, view, longest, self.single or cautious)
 
     def _step(self, arc: Arc, stop: float) -> bool | None:
         """Go on; whether a machine switched, or None if the arc must begin anew with shorter steps."""
@@ -188,7 +190,7 @@ class SundialsRun:
                 self._sample(self.equations.accelerate(stop, before.q, before.v)[1])
             return False
         try:
-            state, fired = arc.step(stop)
+            state, fired = arc.step(stop, min(stop, self._next_sample()))
         except Ended as end:
             if end.outcome is not Outcome.NOT_FINITE or self.retries >= RETRIES:
                 raise

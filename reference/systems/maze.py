@@ -59,6 +59,8 @@ from crossbody.reference.systems._maze_switch import GUARDS, switch, watch
 if TYPE_CHECKING:
     from crossbody.cases import Law
 
+SPHERE = 0.4
+"""J/(m r^2) of a solid ball; its own, so that the closed forms, which have theirs, can disagree."""
 SCRATCH = 3
 """Length of w: x/rho, y/rho, rho."""
 
@@ -207,7 +209,7 @@ def constants(p: Mapping[str, Any], maze: geometry.Maze) -> Floats:
     centre = cf.centre_gains(model, maze.rings[0].inner - r, float(p["centre_pole"]))
     gains = dict(zip(layout.CONSTANTS[layout.K2 : layout.C0 + 1], balance + centre, strict=True))
     own = {
-        "gravity": g, "ball_radius": r, "ball_inertia": cf.INERTIA * float(p["ball_mass"]) * r * r,
+        "gravity": g, "ball_radius": r, "ball_inertia": SPHERE * float(p["ball_mass"]) * r * r,
         "rings": len(maze.rings), "controller": CONTROLLERS.index(str(p["controller"])), **gains,
     }  # fmt: skip
     head = [float(own[name] if name in own else p[name]) for name in layout.CONSTANTS]

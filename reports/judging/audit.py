@@ -85,7 +85,7 @@ def states(case: Case, theirs: Mapping[str, Any] = MappingProxyType({})) -> list
     """
     draw = np.random.default_rng(SEED)
     n = len(case.q0)
-    if len(case.law.a0) and not case.law.unilateral.any():
+    if case.scene is not None or (len(case.law.a0) and not case.law.unilateral.any()):
         return [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, n)) for _ in range(STATES)]
     if len(case.law.a0) and "gap" in theirs:
         return [_entered(case, theirs["gap"], theirs["H"], draw) for _ in range(STATES)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.stored import Deviations, deviations, words
+from crossbody.reports.judging.stored import Deviations, deviations, differing, words
 from crossbody.reports.judging.truth import Truth, from_run, truth_of
 from crossbody.reports.judging.verdict import (
     Regression,
@@ -113,6 +114,12 @@ def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> 
 def table(rows: Iterable[Verdict]) -> pd.DataFrame:
     """Verdicts as a tidy table; the columns are there even without a row."""
     return pd.DataFrame([row.row() for row in rows], columns=list(Verdict.__dataclass_fields__))
+
+
+def judges_parts(case: Case, engine: str, profile: str) -> bool:
+    """Whether a limit asks for the model or the discretisation error of an engine."""
+    names = (f"{name} ({part})" for name in SPLIT for part in PARTS)
+    return any(limit_for(limits_of(case), name, engine, profile) is not None for name in names)
 
 
 def check_names(case: Case) -> None:
@@ -289,36 +296,53 @@ def _audit(judge_: _Judge) -> Verdict:
 
 
 def _is_known(judge_: _Judge, limit: Limit, row: AuditRow) -> bool:
-    """Whether a stored run differed in the same quantity by as much; without one, the property explains all."""
+    """Whether a stored run differed in the same quantity by as much.
+
+    With other parameters or settings than any stored run's the size is not known: the quantity alone must be.
+    """
+    name = f"audit {row.quantity}"
     if not judge_.stored:
-        return True
-    stored = judge_.stored.get(f"audit {row.quantity}", 0.0)
+        return name in differing(judge_.case, judge_.entry)
+    stored = judge_.stored.get(name, 0.0)
     sizes = explained(limit, stored)
     return stored == row.difference or (sizes is not None and sizes[0] <= row.difference <= sizes[1])
 
 
+def crash(error: Exception) -> str:
+    """What was thrown, and where."""
+    place = "".join(traceback.format_tb(error.__traceback__)[-1:]).strip().splitlines()[0]
+    return f"{type(error).__name__}: {error} ({place})"
+
+
 def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict]:
+    """A row for every metric that says something; one that throws is a row too, so that the others are judged."""
     for name in metrics.names():
         metric = metrics.load(name)
         wanted = name in judge_.claims or judge_.limit(name) is not None
         if metric.CLAIMED and not wanted:
             continue
-        value, compared = _value(metric, name, truth, run, judge_.case)
-        needs = getattr(metric, "NEEDS", "")
-        excused = (
-            value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
-        )
-        if value is not None and not excused:
-            yield judge_.judged(name, value, metric.UNIT, truth, compared)
-        elif excused and not wanted:
-            continue
-        elif name in judge_.claims or (wanted and _shown(metric, truth, judge_.case)):
-            why = (
-                "The run has no such number, the truth has."
-                if name not in judge_.claims
-                else "There is no such number."
-            )
-            yield judge_.missing(name, metric.UNIT, why, needs)
+        try:
+            found = _row(judge_, metric, name, wanted, truth, run)
+        except Exception as error:
+            found = judge_.row(name, math.nan, metric.UNIT, Word.CRASHED, crash(error))
+        if found is not None:
+            yield found
+
+
+def _row(
+    judge_: _Judge, metric: metrics.Metric, name: str, wanted: bool, truth: Truth, run: Trajectory
+) -> Verdict | None:
+    """What is said of one metric; None where nothing is."""
+    value, compared = _value(metric, name, truth, run, judge_.case)
+    needs = getattr(metric, "NEEDS", "")
+    excused = value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
+    if value is not None and not excused:
+        return judge_.judged(name, value, metric.UNIT, truth, compared)
+    if name in judge_.claims:
+        return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
+    if wanted and _shown(metric, truth, judge_.case):
+        return judge_.missing(name, metric.UNIT, "The run has no such number, the truth has.", needs)
+    return None
 
 
 def _shown(metric: metrics.Metric, truth: Truth, case: Case) -> bool:
@@ -356,6 +380,10 @@ def _split(judge_: _Judge) -> Iterator[Verdict]:
     for name in SPLIT:
         metric = metrics.load(name)
         for label, against, run in sides:
-            value, compared = _value(metric, name, against, run, judge_.case)
+            try:
+                value, compared = _value(metric, name, against, run, judge_.case)
+            except Exception as error:
+                yield judge_.row(f"{name} ({label})", math.nan, metric.UNIT, Word.CRASHED, crash(error))
+                continue
             if value is not None:
                 yield judge_.judged(f"{name} ({label})", value, metric.UNIT, against, compared)

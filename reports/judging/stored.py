@@ -43,6 +43,12 @@ def deviations(case: Case, entry: Entry) -> Deviations:
     return {metric: float(value) for metric, value in run["deviations"].items()}
 
 
+def differing(case: Case, entry: Entry) -> frozenset[str]:
+    """What was looked at in the stored run of that variant, engine and profile, whatever its parameters."""
+    run = _table().get(case.label, {}).get("runs", {}).get(f"{entry.engine}:{entry.profile}")
+    return frozenset() if run is None else frozenset(run["deviations"])
+
+
 @cache
 def _table() -> dict[str, Any]:
     found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.is_file() else {}
@@ -83,21 +89,32 @@ def _short(value: float) -> float | str:
     return float(f"{value:.3g}") if math.isfinite(value) else str(value)
 
 
+def _measured(name: str, variant: str) -> list[tuple[Case, Entry, Deviations]]:
+    """What all engines give on one variant."""
+    from crossbody.reports.judging.comparison import measured
+    from crossbody.reports.runs import jobs
+
+    (case,) = jobs.load_cases([name], variant, {})
+    result = jobs.run_case(case, jobs.picks(()), tell=print, refine=False)
+    return [(case, entry, measured(case, entry, result.truth)) for entry in result.entries if entry.run]
+
+
 def main(names: list[str]) -> None:
-    """Run cases, all if none is named, and store what they gave.
+    """Run cases, all if none is named, one process a core, and store what they gave; each as soon as it is there.
 
     Raises:
         CrossbodyError: for a name that does not exist.
     """
-    from crossbody import cases
-    from crossbody.reports.judging.comparison import measured
-    from crossbody.reports.runs import jobs
+    from joblib import Parallel, delayed
 
-    for name in names or cases.names():
-        for case in jobs.load_cases([name], None, {}):
-            result = jobs.run_case(case, jobs.picks(()), tell=print)
-            write((case, entry, measured(case, entry, result.truth)) for entry in result.entries if entry.run)
+    from crossbody import cases
+
+    wanted = [(name, variant) for name in names or cases.names() for variant in cases.variants(name)]
+    for found in Parallel(n_jobs=-1, return_as="generator_unordered")(delayed(_measured)(*one) for one in wanted):
+        write(found)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    from crossbody.reports.judging import stored
+
+    stored.main(sys.argv[1:])

@@ -20,9 +20,10 @@ SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
-AGREES = 1e5
-"""Largest disagreement of the two, in units of the looser tolerance: errors add up and grow over thousands of steps. It
-is never more than `PARTED`."""
+STEPS, GROWTH = 1e4, 10.0
+"""Most steps of a run, whose errors add up at worst, and how much they grow where a motion is not declared chaotic."""
+AGREES = STEPS * GROWTH
+"""Largest disagreement of the two, in units of the looser tolerance; it is never more than `PARTED`."""
 GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
 
@@ -83,7 +84,7 @@ def truth_of(case: Case) -> Truth:
         CrossbodyError: if the reference cannot run the case.
     """
     from crossbody import engines
-    from crossbody.engines._equations import builder
+    from crossbody.engines._equations import known
 
     _arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
@@ -93,12 +94,12 @@ def truth_of(case: Case) -> Truth:
     first = motion(np.zeros(1))
     truth = Truth(
         tier=Tier.A,
-        source="closed form of every arc",
+        source="closed form of every arc, which shares the numbers of the case alone with what it judges",
         trajectory=motion(sample_times(first, case.t_end)),
         at=motion,
         agreement={},
     )
-    if "reference" not in engines.names() or builder(case.mechanism) is None:
+    if "reference" not in engines.names() or not known(case):
         return truth
     second = _tight(case)
     told = _held_against(truth, second, case, case.tight)
@@ -162,7 +163,8 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     second = reference.prepare(case, other, rtol=loose).run()
     truth = _held_against(Truth(tier=tier, source="", trajectory=dense, at=at, agreement={}), second, case, loose)
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
-    source = f"compiled reference at rtol {case.tight:g}, {other} at {loose:g} agrees: {said}"
+    shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
+    source = f"compiled reference at rtol {case.tight:g}, {other} at {loose:g} agrees: {said}; they share {shared}"
     if truth.parted < case.t_end:
         source += f"; they part at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
     return _rechecked(replace(truth, source=source), case)

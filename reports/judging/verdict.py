@@ -150,6 +150,6 @@ def band(stored: float | None, limit: Limit | None) -> float:
     return BAND * stored if exact else max(BAND * stored, ROUNDING)
 
 
-def exit_code(words: Iterable[str]) -> int:
-    """0 if nothing is outside or crashed (a known deviation counts as fine), else 1."""
-    return int(any(word in (Word.OUTSIDE, Word.CRASHED) for word in words))
+def exit_code(words: Iterable[str], regressions: Iterable[str] = ()) -> int:
+    """0 if nothing is outside or crashed (a known deviation counts as fine) and nothing is lost, else 1."""
+    return int(any(word in (Word.OUTSIDE, Word.CRASHED) for word in words) or Regression.LOST in set(regressions))

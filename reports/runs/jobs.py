@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,7 +22,7 @@ from crossbody.cases import (
     Value,
 )
 from crossbody.reports.judging.audit import AuditRow, audit
-from crossbody.reports.judging.comparison import Entry, check_names
+from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
 from crossbody.reports.runs import watch
 
@@ -119,6 +118,7 @@ def run_case(
     settings: Mapping[str, Value] | None = None,
     truth: Truth | None = None,
     limit: float = watch.LIMIT,
+    refine: bool = True,
 ) -> CaseResult:
     """Run a case on every engine asked for.
 
@@ -130,6 +130,7 @@ def run_case(
         settings: of the engines, by name; each takes those that it knows.
         truth: of the case, where it is known already.
         limit: time after which an engine that has not come back is ended with its process, s; from the command line.
+        refine: whether engines are refined to tell model from discretisation even where no limit judges a part.
 
     Raises:
         UnknownName: for a setting that none of them knows.
@@ -148,7 +149,8 @@ def run_case(
         label = f"{case.label}: {pick.engine}:{pick.profile}"
         tell(label)
         watch.limited(label, limit)
-        entries.append(ended(case, pick, why) if (why := watch.lost(label)) else _entry(case, pick, asked, reference))
+        why = watch.lost(label)
+        entries.append(ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine))
     watch.unlimited()
     _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
@@ -177,22 +179,25 @@ def _reference_audit(case: Case) -> Mapping[str, Any]:
     return engines.load("reference").prepare(case, "compiled").audit()
 
 
-def _entry(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
+def _entry(
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool
+) -> Entry:  # fmt: skip
     """The run of one engine; whatever it throws is a row of its own, so that the others are judged all the same."""
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
-        return _ran(case, pick, asked, reference)
+        return _ran(case, pick, asked, reference, refine or judges_parts(case, pick.engine, pick.profile))
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
         raise
     except Exception as error:
-        place = "".join(traceback.format_tb(error.__traceback__)[-1:]).strip().splitlines()[0]
-        return Entry(engine=pick.engine, profile=pick.profile, crashed=f"{type(error).__name__}: {error} ({place})")
+        return Entry(engine=pick.engine, profile=pick.profile, crashed=crash(error))
 
 
-def _ran(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any]) -> Entry:
+def _ran(
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool
+) -> Entry:  # fmt: skip
     prepared = prepare(case, pick, asked)
     shown = prepared.audit()
     hidden = {**engines.hidden(engines.load(pick.engine), prepared.profile), **shown.get("hidden", {})}
@@ -205,9 +210,9 @@ def _ran(case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[
         run=_dense(case, pick, prepared, natural, asked),
         stepped=natural.t,
         audit=rows,
-        refined=_refined(case, pick, prepared.settings),
+        refined=_refined(case, pick, prepared.settings) if refine else None,
         hidden=hidden,
-        own=None if (followed := getattr(prepared, "follows", None)) is None else law_of(followed),
+        own=law_of(followed) if refine and (followed := getattr(prepared, "follows", None)) is not None else None,
     )
 
 

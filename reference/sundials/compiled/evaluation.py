@@ -26,7 +26,7 @@ from crossbody.reference._system import System
 from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
 
 # What is asked of `evaluate`.
-DERIVATIVE, TERMS, FORCES, BEGIN, SCAN, GRID = range(6)
+DERIVATIVE, TERMS, FORCES, BEGIN, SCAN, GRID, WATCHED, RESIDUAL = range(8)
 
 
 class Kind(IntEnum):
@@ -65,8 +65,8 @@ class Workspace:
     """Everything that `evaluate` reads and writes."""
 
     size: Index  # n, nc, k, nz, na, terms, guards
-    count: Index  # evaluations, steps, steps in a row that stability binds
-    clock: Floats  # last instant, fastest damped pole, start of the step
+    count: Index  # evaluations, steps, steps in a row that stability binds, the most of these, guards undecided
+    clock: Floats  # last instant, fastest damped pole, end of the last step and its start
     p: Floats
     u: Floats
     w: Floats
@@ -84,6 +84,9 @@ class Workspace:
     two: Floats
     matrix: Floats2  # (n + nc, n + nc + 2): the last columns are right-hand sides
     solution: Floats2  # (n + nc, 2)
+    slopes: Floats  # derivative of the solver's vector, where it is implicit
+    scale: Floats  # (nc,) of the rows' equations there
+    rigid: Index  # (nc,) place of a row's second multiplier there, -1 for a row held by its law
     law: Floats2  # (nc, 3) in force
     law_if: Floats2  # the same, with every inactive row as it would be
     idx: Index
@@ -98,6 +101,7 @@ class Workspace:
     values: Floats2  # (nodes, terms)
     check: Floats2  # (4, terms) at two places, without the quintic's error and with it
     grid: Floats2  # (POINTS, terms)
+    ends: Floats2  # (2, of the solver's vector) the last step's start and end
     y0: Floats  # (2n,) start of the step
     y1: Floats
     curve: Floats  # (n,) v' of the quintic
@@ -189,13 +193,19 @@ def _accelerate(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: 
 
 
 @inlined
-def _derivative(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t: float, y: Any, yp: Any) -> int:
-    """Y' of q, v and the work done by rows, by inputs and against damping."""
-    n, nc, nz = s.size[0], s.size[1], s.size[3]
+def _tick(s: Workspace, t: float) -> None:
+    """Count a step tried, and how many of them in a row stability binds."""
     if t != s.clock[0]:
         s.count[1] += 1
         s.count[2] = s.count[2] + 1 if (t - s.clock[0]) * s.clock[1] > STIFF else 0
         s.clock[0] = t
+
+
+@inlined
+def _derivative(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t: float, y: Any, yp: Any) -> int:
+    """Y' of q, v and the work done by rows, by inputs and against damping."""
+    n, nc, nz = s.size[0], s.size[1], s.size[3]
+    _tick(s, t)
     for i in range(n):
         s.q[i], s.v[i] = y[i], y[n + i]
     code = _accelerate(dynamics, rows, s, t, s.q, s.v)
@@ -211,6 +221,64 @@ def _derivative(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t
             if not np.isfinite(yp[i]):
                 return NOT_FINITE
     return int(code)
+
+
+@inlined
+def _residual(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t: float, y: Any, out: Any) -> int:
+    """The implicit equations of (q, v, lam, mu, z), with the derivative in `slopes`; all rows of `lam`.
+
+    M v' = f + H^T lam, and of every active row H M^-1 (f + H^T lam) + H' v + a1 h' + a0 h + a2 h^3 = 0: with v' of the
+    solver in its place, the rounding of a difference over a short step would stand in the multiplier.
+    """
+    n, nc, k, nz, na, A = s.size[0], s.size[1], s.size[2], s.size[3], s.size[4], s.matrix
+    mu = 2 * n + nc
+    _tick(s, t)
+    for i in range(n):
+        s.q[i], s.v[i] = y[i], y[n + i]
+    s.count[0] += 1
+    dynamics(t, s.q, s.v, s.u, s.p, s.blocks, s.f, s.w)
+    s.H[:na] = 0.0
+    if na > 0:
+        rows(t, s.q, s.v, s.p, s.w, s.idx, na, s.H, s.h, s.Hdv)
+    A[:n, : n + 1] = 0.0
+    for i in range(n):
+        first = i // k * k
+        out[i], out[n + i], A[i, n] = s.slopes[i] - s.v[i], 0.0, s.f[i]
+        for j in range(k):
+            A[i, first + j] = s.blocks[i, j]
+            out[n + i] += s.blocks[i, j] * s.slopes[n + first + j]
+        for j in range(na):
+            A[i, n] += s.H[j, i] * y[2 * n + s.idx[j]]
+        out[n + i] -= A[i, n]
+    if na > 0 and _eliminate(A, s.solution, n, 1) != 0:
+        return ILL_POSED
+    for i in range(2 * n, mu):
+        out[i] = y[i]
+    for j in range(na):
+        i = s.idx[j]
+        rate, push, h = 0.0, 0.0, s.h[j]
+        for c in range(n):
+            rate += s.H[j, c] * s.v[c]
+            push += s.H[j, c] * s.solution[c, 0]
+        drive = s.law[i, 1] * rate + (s.law[i, 0] + s.law[i, 2] * h * h) * h
+        out[2 * n + i] = (push + s.Hdv[j] + drive) * s.scale[i]
+        if s.rigid[i] >= 0:
+            out[2 * n + i], out[mu + s.rigid[i]] = h, rate
+            for c in range(n):
+                out[c] -= s.H[j, c] * y[mu + s.rigid[i]]
+    if nz > 0:
+        _accelerate(dynamics, rows, s, t, s.q, s.v)  # lam of the state itself
+        gaps(t, s.q, s.v, s.p, s.gap, s.rate)
+        power(t, s.q, s.v, s.u, s.p, s.two)
+        at = len(y) - nz
+        for i in range(nc):
+            out[at + i] = s.slopes[at + i] - s.lam[i] * s.rate[i]
+        for i in range(2):
+            out[at + nc + i] = s.slopes[at + nc + i] - s.two[i]
+    for i in range(len(y)):
+        if not np.isfinite(out[i]):
+            return NOT_FINITE
+    return GOOD
 
 
 @inlined
@@ -375,6 +443,15 @@ def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
     return int(code)
 
 
+@inlined
+def _move_on(s: Workspace, t: float, y: Any) -> None:
+    """The last step ends at t; what was its end is its start."""
+    s.clock[3], s.clock[2] = s.clock[2], t
+    s.y0[:], s.a0[:] = s.y1, s.a1
+    for i in range(len(y)):
+        s.ends[0, i], s.ends[1, i] = s.ends[1, i], y[i]
+
+
 @compiled
 def _scan(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, y: Any) -> int:
     """Look whether a guard can fire inside the step that ends at t; minus a code, or the number of undecided guards.
@@ -391,10 +468,9 @@ def _scan(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: floa
         code = _doubt(dynamics, gaps, rows, watch, s, t)
     if code != GOOD:
         return int(-code)
-    left = _decide(s)
-    s.clock[2] = t
-    s.y0[:], s.a0[:] = s.y1, s.a1
-    return int(left)
+    s.count[4] = _decide(s)
+    _move_on(s, t, y)
+    return int(s.count[4])
 
 
 @compiled
@@ -409,8 +485,7 @@ def _grid(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: floa
             code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.grid[j])
     if code == GOOD:
         code = _doubt(dynamics, gaps, rows, watch, s, t)
-    s.clock[2] = t
-    s.y0[:], s.a0[:] = s.y1, s.a1
+    _move_on(s, t, y)
     return int(code)
 
 
@@ -420,7 +495,8 @@ def evaluate(
     """Do what is asked at (t, y); GOOD or what went wrong, except for SCAN, as `_scan`.
 
     DERIVATIVE: y' into out. TERMS: all terms into out. FORCES: the multipliers. BEGIN: a step begins here. SCAN, GRID:
-    a step ends here.
+    a step ends here. WATCHED: as SCAN, unless it is looked at again; out[0] is 0 where the solver is to stop, else 1.
+    RESIDUAL: of the implicit equations into out, with the derivative in `slopes`.
     """
     s = open_work(lines)
     n = s.size[0]
@@ -436,11 +512,20 @@ def evaluate(
         return int(_accelerate(dynamics, rows, s, t, s.q, s.v))
     if what == BEGIN:
         code = _carry(dynamics, rows, s, t, y)
-        s.clock[2] = t
-        s.y0[:], s.a0[:] = s.y1, s.a1
+        _move_on(s, t, y)
         return int(code)
     if what == GRID:
         return int(_grid(dynamics, gaps, rows, watch, s, t, y))
+    if what == RESIDUAL:
+        return int(_residual(dynamics, gaps, rows, power, s, t, y, out))
+    if what == WATCHED:
+        out[0] = 1.0
+        if t <= s.clock[2]:  # the solver looks back
+            return GOOD
+        left = _scan(dynamics, gaps, rows, watch, s, t, y)
+        if left > 0 or s.count[2] >= s.count[3]:
+            out[0] = 0.0
+        return int(min(left, 0))
     return int(_scan(dynamics, gaps, rows, watch, s, t, y))
 
 
@@ -488,13 +573,14 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
     """
     n, nc, all_ = system.n, system.nc, system.n + system.nc
     shapes: dict[str, tuple[int, ...]] = {
-        "size": (7,), "count": (3,), "clock": (3,), "w": (system.scratch,), "blocks": (n, system.mass_block),
+        "size": (7,), "count": (5,), "clock": (4,), "w": (system.scratch,), "blocks": (n, system.mass_block),
         **dict.fromkeys(("f", "q", "v", "a0", "a1", "curve"), (n,)), "H": (nc, n), "two": (2,),
         "matrix": (all_, all_ + 2), "solution": (all_, 2), "law": (nc, 3), "law_if": (nc, 3), "trial": (nc + 1,),
+        "slopes": (2 * n + 2 * nc + nz,),
         "watched": (system.guards if system.watch is not None else 0,),
         **dict.fromkeys(("kind", "row", "shift", "group", "undecided"), (terms,)), "side": (terms, 2),
         "values": (DEGREE + 1, terms), "check": (4, terms), "grid": (POINTS, terms),
-        "y0": (2 * n,), "y1": (2 * n,),
+        "y0": (2 * n,), "y1": (2 * n,), "ends": (2, 2 * all_ + nz),
     }  # fmt: skip
     kinds = {"Index": np.int64}
     arrays = {

@@ -1,0 +1,188 @@
+"""A robot file as a case: its keyframes are the variants, its horizon and its rows' law the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
+from crossbody.cases._errors import SceneError, UnknownName
+from crossbody.cases.files.controls import read_controls
+from crossbody.cases.files.reading import findings_of, model_of, scene_of
+from crossbody.cases.scene import RowLaw, Scene
+
+REFERENCE_POSE = "reference"
+OF_THE_FILE = -1.0
+PARAMETERS = {
+    "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
+    "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
+    "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
+    "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
+    "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileCase:
+    """What a case's module offers, for a file."""
+
+    path: Path
+    PARAMETERS: Mapping[str, Parameter] = field(default_factory=lambda: PARAMETERS)
+
+    @property
+    def __file__(self) -> str:
+        """The file."""
+        return str(self.path)
+
+    @cached_property
+    def model(self) -> Any:
+        """MuJoCo's model of the whole file."""
+        return model_of(self.path)
+
+    @cached_property
+    def VARIANTS(self) -> Mapping[str, Mapping[str, Value]]:
+        """The keyframes of the file, the pose of its bodies if it has none."""
+        names = [self.model.key(i).name or f"key{i}" for i in range(self.model.nkey)]
+        return {name: {} for name in names or [REFERENCE_POSE]}
+
+    def build(self, variant: str, p: Mapping[str, Value]) -> Case:
+        """Return the case of one keyframe."""
+        index = list(self.VARIANTS).index(variant) if self.model.nkey else -1
+        q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
+        v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
+        ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
+        scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
+        table = Path(str(p["ctrl"])) if p["ctrl"] else None
+        return case_of(
+            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),
+            findings=findings_of(self.path),
+            inputs=read_controls(table, scene) if table else held(scene, ctrl),
+            parameters=p, file=str(self.path.resolve()),
+        )  # fmt: skip
+
+
+def open_file(name: str) -> FileCase:
+    """Return what a file offers.
+
+    Raises:
+        UnknownName: if it is not there.
+    """
+    path = Path(name)
+    if not path.is_file():
+        raise UnknownName("robot file", name, ())
+    return FileCase(path=path)
+
+
+def overruled(scene: Scene, a0: float, a1: float) -> Scene:
+    """Return the scene with these constants for all of its rows; below 0 they stay."""
+    if a0 < 0.0 and a1 < 0.0:
+        return scene
+
+    def law(own: RowLaw) -> RowLaw:
+        return RowLaw(a0=own.a0 if a0 < 0.0 else a0, a1=own.a1 if a1 < 0.0 else a1)
+
+    changed: dict[str, Any] = {}
+    for group in ("joints", "loops", "tendons"):
+        changed[group] = tuple(replace(part, law=law(part.law)) for part in getattr(scene, group))
+    return scene.replace(**changed)
+
+
+def case_of(
+    scene: Scene,
+    *,
+    name: str = "scene",
+    variant: str = REFERENCE_POSE,
+    q0: Any = None,
+    v0: Any = None,
+    inputs: Inputs | None = None,
+    t_end: float = 1.0,
+    parameters: Mapping[str, Value] | None = None,
+    file: str = "",
+    findings: tuple[str, ...] = (),
+) -> Case:
+    """Return a scene as a case: its rows are its loops, then the bounds of its joints and tendons.
+
+    Args:
+        scene: what moves.
+        name: of the case.
+        variant: of the case.
+        q0: start (nq,); the reference pose if not given.
+        v0: velocities there (nv,); at rest if not given.
+        inputs: controls of the actuators; zero if not given.
+        t_end: horizon, s.
+        parameters: of the case.
+        file: where the scene comes from.
+        findings: sentences on what is strange there.
+
+    Raises:
+        SceneError: for a scene that no engine here can run, naming what stands against it.
+    """
+    check_runnable(scene)
+    names, laws, unilateral = rows_of(scene)
+    law = Law(
+        a0=np.array([one.a0 for one in laws]), a1=np.array([one.a1 for one in laws]),
+        a2=np.array([one.a2 for one in laws]), unilateral=np.array(unilateral, dtype=bool),
+    )  # fmt: skip
+    return Case(
+        name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
+        mechanism="scene", parameters=dict(parameters or {"t_end": t_end}), coordinates=coordinates(scene),
+        contacts=tuple(names), q0=reference_pose(scene) if q0 is None else q0,
+        v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
+        file=file, findings=findings,
+    )  # fmt: skip
+
+
+def check_runnable(scene: Scene) -> None:
+    """Refuse what the engines here do not have.
+
+    Raises:
+        SceneError: naming the part.
+    """
+    for joint in scene.joints:
+        if joint.type in ("free", "ball"):
+            raise SceneError(f"Joint {joint.name!r} is of type {joint.type}: only slides and hinges can be run.")
+    for part in scene.bounded:
+        if part.friction_loss:
+            raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
+
+
+def coordinates(scene: Scene) -> tuple[Coordinate, ...]:
+    """Return names and units of q."""
+    return tuple(Coordinate(name=joint.name, unit="m" if joint.type == "slide" else "rad") for joint in scene.joints)
+
+
+def reference_pose(scene: Scene) -> Floats:
+    """Return q at the pose that `Body.position` gives."""
+    return np.array([joint.reference for joint in scene.joints])
+
+
+def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
+    """Return controls that are held from the start on; None for a scene without actuators."""
+    if not scene.actuators:
+        return None
+    values = np.zeros((1, len(scene.actuators))) if ctrl is None else np.atleast_2d(np.asarray(ctrl, dtype=float))
+    names = tuple(actuator.name for actuator in scene.actuators)
+    return Inputs(names=names, times=np.zeros(1), values=values)
+
+
+def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
+    """Return names, laws and whether they can open, of the rows in the order of all engines."""
+    names, laws, unilateral = [], [], []
+    for loop in scene.loops:
+        for k in range(loop.width):
+            names.append(loop.name if loop.width == 1 else f"{loop.name} {'xyz'[k]}")
+            laws.append(loop.law)
+            unilateral.append(False)
+    for part in scene.bounded:
+        for side, bound in zip(("low", "high"), part.range, strict=True):
+            if np.isfinite(bound):
+                names.append(f"{part.name} {side}")
+                laws.append(part.law)
+                unilateral.append(True)
+    return names, laws, unilateral

@@ -1,0 +1,49 @@
+"""Controls of a robot's file, from a table: a column t in s, and one for every actuator by its name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases._case import Inputs
+from crossbody.cases._errors import InvalidValue
+from crossbody.cases.scene import Scene
+
+
+def read_controls(path: Path, scene: Scene) -> Inputs:
+    """Return what a table says, each row held until the next.
+
+    Args:
+        path: a CSV or Parquet table with a head, or an NPZ with t (m,) and ctrl (m, nu).
+        scene: whose actuators they are.
+
+    Raises:
+        InvalidValue: if it cannot be read, times do not increase, or an actuator has no column.
+    """
+    names = [actuator.name for actuator in scene.actuators]
+    try:
+        times, values = _from_npz(path, names) if path.suffix == ".npz" else _from_table(path, names)
+    except (OSError, ValueError, KeyError, UnicodeDecodeError) as error:
+        raise InvalidValue(f"Controls {path}: {error}") from None
+    if values.shape != (len(times), len(names)):
+        raise InvalidValue(f"Controls {path} have the shape {values.shape}; valid: ({len(times)}, {len(names)}).")
+    if not (np.isfinite(times).all() and (np.diff(times) > 0).all() and len(times) and times[0] >= 0.0):
+        raise InvalidValue(f"Controls {path}: t must be finite, at least 0 and increasing.")
+    return Inputs(names=tuple(names), times=times, values=values)
+
+
+def _from_npz(path: Path, names: list[str]) -> tuple[Floats, Floats]:
+    with np.load(path, allow_pickle=False) as held:
+        return np.asarray(held["t"], dtype=float), np.asarray(held["ctrl"], dtype=float)
+
+
+def _from_table(path: Path, names: list[str]) -> tuple[Floats, Floats]:
+    import pandas as pd
+
+    table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+    missing = [name for name in ("t", *names) if name not in table.columns]
+    if missing:
+        raise ValueError(f"there is no column {missing[0]!r}; it has: {', '.join(map(str, table.columns))}.")
+    return table["t"].to_numpy(dtype=float), table[names].to_numpy(dtype=float)

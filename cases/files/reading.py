@@ -1,0 +1,50 @@
+"""Which reader a file needs: by its suffix, or by its root where that says nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from crossbody.cases.files import mjcf, urdf
+from crossbody.cases.files.without import strip
+from crossbody.cases.scene import Scene
+
+if TYPE_CHECKING:
+    import mujoco
+
+SUFFIXES = (".xml", ".mjcf", ".urdf")
+HEAD = 4096
+"""Bytes in which the root of a file must begin, behind comments that are longer it is taken for MJCF."""
+
+
+def is_urdf(path: Path) -> bool:
+    """Return whether a file is a URDF."""
+    with path.open("rb") as file:
+        return path.suffix == ".urdf" or b"<robot" in file.read(HEAD)
+
+
+def model_of(path: Path, without: str = "") -> mujoco.MjModel:
+    """Return the compiled model whose tree, shapes and filters are the file's; inertias of a URDF are placeholders.
+
+    Raises:
+        SceneError: with the compiler's own sentence.
+        InvalidValue: for a word in `without` that names nothing.
+    """
+    model = urdf.model_of(path) if is_urdf(path) else mjcf.compiled(path)
+    strip(model, without)
+    return model
+
+
+def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
+    """Return the scene of a file by its model.
+
+    Raises:
+        SceneError: for what a scene does not have, by name.
+    """
+    scene = mjcf.scene_of(model)
+    return urdf.with_inertias(path, scene) if is_urdf(path) else scene
+
+
+def findings_of(path: Path) -> tuple[str, ...]:
+    """Return sentences on what is strange in a file but taken as it stands."""
+    return tuple(urdf.findings(path)) if is_urdf(path) else ()

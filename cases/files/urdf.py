@@ -1,0 +1,155 @@
+"""A URDF as a compiled model and a scene: MuJoCo's compiler reads the tree, its inertias are read here.
+
+The compiler refuses links without mass and inertias that no body can have, and repairs others in silence. It is given a
+placeholder for every link, and the file's own numbers go into the scene unchanged.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases._errors import SceneError
+from crossbody.cases.scene import Body, Loop, Scene
+
+if TYPE_CHECKING:
+    import mujoco
+
+LARGEST = 50_000_000
+"""Bytes of a file."""
+PLACEHOLDER = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def parsed(path: Path) -> ElementTree.Element:
+    """Return the root of a URDF.
+
+    Raises:
+        SceneError: with the parser's own place, or for a file without end.
+    """
+    if path.stat().st_size > LARGEST:
+        raise SceneError(f"{path} has {path.stat().st_size} bytes; a URDF may have {LARGEST}.")
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise SceneError(f"{path} is no XML: {error}.") from None
+    if root.tag != "robot":
+        raise SceneError(f"{path} has the root <{root.tag}>; that of a URDF is <robot>.")
+    return root
+
+
+def model_of(path: Path) -> mujoco.MjModel:
+    """Return MuJoCo's model of the tree, with a placeholder for every inertia and without what is only drawn.
+
+    Raises:
+        SceneError: with MuJoCo's own sentence.
+    """
+    import mujoco
+
+    root = parsed(path)
+    for link in root.findall("link"):
+        for part in [*link.findall("inertial"), *link.findall("visual")]:
+            link.remove(part)
+        link.append(ElementTree.fromstring(PLACEHOLDER))
+        for collision in link.findall("collision"):
+            if collision.find("geometry/mesh") is not None:
+                link.remove(collision)  # no mesh has a row: hulls are watched by nothing yet
+    for own in root.findall("mujoco"):
+        root.remove(own)
+    setting = ElementTree.SubElement(root, "mujoco")
+    ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
+    try:
+        return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+    except ValueError as error:
+        raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
+
+
+def with_inertias(path: Path, scene: Scene) -> Scene:
+    """Return the scene with the inertias of the file, and its mimicking joints as loops."""
+    root = parsed(path)
+    links = {link.get("name", ""): link for link in root.findall("link")}
+    bodies = tuple(_body(body, links[body.name]) if body.name in links else body for body in scene.bodies)
+    known = {joint.name for joint in scene.joints}
+    loops = tuple(_mimic(joint) for joint in root.findall("joint")
+                  if joint.find("mimic") is not None and joint.get("name") in known)  # fmt: skip
+    return scene.replace(bodies=bodies, loops=(*scene.loops, *loops))
+
+
+def findings(path: Path) -> list[str]:
+    """Return a sentence for every link whose inertia no rigid body can have."""
+    told = []
+    for link in parsed(path).findall("link"):
+        if link.find("inertial") is None:
+            continue
+        mass, _, J = inertial(link)
+        least, middle, most = np.linalg.eigvalsh(J)
+        if mass < 0.0 or least < 0.0 or least + middle < most * (1.0 - 1e-9):
+            told.append(f"Link {link.get('name')!r}: mass {mass:g} and moments {least:g}, {middle:g}, {most:g} are "
+                        "those of no rigid body; taken as they stand.")  # fmt: skip
+    return told
+
+
+def inertial(link: ElementTree.Element) -> tuple[float, Floats, Floats]:
+    """Return mass, centre (3,) and inertia about it (3, 3), in the link's axes."""
+    own = link.find("inertial")
+    if own is None:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    name = link.get("name")
+    mass = _number(name, own.find("mass"), "value")
+    x = own.find("inertia")
+    xx, yy, zz, xy, xz, yz = (_number(name, x, key) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+    origin = own.find("origin")
+    place = _numbers(name, origin, "xyz")
+    R = _rotation(_numbers(name, origin, "rpy"))
+    return mass, place, R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+
+
+def _body(body: Body, link: ElementTree.Element) -> Body:
+    mass, com, J = inertial(link)
+    six = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
+    return replace(body, mass=mass, com=tuple(com), inertia=six)
+
+
+def _mimic(joint: ElementTree.Element) -> Loop:
+    name, mimic = joint.get("name", ""), joint.find("mimic")
+    factor, offset = (_number(name, mimic, key, value) for key, value in (("multiplier", 1.0), ("offset", 0.0)))
+    second = mimic.get("joint", "") if mimic is not None else ""
+    return Loop(name=f"{name} mimics", type="joint", first=name, second=second,
+                polynomial=(offset, factor, 0.0, 0.0, 0.0))  # fmt: skip
+
+
+def _number(where: str | None, element: Any, key: str, default: float = 0.0) -> float:
+    text = default if element is None else element.get(key, default)
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise SceneError(f"{where!r}: {key} is {text!r}; it must be a number.")
+    return found
+
+
+def _numbers(where: str | None, element: Any, key: str) -> Floats:
+    text = "0 0 0" if element is None else element.get(key, "0 0 0")
+    try:
+        found = np.array([float(word) for word in text.split()])
+    except ValueError:
+        found = np.zeros(0)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise SceneError(f"{where!r}: {key} is {text!r}; it must be three numbers.")
+    return found
+
+
+def _rotation(rpy: Floats) -> Floats:
+    """Return the rotation of roll, pitch and yaw: fixed axes x, y, z in this order."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])  # fmt: skip

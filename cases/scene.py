@@ -1,0 +1,380 @@
+"""A scene as data: bodies on joints, shapes, loops, tendons and actuators, in SI units and world axes with z up.
+
+Coordinates: q (nq) and v (nv) stand in the order of `Scene.joints`. A hinge or slide has one of each; a ball joint has
+a quaternion (w first) and its angular velocity in body axes; a free joint has the position and quaternion of its body
+in the world, the velocity of the body's origin in world axes and its angular velocity in body axes.
+
+A scene is a value: frozen, checked once, hashable; `replace` makes a changed copy.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from crossbody.cases._arguments import shown
+from crossbody.cases._errors import SceneError
+
+Vector = tuple[float, ...]
+ZERO: Vector = (0.0, 0.0, 0.0)
+UPRIGHT: Vector = (1.0, 0.0, 0.0, 0.0)
+UNBOUNDED: Vector = (-math.inf, math.inf)
+WIDTHS = {"free": (7, 6), "ball": (4, 3), "slide": (1, 1), "hinge": (1, 1)}
+"""Coordinates and velocities of every type of joint."""
+LARGEST = 10_000
+"""Bodies of one scene."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowLaw:
+    """Constants of h'' + a1 h' + a0 h + a2 h^3 = 0 for one row; b0, b1 those of COLLISION, 0 where there is one set."""
+
+    a0: float
+    a1: float
+    a2: float = 0.0
+    b0: float = 0.0
+    b1: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check that the constants are finite and not below 0."""
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise SceneError(f"RowLaw.{field.name} is {shown(value)}; it must be finite and at least 0.")
+
+
+STIFF = RowLaw(a0=2500.0, a1=100.0)
+"""What a row follows for which nothing else is said: both poles at -50/s."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Named:
+    """A part that is told apart by its name."""
+
+    name: str
+    sizes: ClassVar[dict[str, int]] = {}
+
+    def __post_init__(self) -> None:
+        """Bring vectors to tuples of their length and check that every number is finite."""
+        what = f"{type(self).__name__} {self.name!r}"
+        if not isinstance(self.name, str) or not self.name:
+            raise SceneError(f"{type(self).__name__}.name is {shown(self.name)}; it must be a text.")
+        for name, size in self.sizes.items():
+            object.__setattr__(self, name, _vector(f"{what}: {name}", getattr(self, name), size))
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float) and math.isnan(value):
+                raise SceneError(f"{what}: {field.name} is not a number.")
+
+
+def _vector(where: str, value: Any, size: int) -> Vector:
+    try:
+        found = tuple(float(number) for number in value)
+    except (TypeError, ValueError):
+        raise SceneError(f"{where} is {shown(value)}; it must be {size} numbers.") from None
+    if len(found) != size or any(math.isnan(number) for number in found):
+        raise SceneError(f"{where} is {shown(value)}; it must be {size} numbers.")
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body(_Named):
+    """A rigid body.
+
+    Attributes:
+        parent: name of the body it hangs on; empty for the world.
+        position, orientation: of its frame in the parent's at q = reference, m and quaternion (w first).
+        mass: kg.
+        com: centre of mass in body axes, m.
+        inertia: xx, yy, zz, xy, xz, yz about the centre of mass in body axes, kg m^2.
+        weightless: share of the weight that a force at the centre of mass takes off.
+    """
+
+    parent: str = ""
+    position: Vector = ZERO
+    orientation: Vector = UPRIGHT
+    mass: float = 0.0
+    com: Vector = ZERO
+    inertia: Vector = (0.0,) * 6
+    weightless: float = 0.0
+    sizes: ClassVar[dict[str, int]] = {"position": 3, "orientation": 4, "com": 3, "inertia": 6}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint(_Named):
+    """How a body moves against its parent; several of one body act in their order.
+
+    Attributes:
+        body: whose.
+        type: free, ball, slide or hinge.
+        axis, anchor: in body axes, unit and m.
+        reference: coordinate at the pose of `Body.position`, m or rad; slide and hinge alone.
+        range: lowest and highest coordinate, m or rad; of a ball joint 0 and the largest angle.
+        margin: distance to the bound at which its row begins to act.
+        armature: added to the joint's inertia, kg m^2 or kg.
+        damping: b0, b1, b2 of the force -(b0 v + b1 v |v| + b2 v^3).
+        stiffness: k0, k1, k2 of the force -(k0 x + k1 x^2 + k2 x^3), x = q - rest.
+        rest: where the spring is at rest: one number, or four of a quaternion.
+        friction_loss: dry friction, N m or N.
+        force_range: bounds of the sum of the actuators' forces on it.
+        law: of the rows of its bounds.
+    """
+
+    body: str
+    type: str
+    axis: Vector = (0.0, 0.0, 1.0)
+    anchor: Vector = ZERO
+    reference: float = 0.0
+    range: Vector = UNBOUNDED
+    margin: float = 0.0
+    armature: float = 0.0
+    damping: Vector = ZERO
+    stiffness: Vector = ZERO
+    rest: Vector = (0.0,)
+    friction_loss: float = 0.0
+    force_range: Vector = UNBOUNDED
+    law: RowLaw = STIFF
+    sizes: ClassVar[dict[str, int]] = {
+        "axis": 3, "anchor": 3, "range": 2, "damping": 3, "stiffness": 3, "force_range": 2,
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Check the type and bring the axis to length 1."""
+        _Named.__post_init__(self)
+        if self.type not in WIDTHS:
+            raise SceneError(f"Joint {self.name!r}: type is {shown(self.type)}; valid: {', '.join(WIDTHS)}.")
+        length = math.hypot(*self.axis)
+        if not length > 0.0:
+            raise SceneError(f"Joint {self.name!r}: axis is {list(self.axis)}; it must not be zero.")
+        object.__setattr__(self, "axis", tuple(number / length for number in self.axis))
+        size = 4 if self.type in ("ball", "free") else 1
+        rest = UPRIGHT if size == 4 and len(self.rest) == 1 else self.rest
+        object.__setattr__(self, "rest", _vector(f"Joint {self.name!r}: rest", rest, size))
+
+    @property
+    def limited(self) -> bool:
+        """Whether it has a bound."""
+        return math.isfinite(self.range[0]) or math.isfinite(self.range[1])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape(_Named):
+    """A solid on a body, for contacts and for the eye.
+
+    Attributes:
+        body: whose; empty for the world.
+        type: sphere, capsule, cylinder, box, ellipsoid or plane.
+        size: as MuJoCo's: radius; radius and half length; half sides; semi-axes, m.
+        position, orientation: in body axes.
+        friction: sliding, torsional, rolling.
+        margin: added to the distance at which a row acts, m.
+    """
+
+    body: str = ""
+    type: str = "sphere"
+    size: Vector = ZERO
+    position: Vector = ZERO
+    orientation: Vector = UPRIGHT
+    friction: Vector = (1.0, 0.005, 0.0001)
+    margin: float = 0.0
+    sizes: ClassVar[dict[str, int]] = {"size": 3, "position": 3, "orientation": 4, "friction": 3}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop(_Named):
+    """Rows that are always on.
+
+    Attributes:
+        type: connect (two points stay together), weld (two frames do) or joint (coordinates follow a polynomial).
+        first, second: names of two bodies (the second may be empty: the world) or two joints (the second may be empty).
+        first_position, second_position: of the points in body axes, m.
+        orientation: of the second body in the first, for a weld.
+        polynomial: x1 - x1ref = c0 + c1 y + ... + c4 y^4, y = x2 - x2ref, for a joint loop.
+        torque_scale: of a weld's rotational rows, m.
+        law: of its rows.
+    """
+
+    type: str
+    first: str
+    second: str = ""
+    first_position: Vector = ZERO
+    second_position: Vector = ZERO
+    orientation: Vector = UPRIGHT
+    polynomial: Vector = (0.0, 1.0, 0.0, 0.0, 0.0)
+    torque_scale: float = 1.0
+    law: RowLaw = STIFF
+    sizes: ClassVar[dict[str, int]] = {
+        "first_position": 3, "second_position": 3, "orientation": 4, "polynomial": 5,
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Check the type."""
+        _Named.__post_init__(self)
+        if self.type not in ("connect", "weld", "joint"):
+            raise SceneError(f"Loop {self.name!r}: type is {shown(self.type)}; valid: connect, weld, joint.")
+
+    @property
+    def width(self) -> int:
+        """Number of its rows."""
+        return {"connect": 3, "weld": 6, "joint": 1}[self.type]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tendon(_Named):
+    """A length l = sum c_j q_j of joints.
+
+    Attributes:
+        joints, coefficients: what it adds up, hinges and slides alone.
+        damping, stiffness: as of a joint, of the length.
+        rest: dead band of the spring, lowest and highest length.
+        range, margin, law: as of a joint.
+        friction_loss: as of a joint.
+    """
+
+    joints: tuple[str, ...]
+    coefficients: Vector
+    damping: Vector = ZERO
+    stiffness: Vector = ZERO
+    rest: Vector = (0.0, 0.0)
+    range: Vector = UNBOUNDED
+    margin: float = 0.0
+    friction_loss: float = 0.0
+    law: RowLaw = STIFF
+    sizes: ClassVar[dict[str, int]] = {
+        "damping": 3, "stiffness": 3, "rest": 2, "range": 2,
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Check that every joint has its coefficient."""
+        _Named.__post_init__(self)
+        what = f"Tendon {self.name!r}: coefficients"
+        object.__setattr__(self, "coefficients", _vector(what, self.coefficients, len(self.joints)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Actuator(_Named):
+    """A force (g0 + g1 l + g2 l') u + b0 + b1 l + b2 l' on a joint or tendon, l = gear x.
+
+    Attributes:
+        joint, tendon: what it acts on; one of them is empty.
+        gear: one number; of a ball or free joint, as many as it has velocities.
+        gain: g0, g1, g2.
+        bias: b0, b1, b2.
+        armature: gear^2 armature is added to the joint's, kg m^2.
+        damping: -gear^2 damping v acts on the joint.
+        control_range, force_range: bounds of u, and of the force.
+    """
+
+    joint: str = ""
+    tendon: str = ""
+    gear: Vector = (1.0,)
+    gain: Vector = (1.0, 0.0, 0.0)
+    bias: Vector = ZERO
+    armature: float = 0.0
+    damping: float = 0.0
+    control_range: Vector = UNBOUNDED
+    force_range: Vector = UNBOUNDED
+    sizes: ClassVar[dict[str, int]] = {"gain": 3, "bias": 3, "control_range": 2, "force_range": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """Bodies on joints and what acts between them; see the module.
+
+    Attributes:
+        bodies: depth-first: behind its parent, and no other branch in between. Engines number them so.
+        joints: those of one body stand together, in the order of the bodies.
+        shapes, loops, tendons, actuators: what else there is.
+        gravity: m/s^2.
+    """
+
+    bodies: tuple[Body, ...] = ()
+    joints: tuple[Joint, ...] = ()
+    shapes: tuple[Shape, ...] = ()
+    loops: tuple[Loop, ...] = ()
+    tendons: tuple[Tendon, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    gravity: Vector = (0.0, 0.0, -9.81)
+
+    def __post_init__(self) -> None:
+        """Check that names are unique, that every name which is spoken of is there, and the order of the parts."""
+        object.__setattr__(self, "gravity", _vector("Scene.gravity", self.gravity, 3))
+        for group in ("bodies", "joints", "shapes", "loops", "tendons", "actuators"):
+            object.__setattr__(self, group, tuple(getattr(self, group)))
+            _unique(group, getattr(self, group))
+        if len(self.bodies) > LARGEST:
+            raise SceneError(f"The scene has {len(self.bodies)} bodies; at most {LARGEST} can be run.")
+        self._check_order()
+        bodies, joints = {"", *(b.name for b in self.bodies)}, {j.name for j in self.joints}
+        tendons = {t.name for t in self.tendons}
+        for shape in self.shapes:
+            _known(shape, "body", shape.body, bodies)
+        for loop in self.loops:
+            among = joints | {""} if loop.type == "joint" else bodies
+            _known(loop, "first", loop.first, among - {""})
+            _known(loop, "second", loop.second, among)
+        for tendon in self.tendons:
+            for name in tendon.joints:
+                _known(tendon, "joints", name, joints)
+        for actuator in self.actuators:
+            _known(actuator, "joint", actuator.joint, joints | {""})
+            _known(actuator, "tendon", actuator.tendon, tendons | {""})
+
+    def _check_order(self) -> None:
+        seen: dict[str, int] = {"": -1}
+        branch: list[str] = []
+        for i, body in enumerate(self.bodies):
+            _known(body, "parent", body.parent, seen)
+            seen[body.name] = i
+            while branch and body.parent != branch[-1]:
+                branch.pop()
+            if body.parent and not branch:
+                raise SceneError(
+                    f"Body {body.name!r} hangs on {body.parent!r}, whose branch has ended before it: "
+                    "Scene.bodies must stand branch by branch (depth-first)."
+                )
+            branch.append(body.name)
+        for joint in self.joints:
+            _known(joint, "body", joint.body, set(seen) - {""})
+            if joint.type == "free" and self.bodies[seen[joint.body]].parent:
+                raise SceneError(f"Joint {joint.name!r}: a free joint belongs to a body of the world.")
+        places = [seen[joint.body] for joint in self.joints]
+        if places != sorted(places):
+            raise SceneError("Scene.joints must stand in the order of the bodies.")
+
+    def replace(self, **changes: Any) -> Scene:
+        """Return a copy with other parts."""
+        return dataclasses.replace(self, **changes)
+
+    @property
+    def bounded(self) -> tuple[Joint | Tendon, ...]:
+        """What may have bounds, in the order of their rows."""
+        return (*self.joints, *self.tendons)
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates."""
+        return sum(WIDTHS[joint.type][0] for joint in self.joints)
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return sum(WIDTHS[joint.type][1] for joint in self.joints)
+
+
+def _unique(group: str, parts: Sequence[_Named]) -> None:
+    seen: set[str] = set()
+    for part in parts:
+        if part.name in seen:
+            raise SceneError(f"Scene.{group} has the name {part.name!r} twice.")
+        seen.add(part.name)
+
+
+def _known(part: _Named, field: str, name: str, among: Any) -> None:
+    if name not in among:
+        raise SceneError(
+            f"{type(part).__name__} {part.name!r}: {field} is {shown(name)}, which does not exist (before it)."
+        )

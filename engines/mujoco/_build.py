@@ -1,0 +1,101 @@
+"""A scene as a model of MuJoCo, element by element."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from crossbody.cases import CaseUnsupported
+from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Tendon
+from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
+
+
+def compiled(spec: Any, scene: Scene) -> Any:
+    """Return the compiled model, with what no element of the format says: where the springs of ball joints rest."""
+    model = spec.compile()
+    for joint in scene.joints:
+        if joint.type == "ball":
+            at = int(model.joint(joint.name).qposadr[0])
+            model.qpos_spring[at : at + 4] = joint.rest
+    return model
+
+
+def spec_of(scene: Scene) -> Any:
+    """Return a scene as an editable model."""
+    spec = mujoco.MjSpec()
+    spec.compiler.balanceinertia = False
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.compiler.degree, spec.compiler.autolimits = False, False
+    spec.option.gravity = scene.gravity
+    bodies = {"": spec.worldbody}
+    for body in scene.bodies:
+        added = bodies[body.parent].add_body(
+            name=body.name, pos=body.position, quat=body.orientation, mass=body.mass, ipos=body.com,
+            gravcomp=body.weightless, explicitinertial=True,
+        )  # fmt: skip
+        # The full inertia stands in the order xx yy zz xy xz yz.
+        added.fullinertia = body.inertia if body.mass > 0.0 else np.full(6, np.nan)
+        bodies[body.name] = added
+        for joint in scene.joints:
+            if joint.body == body.name:
+                _add_joint(added, joint)
+    for tendon in scene.tendons:
+        _add_tendon(spec, tendon)
+    for loop in scene.loops:
+        _add_loop(spec, loop)
+    for actuator in scene.actuators:
+        _add_actuator(spec, actuator)
+    return spec
+
+
+def _bounds(bounds: tuple[float, ...]) -> tuple[bool, tuple[float, ...]]:
+    """Return whether there is a bound, and both of them; one that is not there is far away."""
+    return bool(np.isfinite(bounds).any()), tuple(np.clip(bounds, -1e10, 1e10))
+
+
+def _solref(law: RowLaw) -> tuple[float, float]:
+    return -MAX_IMPEDANCE * law.a0, -MAX_IMPEDANCE * law.a1
+
+
+def _add_joint(body: Any, joint: Joint) -> None:
+    added = body.add_joint(
+        name=joint.name, type=getattr(mujoco.mjtJoint, f"mjJNT_{joint.type.upper()}"), axis=joint.axis,
+        pos=joint.anchor, ref=joint.reference, margin=joint.margin, armature=joint.armature,
+        springref=joint.rest[0],
+    )  # fmt: skip
+    added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
+    added.limited, added.range = _bounds(joint.range)
+    added.actfrclimited, added.actfrcrange = _bounds(joint.force_range)
+    added.solref_limit, added.solimp_limit = _solref(joint.law), IMPEDANCE
+
+
+def _add_tendon(spec: Any, tendon: Tendon) -> None:
+    added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
+    added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
+    added.limited, added.range = _bounds(tendon.range)
+    added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE
+    for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
+        added.wrap_joint(name, c)
+
+
+def _add_loop(spec: Any, loop: Loop) -> None:
+    if loop.type != "joint":
+        raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
+    added = spec.add_equality(name=loop.name, type=mujoco.mjtEq.mjEQ_JOINT, active=True)
+    added.objtype = mujoco.mjtObj.mjOBJ_JOINT
+    added.name1, added.name2 = loop.first, loop.second
+    added.data[:5] = loop.polynomial
+    added.solref, added.solimp = _solref(loop.law), IMPEDANCE
+
+
+def _add_actuator(spec: Any, actuator: Actuator) -> None:
+    added = spec.add_actuator(name=actuator.name, target=actuator.joint or actuator.tendon)
+    added.trntype = mujoco.mjtTrn.mjTRN_JOINT if actuator.joint else mujoco.mjtTrn.mjTRN_TENDON
+    added.gear[: len(actuator.gear)] = actuator.gear
+    added.gaintype, added.biastype = mujoco.mjtGain.mjGAIN_AFFINE, mujoco.mjtBias.mjBIAS_AFFINE
+    added.gainprm[:3], added.biasprm[:3] = actuator.gain, actuator.bias
+    added.armature, added.damping[0] = actuator.armature, actuator.damping
+    added.ctrllimited, added.ctrlrange = _bounds(actuator.control_range)
+    added.forcelimited, added.forcerange = _bounds(actuator.force_range)

@@ -1,0 +1,253 @@
+"""Any scene of slides and hinges in MuJoCo: matched, built from the scene; default, the file as it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from crossbody.cases import Case, CaseUnsupported, Mode, SceneError
+from crossbody.cases._arrays import Floats
+from crossbody.cases.files import mjcf
+from crossbody.cases.files.without import strip
+from crossbody.cases.scene import Scene
+from crossbody.engines._log import Modes, Observe
+from crossbody.engines._scene import Forces, tendons
+from crossbody.engines.mujoco._build import compiled, spec_of
+from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
+from crossbody.engines.mujoco._scene import Scene as Prepared
+
+SLOWEST, OF_RATE = 1e-3, 0.02
+"""Largest step of the matched profile, s, and the part of the fastest time constant that it is: Runge-Kutta 4 leaves
+(1/50)^4 a time constant."""
+LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
+SOFT = "The file's rows are soft: their law varies with depth."
+HIDDEN = "MuJoCo has a row for a bound only where it acts."
+
+
+def why_not(case: Case, profile: str) -> str | None:
+    """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
+    if profile != "default":
+        return None
+    if not case.file:
+        return "There is no file to run as it stands."
+    try:
+        _from_file(case)
+    except SceneError as error:
+        return str(error)
+    return None
+
+
+def default_step(case: Case, profile: str) -> float:
+    """Return the file's own step, s, or for matched a part of the fastest time constant that forces of joints have."""
+    if profile == "default":
+        return float(_from_file(case).opt.timestep)
+    return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0))
+
+
+def fastest(scene: Scene, q: Floats, v: Floats) -> float:
+    """Return the largest rate, 1/s, with which springs, dampers and actuators move the bodies from a state."""
+    model = matched(scene)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = q, v
+    mujoco.mj_forward(model, data)
+    M, n, forces, step = np.zeros((model.nv, model.nv)), model.nv, Forces(scene), 1e-6
+    mujoco.mj_fullM(model, data, M)
+    lift = step * np.eye(n)
+    K = np.array([(forces(q + d, v) - forces(q - d, v)) / (2.0 * step) for d in lift]).T
+    D = np.array([(forces(q, v + d) - forces(q, v - d)) / (2.0 * step) for d in lift]).T
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [np.linalg.solve(M, K), np.linalg.solve(M, D)]])
+    return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
+
+
+def build(case: Case, profile: str, dt: float) -> Prepared:
+    """Compile the model of one profile.
+
+    Raises:
+        ValueError: MuJoCo's own, for a model that it refuses.
+    """
+    scene = _scene(case)
+    model = _from_file(case) if profile == "default" else matched(scene)
+    data = mujoco.MjData(model)
+    rows = Rows(scene, model, data)
+    prepared = Prepared(
+        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data), modes=rows.modes,
+        lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
+        observe=rows.observe(), instants=() if case.inputs is None else case.inputs.times.tolist(),
+        change=_change(case, data),
+    )  # fmt: skip
+    prepared.audit = _audit(case, profile, model, rows)
+    return prepared
+
+
+def _scene(case: Case) -> Scene:
+    if case.scene is None:
+        raise CaseUnsupported(f"{case.label} is not a scene.")
+    return case.scene
+
+
+def _from_file(case: Case) -> Any:
+    """Return MuJoCo's own reading of the file, less what is left out of every engine."""
+    model = mjcf.compiled(Path(case.file))
+    strip(model, str(case.parameters.get("without", "")))
+    return model
+
+
+def matched(scene: Scene) -> Any:
+    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no contacts."""
+    spec = spec_of(scene)
+    option = spec.option
+    option.integrator, option.solver = mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_NEWTON
+    option.tolerance, option.jacobian = 0.0, mujoco.mjtJacobian.mjJAC_DENSE
+    off = mujoco.mjtDisableBit
+    option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE | off.mjDSBL_CONTACT)
+    model = compiled(spec, scene)
+    without_regularisation(model)
+    return model
+
+
+def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
+    def start() -> None:
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = case.q0, case.v0
+
+    return start
+
+
+def _change(case: Case, data: Any) -> Callable[[float], None]:
+    given = case.inputs
+
+    def change(t: float) -> None:
+        if given is not None:
+            data.ctrl[:] = given.values[np.searchsorted(given.times, t)]
+
+    return change
+
+
+class Rows:
+    """The rows of a scene among those that MuJoCo has at a state.
+
+    Attributes:
+        always: number of rows that are always on; they stand first in both.
+    """
+
+    def __init__(self, scene: Scene, model: Any, data: Any) -> None:
+        self.scene, self.model, self.data = scene, model, data
+        self.always = sum(loop.width for loop in scene.loops)
+        self.places: dict[tuple[int, int, bool], int] = {}
+        row = self.always
+        groups = ((int(LIMITS[0]), scene.joints, model.joint), (int(LIMITS[1]), scene.tendons, model.tendon))
+        for kind, parts, named in groups:
+            for part in parts:
+                i = int(named(part.name).id)
+                for upper, bound in enumerate(part.range):
+                    if np.isfinite(bound):
+                        self.places[kind, i, bool(upper)] = row
+                        row += 1
+        self.nc = row
+
+    def constants(self) -> dict[str, Any]:
+        """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
+        model = self.model
+        solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
+        bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
+        solref += [bounds[kind][i] for kind, i, _ in self.places]
+        pairs = np.array(solref).reshape(-1, 2)
+        if (pairs >= 0.0).any():
+            return {"solref": pairs}
+        return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), np.zeros(len(pairs))), strict=True))
+
+    def lam(self) -> Floats:
+        """Return the multiplier of every row (nc,), 0 where it does not act."""
+        data, lam = self.data, np.zeros(self.nc)
+        lam[: self.always] = data.efc_force[: self.always]
+        for j in range(data.ne, data.nefc):
+            kind, part = int(data.efc_type[j]), int(data.efc_id[j])
+            if kind in LIMITS:
+                lam[self._place(j, kind, part)] += data.efc_force[j]
+        return lam
+
+    def _place(self, j: int, kind: int, part: int) -> int:
+        """Return which bound an active row is: the upper one has a falling gap."""
+        J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
+        if kind == LIMITS[0]:
+            return self.places[kind, part, bool(J.sum() < 0.0)]
+        tendon = next(one for one in self.scene.tendons if self.model.tendon(one.name).id == part)
+        slope = J[int(self.model.joint(tendon.joints[0]).dofadr[0])] * tendon.coefficients[0]
+        return self.places[kind, part, bool(slope < 0.0)]
+
+    def modes(self) -> Modes:
+        """Return the mode of every row: a bound is in contact where it pushes."""
+        lam = self.lam()[self.always :]
+        return (int(Mode.BILATERAL),) * self.always + tuple(int(Mode.CONTACT if x > 0.0 else Mode.FREE) for x in lam)
+
+    def observe(self) -> Observe:
+        """Return what reads gaps and energies of recorded states."""
+        data = mujoco.MjData(self.model)
+        T = tendons(self.scene)
+
+        def heights(q: Floats) -> list[float]:
+            h: list[float] = []
+            lengths = [*q, *(T @ q)]
+            for part, x in zip(self.scene.bounded, lengths, strict=True):
+                low, high = part.range
+                h += [x - low - part.margin] if np.isfinite(low) else []
+                h += [high - x - part.margin] if np.isfinite(high) else []
+            return h
+
+        def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
+            gaps, energy = np.empty((len(q), self.nc)), np.empty((len(q), 2))
+            for i in range(len(q)):
+                data.qpos[:], data.qvel[:] = q[i], v[i]
+                mujoco.mj_fwdPosition(self.model, data)
+                mujoco.mj_fwdVelocity(self.model, data)
+                mujoco.mj_energyPos(self.model, data)
+                mujoco.mj_energyVel(self.model, data)
+                gaps[i] = [*data.efc_pos[: self.always], *heights(q[i])]
+                spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
+                energy[i] = data.energy[1], data.energy[0] + spared.sum()
+            return gaps, energy
+
+        return observe
+
+
+def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
+    """Masses, M and bias at zero input; rows where all of them are always on."""
+    data = mujoco.MjData(model)
+
+    def look(q: Floats, v: Floats) -> None:
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+
+    def M(q: Floats) -> Floats:
+        look(q, np.zeros(model.nv))
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, full)
+        return full
+
+    def bias(q: Floats, v: Floats) -> Floats:
+        look(q, v)
+        return np.array(data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)
+
+    def H(q: Floats) -> Floats:
+        look(q, np.zeros(model.nv))
+        return np.array(data.efc_J).reshape(-1, model.nv)[: rows.nc]
+
+    def lam(q: Floats, v: Floats) -> Floats:
+        look(q, v)
+        return np.array(data.efc_force[: rows.nc])
+
+    found: dict[str, Any] = {
+        "masses": model.body_mass[1:].copy(), "gravity": float(np.linalg.norm(model.opt.gravity)),
+        "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
+    }  # fmt: skip
+    if profile == "matched":
+        found["constants"] = rows.constants()
+    hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
+    if rows.nc > rows.always:
+        return found | {"hidden": {**hidden, "H": HIDDEN, "lam": HIDDEN}}
+    return found | {"hidden": hidden, "H": H} | ({"lam": lam} if profile == "matched" else {})

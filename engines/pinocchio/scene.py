@@ -1,0 +1,170 @@
+"""Any scene of slides and hinges in Pinocchio: its own model, joint by joint, with rows and forces written apart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from crossbody.cases import Case, CaseUnsupported, Mode
+from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import Body, Joint, Scene
+from crossbody.engines import _scene as parts
+from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix
+from crossbody.engines.pinocchio._scene import Scene as Prepared
+from crossbody.engines.pinocchio._scene import World
+
+Placed = dict[str, tuple[int, Any]]
+"""Body -> joint that carries it, and its pose in that joint's frame."""
+
+
+def why_not(case: Case, profile: str) -> str | None:
+    """Return why a profile cannot do it: bounds and loops follow the law alone."""
+    if profile != "law":
+        return "The rows of a scene follow the law: impacts in no time and time stepping have none."
+    return None
+
+
+def build(case: Case, algebra: str) -> Prepared:
+    """Return the model of a scene with its forces and rows."""
+    scene = case.scene
+    if scene is None:
+        raise CaseUnsupported(f"{case.label} is not a scene.")
+    forces = parts.Forces(scene)
+    rows = parts.Rows(scene, forces)
+    model, placed = tree(scene)
+    model.armature[:] = forces.armature
+    reference = np.array([joint.reference for joint in scene.joints])
+    data = model.createData()
+
+    def apply(q: Floats, v: Floats, tau: Floats) -> None:
+        tau[:] = forces(q + reference, v) + lifted(scene, model, data, placed, q)
+
+    pinned = PinRows(
+        model, jacobian=lambda q: rows.jacobian(q + reference), heights=lambda q: rows.heights(q + reference),
+        drift=lambda q, v: rows.drift(q + reference, v), law=case.law, algebra=algebra, forces=apply,
+    )  # fmt: skip
+    span = np.ones(scene.nv)
+    return Prepared(
+        rows=pinned, observe=_observe(scene, model, forces, rows, reference), sizes=(span, span),
+        start=(case.q0 - reference, case.v0), chart=lambda q, v: (q + reference, v), world=_world(case, forces),
+        audit=_audit(scene, pinned, forces, apply, reference),
+    )  # fmt: skip
+
+
+def tree(scene: Scene) -> tuple[Any, Placed]:
+    """Return Pinocchio's model of the bodies, and where each of them is."""
+    model = pin.Model()
+    model.gravity.linear = np.array(scene.gravity)
+    placed: Placed = {"": (0, pin.SE3.Identity())}
+    for body in scene.bodies:
+        carrier, pose = placed[body.parent]
+        pose = pose * _pose(body.position, body.orientation)
+        for joint in scene.joints:
+            if joint.body != body.name:
+                continue
+            anchor = pin.SE3(np.eye(3), np.array(joint.anchor))
+            carrier = model.addJoint(carrier, _joint(joint), pose * anchor, joint.name)
+            pose = anchor.inverse()
+        placed[body.name] = (carrier, pose)
+        model.appendBodyToJoint(carrier, _inertia(body), pose)
+    return model, placed
+
+
+def _pose(position: Any, orientation: Any) -> Any:
+    w, x, y, z = orientation
+    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), np.array(position))
+
+
+def _joint(joint: Joint) -> Any:
+    kinds = {"hinge": pin.JointModelRevoluteUnaligned, "slide": pin.JointModelPrismaticUnaligned}
+    if joint.type not in kinds:
+        raise CaseUnsupported(f"Joint {joint.name!r} of type {joint.type} is not built in Pinocchio.")
+    return kinds[joint.type](np.array(joint.axis))
+
+
+def _inertia(body: Body) -> Any:
+    xx, yy, zz, xy, xz, yz = body.inertia
+    return pin.Inertia(body.mass, np.array(body.com), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+
+
+def lifted(scene: Scene, model: Any, data: Any, placed: Placed, q: Floats) -> Floats:
+    """Return the generalised force (nv,) of the weight that bodies are spared."""
+    total: Floats = np.zeros(model.nv)
+    spared = [body for body in scene.bodies if body.weightless]
+    if not spared:
+        return total
+    pin.computeJointJacobians(model, data, q)
+    for body in spared:
+        carrier, pose = placed[body.name]
+        world = data.oMi[carrier] * pose
+        J = pin.getJointJacobian(model, data, carrier, pin.LOCAL_WORLD_ALIGNED)
+        arm = world.act(np.array(body.com)) - data.oMi[carrier].translation
+        force = -body.weightless * body.mass * np.array(scene.gravity)
+        total += J[:3].T @ force + J[3:].T @ np.cross(arm, force)
+    return total
+
+
+def _observe(scene: Scene, model: Any, forces: parts.Forces, rows: parts.Rows, reference: Floats) -> Any:
+    """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
+    data = model.createData()
+    placed = tree(scene)[1]
+
+    def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        energy: Floats = np.empty((len(q), 2))
+        for i in range(len(q)):
+            # Armature is in Pinocchio's M but not in its kinetic energy.
+            energy[i, 0] = pin.computeKineticEnergy(model, data, q[i], v[i]) + 0.5 * (model.armature * v[i]) @ v[i]
+            energy[i, 1] = pin.computePotentialEnergy(model, data, q[i])
+            for body in scene.bodies:
+                if body.weightless:
+                    carrier, pose = placed[body.name]
+                    height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
+                    energy[i, 1] += body.weightless * body.mass * height
+        at = q + reference
+        energy[:, 1] += forces.energy(at)
+        return np.array([rows.heights(one) for one in at]).reshape(len(q), -1), energy
+
+    return observe
+
+
+def _world(case: Case, forces: parts.Forces) -> World:
+    """The controls, from one change to the next."""
+    given = case.inputs
+    if given is None:
+        return World()
+
+    def change(t: float, _q: Floats, _v: Floats) -> None:
+        forces.change(given.values[np.searchsorted(given.times, t)])
+
+    return World(instants=given.times.tolist(), change=change, reset=lambda: forces.change(0.0 * forces.u))
+
+
+def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, reference: Floats) -> dict[str, Any]:
+    """What differs from the rows' own audit: masses body by body, forces at zero input, and the scene's coordinates."""
+    model, data = rows.model, rows.data
+    on = rows_on(rows)
+
+    def bias(q: Floats, v: Floats) -> Floats:
+        forces.change(0.0 * forces.u)
+        apply(q - reference, v, rows.tau)
+        total: Floats = pin.nonLinearEffects(model, data, q - reference, v) - rows.tau
+        return total
+
+    def lam(q: Floats, v: Floats) -> Floats:
+        forces.change(0.0 * forces.u)
+        return rows.accelerate(q - reference, v, on)[1]
+
+    return {
+        "masses": np.array([body.mass for body in scene.bodies]),
+        "M": lambda q: mass_matrix(model, data, q - reference),
+        "bias": bias,
+        "H": lambda q: rows.jacobian(q - reference),
+        "lam": lam,
+    }
+
+
+def rows_on(rows: PinRows) -> tuple[int, ...]:
+    """Every row active."""
+    return tuple(int(Mode.CONTACT) for _ in range(rows.nc))

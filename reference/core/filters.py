@@ -1,0 +1,122 @@
+"""Which rows and guards may switch in a step, by bounds from what its stages have evaluated anyway."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference._cache import inlined
+from crossbody.reference._kinds import Bytes
+from crossbody.reference.core import bogacki, dop853_table, esdirk
+from crossbody.reference.core.layout import (
+    BETWEEN,
+    CONTACT,
+    EXACT,
+    EXPLICIT,
+    FREE,
+    IMPLICIT,
+    LEVEL,
+    NODES,
+    SHORT,
+    Work,
+)
+
+# What values at the stages say about the whole step (linear programming over all polynomials of a degree).
+STAGES_RANGE = 1.7  # degree 6 within a range at the stages of DOP853: how many times the range it may leave it by
+STAGES_OFF = 4.0  # the same, of what is off a parabola: 3.02 for degree 6, of ESDIRK 1.98 for degree 4
+GAPS_OFF = 0.2  # twice the most that x^2 (1 - x)^2 times a parabola of 1 at the three stages comes to
+
+
+@inlined
+def _stays_clear(start: float, middle: float, end: float, place: float, off: float) -> bool:
+    """Whether a function is positive in the step: the parabola through three of its values, less what it may be off."""
+    turn = (middle - (1.0 - place) ** 2 * start - place**2 * end) / (2.0 * place * (1.0 - place))
+    least, bend = min(start, end), start - 2.0 * turn + end
+    if turn < least and bend > 0.0:
+        least = start - (turn - start) ** 2 / bend if 0.0 <= start - turn <= bend else turn
+    return bool(least > STAGES_OFF * off)
+
+
+@inlined
+def _presses_on(s: Any, w: Work, i: int) -> bool:
+    """Whether the multiplier of an active row stays positive, as far as the stages tell."""
+    last, middle = NODES - 1, 9 if s.method == EXPLICIT else 1
+    start, end = w.lams[0, i], w.lams[last, i]
+    low, high = min(start, end), max(start, end)
+    for stage in range(1, s.end):
+        low, high = min(low, w.lam_at[stage, i]), max(high, w.lam_at[stage, i])
+    if not low > 0.0 or low > STAGES_RANGE * (high - low):
+        return bool(low > 0.0)
+    off, half = 0.0, w.lam_at[middle, i]
+    for stage in range(1, s.end):
+        c = _stage_place(s, stage)
+        off = max(off, abs(w.lam_at[stage, i] - _parabola(start, half, end, _stage_place(s, middle), c)))
+    return _stays_clear(start, half, end, _stage_place(s, middle), off)
+
+
+@inlined
+def _parabola(start: float, middle: float, end: float, place: float, c: float) -> float:
+    """Value at c of the parabola through three values, of which the second stands at `place`."""
+    return float(
+        start * (c - place) * (c - 1.0) / place
+        + middle * c * (c - 1.0) / (place * (place - 1.0))
+        + end * c * (c - place) / (1.0 - place)
+    )
+
+
+@inlined
+def _stage_place(s: Any, stage: int) -> float:
+    """Where a stage of the method stands in the step."""
+    if s.method == EXPLICIT:
+        return float(dop853_table.C[stage])
+    return float(esdirk.C[stage]) if s.method == IMPLICIT else float(bogacki.C[stage])
+
+
+@inlined
+def _between(s: Any, place: int) -> float:
+    """Where the stage stands at which gaps and guards were looked at."""
+    if s.method == EXPLICIT:
+        return _stage_place(s, 4 * place + 4 - 2 * (place // 2))
+    return _stage_place(s, place + 2)
+
+
+@inlined
+def _stays_open(s: Any, w: Work, i: int) -> bool:
+    """Whether a gap stays positive: the cubic through its ends and slopes, less what three stages are off it.
+
+    What is off is x^2 (1 - x)^2 times a parabola, if the gap has degree six.
+    """
+    last = NODES - 1
+    h0, h1 = w.gaps[0, i], w.gaps[last, i]
+    c0, c1 = h0 + s.hs / 3.0 * w.rates[0, i], h1 - s.hs / 3.0 * w.rates[last, i]
+    low = min(h0, h1, c0, c1)
+    if not low > 0.0 or s.method == SHORT:
+        return bool(low > max(h0, h1, c0, c1) - low)
+    off = 0.0
+    for place in range(BETWEEN):
+        c = _between(s, place)
+        d = 1.0 - c
+        cubic = d * d * (d * h0 + 3.0 * c * c0) + c * c * (3.0 * d * c1 + c * h1)
+        off = max(off, abs(w.gap_at[place, i] - cubic) / (c * d) ** 2)
+    return bool(low > GAPS_OFF * off)
+
+
+@inlined
+def row_may_switch(s: Any, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether a row may switch in this step, by bounds from what the stages have evaluated anyway."""
+    if s.method == EXACT or s.fsm != LEVEL or (mode[i] != FREE and mode[i] != CONTACT):
+        return True
+    return not (_stays_open(s, w, i) if mode[i] == FREE else _presses_on(s, w, i))
+
+
+@inlined
+def switch_may_fire(s: Any, w: Work, i: int) -> bool:
+    """Whether the guard of a discrete variable may fire in this step."""
+    if s.method == EXACT:
+        return True
+    start, end = w.guards[0, i], w.guards[NODES - 1, i]
+    if s.method == SHORT:
+        return not min(start, end) > abs(end - start)
+    off, half, middle = 0.0, w.guard_at[1, i], _between(s, 1)
+    for place in range(BETWEEN):
+        off = max(off, abs(w.guard_at[place, i] - _parabola(start, half, end, middle, _between(s, place))))
+    return not _stays_clear(start, half, end, middle, off)

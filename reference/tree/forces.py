@@ -1,0 +1,156 @@
+"""Forces on the joints: springs, dampers, weight that is taken off, tendons and actuators."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference import kernels
+from crossbody.reference._kinds import Array
+from crossbody.reference.tree import layout
+
+
+@kernels.helper
+def clamped(x: Any, low: Any, high: Any) -> Any:
+    """Return x within its bounds."""
+    if x.real < low.real:
+        return low + 0.0 * x
+    return high + 0.0 * x if x.real > high.real else x
+
+
+@kernels.helper
+def turn(q: Array, at: int, p: Array, rest: int) -> tuple[Any, Any, Any]:
+    """Return the rotation vector, in body axes, that leads from the quaternion at p[rest:] to the one at q[at:]."""
+    a, b, c, d = p[rest], -p[rest + 1], -p[rest + 2], -p[rest + 3]
+    e, f, g, h = q[at], q[at + 1], q[at + 2], q[at + 3]
+    cos = a * e - b * f - c * g - d * h
+    x, y, z = a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e
+    square = x * x + y * y + z * z
+    if square.real < 1e-24 * (cos * cos).real:
+        return 2.0 * x / cos, 2.0 * y / cos, 2.0 * z / cos
+    sin = np.sqrt(square)
+    scale = 2.0 * np.arctan(sin / cos) / sin
+    return scale * x, scale * y, scale * z
+
+
+@kernels.helper
+def spring(p: Array, k: int, x: Any) -> Any:
+    """Return k0 x + k1 x^2 + k2 x^3 by the constants at p[k:]."""
+    return x * (p[k] + x * (p[k + 1] + x * p[k + 2]))
+
+
+@kernels.helper
+def stored(p: Array, k: int, x: Any) -> Any:
+    """Return the energy of such a spring."""
+    return x * x * (p[k] / 2.0 + x * (p[k + 1] / 3.0 + x * p[k + 2] / 4.0))
+
+
+@kernels.helper
+def damper(p: Array, b: int, v: Any) -> Any:
+    """Return b0 v + b1 v |v| + b2 v^3 by the constants at p[b:]."""
+    size = v if v.real > 0.0 else -v
+    return v * (p[b] + size * p[b + 1] + v * v * p[b + 2])
+
+
+@kernels.helper
+def length(q: Array, p: Array, o: int) -> Any:
+    """Return the length of the tendon at p[o:]."""
+    total = 0.0 * q[0]
+    for j in range(int(p[o + layout.COUNT].real)):
+        k = o + layout.FIRST + 3 * j
+        total += p[k + 2] * q[int(p[k].real)]
+    return total
+
+
+@kernels.helper
+def rate(v: Array, p: Array, o: int) -> Any:
+    """Return how fast it changes."""
+    total = 0.0 * v[0]
+    for j in range(int(p[o + layout.COUNT].real)):
+        k = o + layout.FIRST + 3 * j
+        total += p[k + 2] * v[int(p[k + 1].real)]
+    return total
+
+
+@kernels.helper
+def slack(p: Array, o: int, x: Any) -> Any:
+    """Return how far a length is outside the dead band of the tendon at p[o:]."""
+    if x.real > p[o + layout.BAND + 1].real:
+        return x - p[o + layout.BAND + 1]
+    return x - p[o + layout.BAND] if x.real < p[o + layout.BAND].real else 0.0 * x
+
+
+@kernels.helper
+def tendon(p: Array, i: int) -> int:
+    """Return where tendon i stands in p."""
+    o = int(p[layout.AT_TENDON].real)
+    for _ in range(i):
+        o += layout.FIRST + 3 * int(p[o + layout.COUNT].real)
+    return o
+
+
+@kernels.helper
+def passive(q: Array, v: Array, p: Array, f: Array) -> None:
+    """Fill f (n,) with what springs and dampers do."""
+    at_dof, at_node = int(p[layout.AT_DOF].real), int(p[layout.AT_NODE].real)
+    for j in range(int(p[layout.DOFS].real)):
+        f[j] = -damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
+    for i in range(int(p[layout.NODES].real)):
+        o = at_node + layout.NODE * i
+        k = o + layout.STIFFNESS
+        if p[k] == 0.0 and p[k + 1] == 0.0 and p[k + 2] == 0.0:
+            continue
+        at, j = int(p[o + layout.Q].real), int(p[o + layout.V].real)
+        if p[o + layout.TYPE].real >= layout.SLIDE:
+            f[j] -= spring(p, k, q[at] - p[o + layout.REST])
+            continue
+        if p[o + layout.TYPE].real == layout.FREE:
+            at, j = at + 3, j + 3
+        x, y, z = turn(q, at, p, o + layout.REST)
+        size = np.sqrt(x * x + y * y + z * z)
+        stiffness = p[k] + size * (p[k + 1] + size * p[k + 2])
+        f[j], f[j + 1], f[j + 2] = f[j] - stiffness * x, f[j + 1] - stiffness * y, f[j + 2] - stiffness * z
+    for i in range(int(p[layout.TENDONS].real)):
+        o = tendon(p, i)
+        force = spring(p, o + layout.STIFF, slack(p, o, length(q, p, o))) + damper(p, o + layout.DAMP, rate(v, p, o))
+        pull(p, o, -force, f)
+
+
+@kernels.helper
+def pull(p: Array, o: int, force: Any, f: Array) -> None:
+    """Add what a force along the tendon at p[o:] does to its joints."""
+    for j in range(int(p[o + layout.COUNT].real)):
+        k = o + layout.FIRST + 3 * j
+        f[int(p[k + 1].real)] += p[k + 2] * force
+
+
+@kernels.helper
+def actuated(q: Array, v: Array, u: Array, p: Array, sums: Array) -> None:
+    """Add the actuators' forces to sums (n,), each within its own bounds."""
+    for i in range(int(p[layout.ACTUATORS].real)):
+        o = int(p[layout.AT_ACTUATOR].real) + layout.ACTUATOR * i
+        which = int(p[o + layout.WHICH].real)
+        if p[o + layout.TARGET].real == layout.ON_TENDON:
+            at = tendon(p, which)
+            force = actuator(p, o, u[i], p[o + layout.GEAR] * length(q, p, at), p[o + layout.GEAR] * rate(v, p, at))
+            pull(p, at, p[o + layout.GEAR] * force, sums)
+            continue
+        width, speed = 0, 0.0 * v[0]
+        for k in range(6):
+            if p[o + layout.GEAR + k] != 0.0 and which + k < len(v):
+                speed += p[o + layout.GEAR + k] * v[which + k]
+                width = k + 1
+        x = p[o + layout.GEAR] * q[int(p[o + layout.ANGLE].real)] if width == 1 else 0.0 * speed
+        force = actuator(p, o, u[i], x, speed)
+        for k in range(width):
+            sums[which + k] += p[o + layout.GEAR + k] * force
+
+
+@kernels.helper
+def actuator(p: Array, o: int, u: Any, x: Any, speed: Any) -> Any:
+    """Return the force of the actuator at p[o:] at a length and its rate."""
+    u = clamped(u, p[o + layout.CONTROL], p[o + layout.CONTROL + 1])
+    gain = p[o + layout.GAIN] + p[o + layout.GAIN + 1] * x + p[o + layout.GAIN + 2] * speed
+    force = gain * u + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
+    return clamped(force, p[o + layout.FORCE], p[o + layout.FORCE + 1])

@@ -1,0 +1,30 @@
+"""Where each number of a scene stands in the parameters and in the scratch of the kernels."""
+
+from __future__ import annotations
+
+FREE, BALL, SLIDE, HINGE = range(4)
+
+# Head of the table: sizes, gravity, where each part begins, and the potential energy of what never moves.
+NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, RESTING, HEAD = (
+    0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14,
+)  # fmt: skip
+
+# A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
+TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (
+    0, 1, 2, 3, 4, 5, 6, 42, 45, 48, 49, 52, 58, 62, 65, 69,
+)  # fmt: skip
+# A degree of freedom: the one before it on the way to the world, armature, damping, bounds of its actuators' sum.
+BEFORE, ARMATURE, DAMPING, FORCE_LOW, FORCE_HIGH, DOF = 0, 1, 2, 5, 6, 7
+# An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds.
+TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTUATOR = 0, 1, 2, 3, 9, 12, 15, 17, 19
+ON_JOINT, ON_TENDON = 0, 1
+# A tendon: its spring, damper and bounds; then joint by joint the coordinate, the velocity and the coefficient.
+COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
+# A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
+KIND, ROW = 0, 24
+LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT = range(4)
+
+# What is kept of a node while it is computed: pose (rotation by rows, position), velocity, acceleration without v',
+# force, inertia; of a degree of freedom: its motion subspace (angular, linear).
+POSE_AT, V_AT, A_AT, F_AT, I_AT, NODE_SCRATCH = 0, 12, 18, 24, 30, 40
+DOF_SCRATCH = 6

@@ -1,0 +1,147 @@
+"""The kernels of a scene: mass matrix and forces, gaps and rows, energy and power."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference import kernels
+from crossbody.reference._kinds import Array, Index
+from crossbody.reference.tree import forces, layout, sweeps
+
+
+@kernels.dynamics
+def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Array, w: Array) -> None:
+    """M by composite inertias; f = springs, dampers, actuators less the bias."""
+    forces.passive(q, v, p, f)
+    if len(u) > 0:
+        n, at_dof = len(f), int(p[layout.AT_DOF].real)
+        sums = w[len(w) - n :]
+        sums[:] = 0.0
+        forces.actuated(q, v, u, p, sums)
+        for j in range(n):
+            o = at_dof + layout.DOF * j
+            f[j] += forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
+    sweeps.outwards(q, v, p, w)
+    sweeps.inwards(p, w, M, f)
+
+
+@kernels.helper
+def _row(q: Array, v: Array, p: Array, i: int) -> tuple[Any, Any, Any]:
+    """Return gap, rate and H' v of row i."""
+    o = int(p[layout.AT_ROW].real) + layout.ROW * i
+    kind = int(p[o].real)
+    if kind == layout.LIMIT:
+        return p[o + 1] * (q[int(p[o + 2].real)] - p[o + 4]), p[o + 1] * v[int(p[o + 3].real)], 0.0 * v[0]
+    if kind == layout.TENDON_LIMIT:
+        at = forces.tendon(p, int(p[o + 2].real))
+        return p[o + 1] * (forces.length(q, p, at) - p[o + 3]), p[o + 1] * forces.rate(v, p, at), 0.0 * v[0]
+    y, yd = 0.0 * q[0], 0.0 * v[0]
+    if p[o + 4].real >= 0.0:
+        y, yd = q[int(p[o + 4].real)] - p[o + 6], v[int(p[o + 5].real)]
+    c = o + 7
+    value = p[c] + y * (p[c + 1] + y * (p[c + 2] + y * (p[c + 3] + y * p[c + 4])))
+    slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
+    curve = 2.0 * p[c + 2] + y * (6.0 * p[c + 3] + y * 12.0 * p[c + 4])
+    h = q[int(p[o + 1].real)] - p[o + 3] - value
+    return h, v[int(p[o + 2].real)] - slope * yd, -curve * yd * yd
+
+
+@kernels.helper
+def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
+    """Fill H (n,) of row i where it is not zero."""
+    o = int(p[layout.AT_ROW].real) + layout.ROW * i
+    kind = int(p[o].real)
+    if kind == layout.LIMIT:
+        H[int(p[o + 3].real)] = p[o + 1]
+    elif kind == layout.TENDON_LIMIT:
+        forces.pull(p, forces.tendon(p, int(p[o + 2].real)), p[o + 1] + 0.0 * q[0], H)
+    else:
+        H[int(p[o + 2].real)] = 1.0
+        if p[o + 4].real >= 0.0:
+            y, c = q[int(p[o + 4].real)] - p[o + 6], o + 7
+            slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
+            H[int(p[o + 5].real)] -= slope
+
+
+@kernels.gaps
+def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
+    """Of every row."""
+    for i in range(len(h)):
+        h[i], hd[i], _ = _row(q, v, p, i)
+
+
+@kernels.rows
+def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, H: Array, h: Array, Hdv: Array) -> None:
+    """The active ones."""
+    H[:na] = 0.0
+    for j in range(na):
+        h[j], _, Hdv[j] = _row(q, v, p, idx[j])
+        _gradient(q, p, idx[j], H[j])
+
+
+@kernels.helper
+def _stored(q: Array, p: Array, o: int) -> Any:
+    """Return the energy of the spring of the node at p[o:]."""
+    at, k = int(p[o + layout.Q].real), o + layout.STIFFNESS
+    if p[k] == 0.0 and p[k + 1] == 0.0 and p[k + 2] == 0.0:
+        return 0.0 * q[0]
+    if p[o + layout.TYPE].real >= layout.SLIDE:
+        return forces.stored(p, k, q[at] - p[o + layout.REST])
+    x, y, z = forces.turn(q, at + 3 if p[o + layout.TYPE].real == layout.FREE else at, p, o + layout.REST)
+    return forces.stored(p, k, np.sqrt(x * x + y * y + z * z))
+
+
+@kernels.energy
+def energy(q: Array, v: Array, p: Array, e: Array) -> None:
+    """T = sum of V.IV/2 over the nodes and of armatures; V of weight, of what is spared of it, and of springs."""
+    nodes = int(p[layout.NODES].real)
+    w = np.empty(layout.NODE_SCRATCH * nodes + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
+    sweeps.outwards(q, v, p, w)
+    kinetic, potential = 0.0 * q[0], p[layout.RESTING] + 0.0 * q[0]
+    for i in range(nodes):
+        o, x = int(p[layout.AT_NODE].real) + layout.NODE * i, layout.NODE_SCRATCH * i
+        root = layout.NODE_SCRATCH * int(p[o + layout.ROOT].real)
+        sweeps.inertia(p, o, w, x, root)
+        y, at = x + layout.V_AT, x + layout.I_AT
+        n, f = sweeps.times(w, at, w[y], w[y + 1], w[y + 2], w[y + 3], w[y + 4], w[y + 5])
+        kinetic += w[y] * n[0] + w[y + 1] * n[1] + w[y + 2] * n[2] + w[y + 3] * f[0] + w[y + 4] * f[1] + w[y + 5] * f[2]
+        m = p[o + layout.MASS]
+        lifted = o + layout.LIFT  # what its parts are spared: sum of c m, and of c m times their centres
+        c0 = m * p[o + layout.COM] - p[lifted + 1]
+        c1 = m * p[o + layout.COM + 1] - p[lifted + 2]
+        c2 = m * p[o + layout.COM + 2] - p[lifted + 3]
+        moment = sweeps.turned(w, x, c0, c1, c2)
+        for k in range(3):
+            potential -= p[layout.GRAVITY + k] * (moment[k] + (m - p[lifted]) * w[x + 9 + k])
+        potential += _stored(q, p, o)
+    for j in range(len(v)):
+        kinetic += p[int(p[layout.AT_DOF].real) + layout.DOF * j + layout.ARMATURE] * v[j] * v[j]
+    for i in range(int(p[layout.TENDONS].real)):
+        o = forces.tendon(p, i)
+        potential += forces.stored(p, o + layout.STIFF, forces.slack(p, o, forces.length(q, p, o)))
+    e[0], e[1] = 0.5 * kinetic, potential
+
+
+@kernels.power
+def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
+    """Of the actuators, and what dampers take."""
+    n, at_dof = len(v), int(p[layout.AT_DOF].real)
+    given, taken = 0.0 * v[0], 0.0 * v[0]
+    if len(u) > 0:
+        sums = np.zeros(n, dtype=q.dtype)
+        forces.actuated(q, v, u, p, sums)
+        for j in range(n):
+            o = at_dof + layout.DOF * j
+            given += v[j] * forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
+    for j in range(n):
+        taken += v[j] * forces.damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
+    for i in range(int(p[layout.TENDONS].real)):
+        o = forces.tendon(p, i)
+        speed = forces.rate(v, p, o)
+        taken += speed * forces.damper(p, o + layout.DAMP, speed)
+    e[0], e[1] = given, taken
+
+
+KERNELS: dict[str, Any] = {"dynamics": dynamics, "gaps": gaps, "rows": rows, "energy": energy, "power": power}

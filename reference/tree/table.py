@@ -1,0 +1,298 @@
+"""A scene as the table of numbers that the kernels read: one row a joint, nothing compiled for a model.
+
+A body with several joints is a chain of massless nodes, one without is fused into the node above. The pose of a node in
+its parent is T0 + c T1 + s T2, with c, s = cos, sin of a hinge's angle or c = travel of a slide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from crossbody.cases import SceneError
+from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Scene, Tendon
+from crossbody.reference._kinds import Index
+from crossbody.reference.tree import layout
+
+TYPES = {"free": layout.FREE, "ball": layout.BALL, "slide": layout.SLIDE, "hinge": layout.HINGE}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a body stands: its node (-1 for the world) and its constant pose in that node's frame."""
+
+    node: int
+    R: Floats
+    p: Floats
+
+
+WORLD = Place(node=-1, R=np.eye(3), p=np.zeros(3))
+
+
+@dataclass(slots=True, kw_only=True)
+class Inertia:
+    """Mass, first moment and second moment about the origin of a node, in its axes; and the weight it is spared."""
+
+    m: float = 0.0
+    mc: Floats = field(default_factory=lambda: np.zeros(3))
+    second: Floats = field(default_factory=lambda: np.zeros((3, 3)))
+    lifted: Floats = field(default_factory=lambda: np.zeros(4))
+
+    def add(self, body: Body, place: Place) -> None:
+        """Add a body that is fixed to the node."""
+        xx, yy, zz, xy, xz, yz = body.inertia
+        about_com = place.R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ place.R.T
+        c = place.p + place.R @ np.array(body.com)
+        self.m += body.mass
+        self.mc += body.mass * c
+        self.second += about_com + body.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        self.lifted += body.weightless * body.mass * np.array([1.0, *c])
+
+    def row(self) -> Floats:
+        """Mass, centre and inertia about it, and what it is spared: a node's entries from MASS on."""
+        c = self.mc / self.m if self.m > 0.0 else np.zeros(3)
+        J = self.second - self.m * (c @ c * np.eye(3) - np.outer(c, c))
+        return np.array([self.m, *c, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2], *self.lifted])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A scene for the kernels.
+
+    Attributes:
+        p: the parameters of the kernels.
+        places: body -> where it stands.
+        nodes: number of nodes.
+        dofs: joint -> its first velocity.
+        coordinates: joint -> its first coordinate.
+    """
+
+    p: Floats
+    places: dict[str, Place]
+    nodes: int
+    dofs: dict[str, int]
+    coordinates: dict[str, int]
+
+    @property
+    def scratch(self) -> int:
+        """Length of w that the kernels need; the actuators' sums stand at its end."""
+        return self.nodes * layout.NODE_SCRATCH + int(self.p[layout.DOFS]) * (layout.DOF_SCRATCH + 1)
+
+
+def rotation(quaternion: tuple[float, ...] | Floats) -> Floats:
+    """Return the rotation matrix of a quaternion (w first) of any length above 0."""
+    w, x, y, z = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
+def tabulate(scene: Scene) -> Table:
+    """Return the table of a scene.
+
+    Raises:
+        SceneError: for a scene without joints, or one that the kernels cannot do.
+    """
+    if not scene.joints:
+        raise SceneError("The scene has no joint: nothing can move.")
+    builder = _Builder(scene)
+    return builder.table()
+
+
+class _Builder:
+    """Goes through the bodies once, from the world outwards."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.joints: dict[str, list[Joint]] = {}
+        for joint in scene.joints:
+            self.joints.setdefault(joint.body, []).append(joint)
+        self.places: dict[str, Place] = {"": WORLD}
+        self.rows: list[Floats] = []
+        self.inertias: list[Inertia] = []
+        self.dof_rows: list[Floats] = []
+        self.last_dof: list[int] = []
+        self.coordinates: dict[str, int] = {}
+        self.dofs: dict[str, int] = {}
+        self.nq = 0
+        self.resting = 0.0
+
+    def table(self) -> Table:
+        for body in self.scene.bodies:
+            self._place(body)
+        for row, inertia in zip(self.rows, self.inertias, strict=True):
+            row[layout.MASS : layout.STIFFNESS] = inertia.row()
+        return Table(
+            p=self._packed(), places=self.places, nodes=len(self.rows), dofs=self.dofs, coordinates=self.coordinates
+        )
+
+    def _place(self, body: Body) -> None:
+        """Hang a body on its parent: a node for each of its joints, none if it has none."""
+        above = self.places[body.parent]
+        R, p = above.R @ rotation(body.orientation), above.p + above.R @ np.array(body.position)
+        place = Place(node=above.node, R=R, p=p)
+        for joint in self.joints.get(body.name, ()):
+            self._node(joint, place)
+            place = Place(node=len(self.rows) - 1, R=np.eye(3), p=np.zeros(3))
+        self.places[body.name] = place
+        if place.node >= 0:
+            self.inertias[place.node].add(body, place)
+        else:
+            centre = place.p + place.R @ np.array(body.com)
+            self.resting -= (1.0 - body.weightless) * body.mass * float(centre @ np.array(self.scene.gravity))
+
+    def _node(self, joint: Joint, before: Place) -> None:
+        row, kind = np.zeros(layout.NODE), TYPES[joint.type]
+        width_q, width_v = WIDTHS[joint.type]
+        dof, index = len(self.dof_rows), len(self.rows)
+        root = self.rows[before.node][layout.ROOT] if before.node >= 0 else index
+        row[[layout.TYPE, layout.PARENT, layout.Q, layout.V, layout.ROOT, layout.REFERENCE]] = (
+            kind,
+            before.node,
+            self.nq,
+            dof,
+            root,
+            joint.reference,
+        )
+        row[layout.POSE : layout.POSE + 36] = np.concatenate(_pose(joint, before))
+        row[layout.AXIS : layout.AXIS + 3], row[layout.ANCHOR : layout.ANCHOR + 3] = joint.axis, joint.anchor
+        row[layout.STIFFNESS : layout.STIFFNESS + 3] = joint.stiffness
+        row[layout.REST : layout.REST + len(joint.rest)] = joint.rest
+        self.coordinates[joint.name], self.dofs[joint.name] = self.nq, dof
+        previous = self.last_dof[before.node] if before.node >= 0 else -1
+        for k in range(width_v):
+            low, high = joint.force_range
+
+            self.dof_rows.append(np.array([previous, joint.armature, *joint.damping, low, high]))
+            previous = dof + k
+        self.last_dof.append(previous)
+        self.rows.append(row)
+        self.inertias.append(Inertia())
+        self.nq += width_q
+
+    def _packed(self) -> Floats:
+        scene = self.scene
+        actuators = [self._actuator(actuator) for actuator in scene.actuators]
+        tendons = [self._tendon(tendon) for tendon in scene.tendons]
+        rows = constraint_rows(scene, self)
+        head = np.zeros(layout.HEAD)
+        head[[layout.NODES, layout.DOFS, layout.ACTUATORS, layout.TENDONS, layout.ROWS]] = (
+            len(self.rows), len(self.dof_rows), len(actuators), len(tendons), len(rows),
+        )  # fmt: skip
+        head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
+        head[layout.RESTING] = self.resting
+        parts = [self.rows, self.dof_rows, actuators, tendons, rows]
+        starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
+        head[[layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW]] = starts[:5]
+        packed = np.concatenate([head, *(row for part in parts for row in part)])
+        finite: Floats = np.clip(packed, -1e300, 1e300)
+        return finite  # a bound that is not there: parameters are finite
+
+    def _actuator(self, actuator: Actuator) -> Floats:
+        row = np.zeros(layout.ACTUATOR)
+        if actuator.tendon:
+            names = [tendon.name for tendon in self.scene.tendons]
+            row[[layout.TARGET, layout.WHICH]] = layout.ON_TENDON, names.index(actuator.tendon)
+            row[layout.GEAR] = actuator.gear[0]
+        elif actuator.joint:
+            joint = next(joint for joint in self.scene.joints if joint.name == actuator.joint)
+            width = WIDTHS[joint.type][1]
+            if len(actuator.gear) < width:
+                raise SceneError(
+                    f"Actuator {actuator.name!r}: gear is {list(actuator.gear)}; it needs {width} numbers."
+                )
+            dof = self.dofs[joint.name]
+            row[[layout.TARGET, layout.WHICH, layout.ANGLE]] = layout.ON_JOINT, dof, self.coordinates[joint.name]
+            row[layout.GEAR : layout.GEAR + width] = actuator.gear[:width]
+            for k in range(width):
+                self.dof_rows[dof + k][layout.ARMATURE] += actuator.gear[k] ** 2 * actuator.armature
+                self.dof_rows[dof + k][layout.DAMPING] += actuator.gear[k] ** 2 * actuator.damping
+        else:
+            raise SceneError(f"Actuator {actuator.name!r} acts on neither a joint nor a tendon.")
+        row[layout.GAIN : layout.GAIN + 3], row[layout.BIAS : layout.BIAS + 3] = actuator.gain, actuator.bias
+        row[layout.CONTROL : layout.CONTROL + 2], row[layout.FORCE : layout.FORCE + 2] = (
+            actuator.control_range,
+            actuator.force_range,
+        )
+        return row
+
+    def _tendon(self, tendon: Tendon) -> Floats:
+        steps = [
+            (self.coordinates[name], self.dofs[name], c)
+            for name, c in zip(tendon.joints, tendon.coefficients, strict=True)
+        ]
+        return np.array([
+            len(steps), *tendon.stiffness, *tendon.damping, *tendon.rest, *np.ravel(steps),
+        ])  # fmt: skip
+
+
+def _pose(joint: Joint, before: Place) -> tuple[Floats, Floats, Floats]:
+    """T0, T1, T2 (12,) each: nine of the rotation, three of the position, in the parent's frame."""
+    R, p, axis, anchor = before.R, before.p, np.array(joint.axis), np.array(joint.anchor)
+    none = np.zeros(9)
+    if joint.type == "hinge":
+        K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+        terms = (np.eye(3) + K @ K, -K @ K, K)
+        moved = (anchor - terms[0] @ anchor, -terms[1] @ anchor, -terms[2] @ anchor)
+        first, *others = (np.concatenate([(R @ T).ravel(), R @ m]) for T, m in zip(terms, moved, strict=True))
+        first[9:] += p
+        return first, others[0], others[1]
+    if joint.type == "slide":
+        return np.array([*R.ravel(), *p]), np.array([*none, *(R @ axis)]), np.zeros(12)
+    return np.array([*R.ravel(), *p]), np.zeros(12), np.zeros(12)
+
+
+def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
+    """Return the rows in the order of `crossbody.cases.scene_rows`: loops, bounds of joints, bounds of tendons."""
+    rows: list[Floats] = []
+    for loop in scene.loops:
+        rows += _loop(loop, builder)
+    for joint in scene.joints:
+        rows += [_limit(joint, builder, sign) for sign in (1.0, -1.0) if np.isfinite(joint.range[0 if sign > 0 else 1])]
+    for i, tendon in enumerate(scene.tendons):
+        for sign in (1.0, -1.0):
+            bound = tendon.range[0 if sign > 0 else 1]
+            if np.isfinite(bound):
+                rows.append(_row(layout.TENDON_LIMIT, sign, i, bound + sign * tendon.margin))
+    return rows
+
+
+def _row(kind: int, *numbers: float) -> Floats:
+    row = np.zeros(layout.ROW)
+    row[: 1 + len(numbers)] = (kind, *numbers)
+    return row
+
+
+def _limit(joint: Joint, builder: _Builder, sign: float) -> Floats:
+    if joint.type not in ("hinge", "slide"):
+        raise SceneError(f"Joint {joint.name!r}: bounds of a {joint.type} joint are not done.")
+    bound = joint.range[0 if sign > 0 else 1]
+    place = builder.coordinates[joint.name], builder.dofs[joint.name]
+    return _row(layout.LIMIT, sign, *place, bound + sign * joint.margin)
+
+
+def _loop(loop: Loop, builder: _Builder) -> list[Floats]:
+    if loop.type == "joint":
+        where: list[float] = []
+        for name in (loop.first, loop.second):
+            if not name:
+                where += [-1, -1, 0.0]
+                continue
+            joint = next(joint for joint in builder.scene.joints if joint.name == name)
+            where += [builder.coordinates[name], builder.dofs[name], joint.reference]
+        return [_row(layout.JOINT_LOOP, *where, *loop.polynomial)]
+    if loop.type == "connect":
+        one, two = (builder.places[name] for name in (loop.first, loop.second))
+        points = [one.p + one.R @ np.array(loop.first_position), two.p + two.R @ np.array(loop.second_position)]
+        return [_row(layout.CONNECT, k, one.node, *points[0], two.node, *points[1]) for k in range(3)]
+    raise SceneError(f"Loop {loop.name!r}: a {loop.type} is not done.")
+
+
+def dof_parents(table: Table) -> Index:
+    """Return for every velocity the one before it on the way to the world, -1 for none."""
+    p, first, count = table.p, int(table.p[layout.AT_DOF]), int(table.p[layout.DOFS])
+    return p[first : first + layout.DOF * count : layout.DOF].astype(np.int64)

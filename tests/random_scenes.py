@@ -1,0 +1,126 @@
+"""Random scenes: bodies on joints of every type, massless links, several joints a body, springs, tendons, actuators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Scene, Tendon
+
+ALL = ("hinge", "slide", "ball", "free")
+SINGLE = ("hinge", "slide")
+
+
+def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scene:
+    """Return a scene of that many bodies, the same for the same seed."""
+    rng = np.random.default_rng(seed)
+    made: list[Body] = []
+    joints: list[Joint] = []
+    for i in range(bodies):
+        branch = _branch(made)
+        parent = str(rng.choice(["", *branch]))
+        kinds = _kinds(rng, types, parent)
+        made.append(_body(rng, f"body {i}", parent, fixed=not kinds))
+        joints += [_joint(rng, f"joint {i} {k}", f"body {i}", kind) for k, kind in enumerate(kinds)]
+    if not joints:
+        joints.append(_joint(rng, "joint", made[0].name, "hinge"))
+    joints.sort(key=lambda joint: [body.name for body in made].index(joint.body))
+    single = [joint for joint in joints if joint.type in SINGLE]
+    return Scene(
+        bodies=tuple(made), joints=tuple(joints), tendons=_tendons(rng, single), actuators=_actuators(rng, joints),
+        loops=_loops(rng, single), gravity=tuple(rng.normal(size=3) * 5.0),
+    )  # fmt: skip
+
+
+def random_state(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return q with unit quaternions, v and u, none of them zero."""
+    q: list[float] = []
+    for joint in scene.joints:
+        part = rng.normal(size=WIDTHS[joint.type][0])
+        if joint.type in ("ball", "free"):
+            part[-4:] /= np.linalg.norm(part[-4:])
+        q += part.tolist()
+    return np.array(q), rng.normal(size=scene.nv) * 2.0, rng.normal(size=len(scene.actuators)) * 3.0
+
+
+def _branch(made: Sequence[Body]) -> list[str]:
+    """Return the last body and those above it: on these the next one may hang."""
+    parents = {body.name: body.parent for body in made}
+    branch = [made[-1].name] if made else []
+    while branch and parents[branch[-1]]:
+        branch.append(parents[branch[-1]])
+    return branch
+
+
+def _kinds(rng: np.random.Generator, types: Sequence[str], parent: str) -> list[str]:
+    if "free" in types and not parent and rng.random() < 0.3:
+        return ["free"]
+    turning = [kind for kind in types if kind != "free"]
+    count = int(rng.choice([0, 1, 1, 1, 2, 3]))
+    kinds = [str(rng.choice(turning)) for _ in range(count)]
+    # MuJoCo admits no rotation behind a ball joint of the same body.
+    return [*(kind for kind in kinds if kind != "ball"), *(["ball"] if "ball" in kinds else [])]
+
+
+def _unit(rng: np.random.Generator, size: int) -> tuple[float, ...]:
+    x = rng.normal(size=size)
+    return tuple((x / np.linalg.norm(x)).tolist())
+
+
+def _body(rng: np.random.Generator, name: str, parent: str, *, fixed: bool) -> Body:
+    A = rng.normal(size=(3, 3))
+    J = A @ A.T
+    J = (np.trace(J) * np.eye(3) - J) * 0.1 + 0.01 * np.eye(3)  # of a body: the triangle inequality holds
+    return Body(
+        name=name, parent=parent, position=tuple(rng.normal(size=3)), orientation=_unit(rng, 4),
+        mass=float(rng.uniform(0.1, 3.0)), com=tuple(rng.normal(size=3) * 0.2),
+        inertia=(J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]),
+        weightless=float(rng.choice([0.0, 0.0, 1.0, 0.4])) if not fixed else 0.0,
+    )  # fmt: skip
+
+
+def _joint(rng: np.random.Generator, name: str, body: str, kind: str) -> Joint:
+    single = kind in SINGLE
+    return Joint(
+        name=name, body=body, type=kind, axis=_unit(rng, 3),
+        anchor=tuple(rng.normal(size=3)) if kind != "free" else (0.0, 0.0, 0.0),
+        reference=float(rng.normal()) if single else 0.0, armature=float(rng.choice([0.0, 0.2])),
+        damping=tuple(rng.uniform(0.0, 0.3, 3)) if kind != "free" else (0.0, 0.0, 0.0),
+        stiffness=tuple(rng.uniform(0.0, 2.0, 3)) if kind != "free" else (0.0, 0.0, 0.0),
+        rest=(float(rng.normal()),) if single else _unit(rng, 4),
+        range=(-20.0, 25.0) if single and rng.random() < 0.3 else (-np.inf, np.inf), margin=0.01,
+        force_range=(-2.0, 3.0) if single and rng.random() < 0.3 else (-np.inf, np.inf),
+    )  # fmt: skip
+
+
+def _tendons(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Tendon, ...]:
+    if len(single) < 2:
+        return ()
+    return (
+        Tendon(
+            name="tendon", joints=(single[0].name, single[-1].name), coefficients=(0.7, -1.3),
+            stiffness=(3.0, 0.0, 0.0), damping=(0.4, 0.0, 0.0), rest=(-0.2, 0.1), range=(-30.0, 40.0),
+        ),
+    )  # fmt: skip
+
+
+def _loops(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Loop, ...]:
+    if len(single) < 3 or rng.random() < 0.5:
+        return ()
+    return (Loop(name="coupling", type="joint", first=single[1].name, second=single[2].name,
+                 polynomial=(0.1, 0.8, 0.05, -0.02, 0.01)),)  # fmt: skip
+
+
+def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
+    made = []
+    for i, joint in enumerate(joints):
+        if joint.type == "free" or rng.random() < 0.4:
+            continue
+        made.append(Actuator(
+            name=f"actuator {i}", joint=joint.name, gear=tuple(rng.normal(size=WIDTHS[joint.type][1])),
+            gain=tuple(rng.normal(size=3) if joint.type in SINGLE else (1.0, 0.0, 0.0)),
+            bias=tuple(rng.normal(size=3) if joint.type in SINGLE else (0.0, 0.0, 0.0)),
+            control_range=(-1.0, 2.0), force_range=(-4.0, 4.0),
+        ))  # fmt: skip
+    return tuple(made)

@@ -1,0 +1,260 @@
+"""Robot files as cases: published robots against MuJoCo's own arrays, small files of our own through every engine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from crossbody import cases, engines
+from crossbody.cases import InvalidValue, Outcome, SceneError, UnknownName
+from crossbody.cases.files.mjcf import compiled, scene_of
+from crossbody.cases.files.reading import model_of
+from crossbody.cases.files.reading import scene_of as scene_of_file
+from crossbody.reference.tree import mechanism
+from crossbody.reference.tree.table import tabulate
+from crossbody.reports.cli import cli
+
+ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
+PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",
+             "universal_robots_ur5e/ur5e")  # fmt: skip
+STATES = 100
+SAME = 1e-10
+"""Of the largest entry: what two programs may make of the same arrays."""
+ARM = """
+<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="{integrator}"/><worldbody><body>
+<joint name="shoulder" axis="0 1 0" damping=".3" armature=".02" {shoulder}/>
+<geom name="upper" type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="1.2"/>
+<body pos="0 0 -.4"><joint name="elbow" axis="0 1 0" damping=".2" stiffness="1.5" springref=".4" {elbow}/>
+<geom name="lower" type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".7"/></body></body>{more}</worldbody>
+<actuator><motor name="m1" joint="shoulder" gear="2"/><position name="m2" joint="elbow" kp="8"/></actuator>
+<keyframe><key name="raised" qpos="1.2 -.3" qvel=".5 0" ctrl=".6 .2"/><key name="down" ctrl="0 1"/>
+<key name="loose" qpos="1.2 -.3" qvel=".5 3" ctrl="0 -.3"/></keyframe>
+</mujoco>
+"""
+
+
+def write(folder: Path, name: str = "arm.xml", **fields: str) -> str:
+    path = folder / name
+    text = ARM.format(**{"integrator": "RK4", "shoulder": "", "elbow": "", "more": "", **fields})
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("robot", PUBLISHED)
+def test_published_robots_have_the_dynamics_of_mujoco(robot: str) -> None:
+    path = ROBOTS / f"{robot}.xml"
+    if not path.is_file():
+        pytest.skip(f"The robot's file {path} is not here.")
+    model = compiled(path)
+    scene, data = scene_of(model), mujoco.MjData(model)
+    table, rng = tabulate(scene), np.random.default_rng(7)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    M, f, full = np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), np.zeros((scene.nv, scene.nv))
+    for _ in range(STATES):
+        q = np.array(model.qpos0)
+        mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), 1.0)
+        v, u = rng.normal(size=model.nv) * 2.0, rng.normal(size=model.nu) * 20.0
+        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, full)
+        mechanism.dynamics(0.0, q, v, u, table.p, M, f, np.zeros(table.scratch))
+        theirs = data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias
+        assert np.abs(M - full).max() <= SAME * np.abs(full).max()
+        assert np.abs(f - theirs).max() <= SAME * np.abs(theirs).max()
+
+
+def test_an_arm_moves_alike_in_three_engines(tmp_path: Path) -> None:
+    case = cases.load(write(tmp_path), "raised")
+    ours = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
+    assert ours.outcome is Outcome.FINISHED
+    assert np.abs(ours.q[-1] - ours.q[0]).max() > 0.5
+    others = [
+        engines.load("reference").prepare(case, "cvode", rtol=1e-12).run(),
+        engines.load("pinocchio").prepare(case, "law", rtol=1e-12).run(),
+        engines.load("mujoco").prepare(case, "matched", dt=2e-4).run(),
+    ]
+    for run in others:
+        assert np.abs(run.q[-1] - ours.q[-1]).max() <= 1e-8
+        assert np.abs(run.energy[-1].sum() - ours.energy[-1].sum()) <= 1e-7
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
+def test_a_file_as_it_stands_steps_as_mujoco_does(tmp_path: Path, integrator: str) -> None:
+    path = write(tmp_path, integrator=integrator)
+    case = cases.load(path, "raised", t_end=0.2)
+    run = engines.load("mujoco").prepare(case, "default").run()
+    model = mujoco.MjModel.from_xml_path(path)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    assert np.abs(run.q[-1] - data.qpos).max() <= 1e-12
+
+
+def test_bounds_are_rows_that_open_and_close(tmp_path: Path) -> None:
+    law = 'limited="true" range="-.35 -.25" solreflimit="-4000 -20" solimplimit="1 1 .001"'
+    case = cases.load(write(tmp_path, elbow=law), "loose", t_end=0.5)
+    assert case.contacts == ("elbow low", "elbow high")
+    runs = [engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
+            engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run()]  # fmt: skip
+    times = [np.array([event.t for event in run.events]) for run in runs]
+    assert len(times[0]) >= 2
+    assert len(times[0]) == len(times[1])
+    assert np.abs(times[0] - times[1]).max() <= 1e-8
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() <= 1e-7
+
+
+def test_controls_come_from_a_table(tmp_path: Path) -> None:
+    path, table = write(tmp_path), tmp_path / "u.csv"
+    table.write_text("t,m1,m2\n0,1,0\n0.1,-1,0.5\n", encoding="utf-8")
+    case = cases.load(path, "raised", ctrl=str(table))
+    assert case.inputs is not None
+    assert case.inputs.values.tolist() == [[1.0, 0.0], [-1.0, 0.5]]
+    np.savez(tmp_path / "u.npz", t=case.inputs.times, ctrl=case.inputs.values)
+    again = cases.load(path, "raised", ctrl=str(tmp_path / "u.npz"))
+    assert again.inputs is not None
+    assert np.array_equal(again.inputs.values, case.inputs.values)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("t,m1\n0,1\n", "m2"), ("t,m1,m2\n1,0,0\n0,0,0\n", "increasing"), ("t,m1,m2\n0,x,0\n", "x"), ("", "columns")],
+)
+def test_wrong_controls_are_refused(tmp_path: Path, text: str, said: str) -> None:
+    table = tmp_path / "u.csv"
+    table.write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidValue, match=said):
+        cases.load(write(tmp_path), "raised", ctrl=str(table))
+
+
+def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
+    """A contact that no row stands for is told, and can be left out of every engine."""
+    wall = '<geom name="wall" type="box" pos=".25 0 -.55" size=".1 .5 .02"/>'
+    path = write(tmp_path, more=wall)
+    found = engines.load("reference").prepare(cases.load(path, "down", t_end=3.0), "compiled").run()
+    assert found.outcome is Outcome.INCONSISTENT
+    assert "'wall'" in found.message
+    free = cases.load(path, "down", t_end=3.0, without="contacts")
+    assert engines.load("reference").prepare(free, "compiled").run().outcome is Outcome.FINISHED
+    assert engines.load("mujoco").prepare(free, "default").run().outcome is Outcome.FINISHED
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"shoulder": 'frictionloss=".1"'}, "shoulder.*friction"),
+        ({"more": '<body name="box"><freejoint/><geom size=".1"/></body>'}, "free"),
+        ({"shoulder": 'actuatorgravcomp="true" actuatorfrclimited="true" actuatorfrcrange="-1 1"'}, "shoulder"),
+        ({"integrator": 'RK4" wind="1 0 0'}, "wind"),
+        ({"integrator": 'RK4" density="1'}, "medium"),
+        ({"shoulder": "/><<"}, "compiler refuses"),
+    ],
+)
+def test_what_a_scene_does_not_have_is_refused_by_name(tmp_path: Path, fields: dict[str, str], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        cases.load(write(tmp_path, **fields))
+
+
+def test_friction_is_left_out_when_asked(tmp_path: Path) -> None:
+    case = cases.load(write(tmp_path, shoulder='frictionloss=".1"'), without="friction")
+    assert case.scene is not None
+    assert not any(joint.friction_loss for joint in case.scene.joints)
+
+
+@pytest.mark.parametrize("word", ["nonsense", "actuator:none", "loop:x", "tendon:"])
+def test_nothing_is_left_out_that_is_not_there(tmp_path: Path, word: str) -> None:
+    with pytest.raises(InvalidValue, match="without"):
+        cases.load(write(tmp_path), without=word)
+
+
+def test_a_file_that_is_not_there_is_told() -> None:
+    with pytest.raises(UnknownName, match=r"none\.xml"):
+        cases.load("none.xml")
+
+
+def test_the_command_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path)
+    arguments = ["run", path, "--key", "raised", "--set", "t_end=0.3", "--out", str(tmp_path / "out"), "--json"]
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code in (0, 1), result.output
+    found: Any = result.output
+    assert "mujoco" in found
+    assert "pinocchio" in found
+    assert (tmp_path / "out" / "index.html").is_file()
+
+
+URDF = """
+<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0 .1 -.2" rpy=".3 -.2 .9"/><mass value="1.3"/>
+<inertia ixx=".05" iyy=".04" izz=".02" ixy=".003" ixz="-.002" iyz=".001"/></inertial></link>
+<link name="hand"><inertial><mass value=".4"/><inertia ixx=".001" iyy=".2" izz=".001" ixy="0" ixz="0" iyz="0"/>
+</inertial></link><link name="empty"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+<origin xyz=".1 0 .5" rpy=".1 .2 .3"/><limit lower="-2" upper="2" effort="10" velocity="3"/></joint>
+<joint name="wrist" type="continuous"><parent link="upper"/><child link="hand"/><axis xyz="0 1 1"/>
+<origin xyz="0 0 -.4"/><dynamics damping=".2"/></joint>
+<joint name="tip" type="fixed"><parent link="hand"/><child link="empty"/><origin xyz="0 0 -.1"/></joint></robot>
+"""
+
+
+def test_a_urdf_has_the_inertias_of_its_own(tmp_path: Path) -> None:
+    """Against Pinocchio's reader; one inertia is that of no body, one link has no mass: neither is changed."""
+    import pinocchio as pin
+
+    from crossbody.cases.files.urdf import findings
+
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    scene = scene_of_file(path, model_of(path))
+    table, theirs, rng = tabulate(scene), pin.buildModelFromUrdf(str(path)), np.random.default_rng(3)
+    data, M, f = theirs.createData(), np.zeros((2, 2)), np.zeros(2)
+    for _ in range(STATES):
+        q, v = rng.normal(size=2), rng.normal(size=2)
+        mechanism.dynamics(0.0, q, v, np.zeros(0), table.p, M, f, np.zeros(table.scratch))
+        turned = np.array([q[0], np.cos(q[1]), np.sin(q[1])])  # a continuous joint has two coordinates there
+        upper = np.triu(pin.crba(theirs, data, turned))
+        assert np.abs(M - upper - np.triu(upper, 1).T).max() <= SAME
+        bias = pin.nonLinearEffects(theirs, data, turned, v) + np.array([0.0, 0.2 * v[1]])
+        assert np.abs(f + bias).max() <= SAME * np.abs(bias).max()
+    assert [sentence.split("'")[1] for sentence in findings(path)] == ["hand"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('value="1.3"', 'value="heavy"', "upper.*heavy"),
+        ('xyz="0 .1 -.2"', 'xyz="0 .1"', "three numbers"),
+        ("</robot>", "", "no XML"),
+        ("robot", "model", "<model>|compiler refuses"),
+    ],
+)
+def test_a_wrong_urdf_is_refused_by_name(tmp_path: Path, old: str, new: str, said: str) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF.replace(old, new), encoding="utf-8")
+    with pytest.raises(SceneError, match=said):
+        cases.load(str(path))
+
+
+def test_what_is_strange_in_a_file_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    arguments = ["run", str(path), "-e", "reference:compiled", "--set", "t_end=0.1", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code == 0, result.output
+    assert "note: arm.urdf: Link 'hand'" in result.stderr
+
+
+def test_a_urdf_runs_in_the_reference_and_in_pinocchio(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    case = cases.load(str(path), t_end=0.5)
+    runs = [
+        engines.load(e).prepare(case, p, rtol=1e-11).run() for e, p in (("reference", "compiled"), ("pinocchio", "law"))
+    ]
+    assert all(run.outcome is Outcome.FINISHED for run in runs)
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() <= 1e-8
