@@ -280,7 +280,9 @@ def chunk(whole: bytes | int, declared: int | None = None, compression: str = "z
         pieces = [whole] if isinstance(whole, bytes) else [bytes(1 << 20)] * (whole >> 20)
         raw = b"".join([*(squeeze.compress(piece) for piece in pieces), squeeze.flush()])
     else:
-        raw = lz4.frame.compress(whole if isinstance(whole, bytes) else bytes(whole))
+        frame = lz4.frame.LZ4FrameCompressor()
+        pieces = [whole] if isinstance(whole, bytes) else [bytes(1 << 20)] * (whole >> 20)
+        raw = b"".join([frame.begin(), *(frame.compress(piece) for piece in pieces), frame.flush()])
     size = declared if declared is not None else whole if isinstance(whole, int) else len(whole)
     return record(6, struct.pack("<QQQI", 0, 0, size, 0) + text(compression) + struct.pack("<Q", len(raw)) + raw)
 
@@ -306,7 +308,26 @@ def _mcap_hides(folder: Path) -> Path:
 
 
 def _mcap_lz4(folder: Path) -> Path:
-    return mcap(folder, DEFINED, chunk(GIGA // 4, declared=1000, compression="lz4"))
+    return mcap(folder, DEFINED, chunk(GIGA, declared=1000, compression="lz4"))
+
+
+def _mcap_lz4_declares(folder: Path) -> Path:
+    return mcap(folder, DEFINED, chunk(GIGA, compression="lz4"))
+
+
+def _mcap_many(compression: str, folder: Path) -> Path:
+    """Chunks that tell the truth and are each within the memory: together they unfold to 6 GB."""
+    return mcap(folder, DEFINED, chunk(400 << 20, compression=compression) * 15)
+
+
+def _mcap_empties(folder: Path) -> Path:
+    """Millions of records of nothing, which every reader may skip, and has to."""
+    return mcap(folder, DEFINED, chunk(record(0x80, b"") * 20_000_000))
+
+
+def _mcap_exact(compression: str, folder: Path) -> Path:
+    """A chunk that tells the most that is held, and unfolds to six times that."""
+    return mcap(folder, DEFINED, chunk(GIGA, declared=500 << 20, compression=compression))
 
 
 def _mcap_objects(folder: Path) -> Path:
@@ -559,6 +580,9 @@ def bombs() -> Iterator[Bomb]:
         },
         "mcap": {
             "mcap-declares": _mcap_declares, "mcap-hides": _mcap_hides, "mcap-lz4": _mcap_lz4,
+            "mcap-lz4-declares": _mcap_lz4_declares, "mcap-empties": _mcap_empties,
+            **{f"mcap-many-{kind}": partial(_mcap_many, kind) for kind in ("zstd", "lz4")},
+            **{f"mcap-exact-{kind}": partial(_mcap_exact, kind) for kind in ("zstd", "lz4")},
             "mcap-objects": _mcap_objects, "mcap-nested": _mcap_nested, "mcap-array": _mcap_array,
             "mcap-itself": _mcap_itself, "mcap-topics": _mcap_topics, "mcap-json": _mcap_json,
         },

@@ -133,6 +133,21 @@ def test_a_damping_is_found_from_positions_alone() -> None:
     assert not any("a1 is not identifiable" in warning for warning in fit.warnings)
 
 
+def test_windows_that_were_held_out_start_from_what_was_measured() -> None:
+    """Their error is that of a replay from the measured starts: none was fitted to the samples that it is judged by."""
+    case = cases.load("bouncing_ball", variant="linear", t_end=1.5)
+    log = run_as_log(case, {"height": 0}, 1e-4)
+    known = {name: case.parameters[name] for name in ("a0", "a1", "a2")}
+    fit = hw.identify(log, "ball", ["a1"], parameters=known | {"a1": 15.0}, restart=0.25, hold=2)
+    found = hw.replay(log, "ball", parameters=fit.parameters, restart=0.25)
+    held = [found.windows[i].y - found.predictions[0].y[i] for i in fit.held]
+    assert len(held) == len(fit.held) == 2
+    assert fit.after["rmse"][1] == pytest.approx(np.sqrt(np.mean(np.concatenate(held) ** 2)), rel=1e-9)
+    for i in fit.held:
+        row = np.searchsorted(log.time, found.windows[i].t[0])
+        assert found.windows[i].segment.y == log.matrix("coordinates", ["height"])[row]
+
+
 def test_a_maze_is_replayed_from_where_its_ball_was_seen() -> None:
     log = run_as_log(cases.load("ball_maze", variant="free", t_end=1.5), {"theta": 0, "x": 1, "y": 2}, 1e-6)
     found = hw.replay(log, "maze")

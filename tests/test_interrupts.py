@@ -8,12 +8,19 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from rig_data import run_as_log
 
+from crossbody import cases, hw
+from crossbody.hw.replaying.comparison import Prediction
+from crossbody.reports.replay.kept import keeper
 from crossbody.reports.runs import watch
+from crossbody.reports.runs.parts import Parts
 
 STUCK = Path(__file__).parent / "stuck_engine.py"
 SECOND = 1.0
@@ -88,6 +95,78 @@ def test_what_is_complete_is_kept_and_the_same_command_goes_on(tmp_path: Path) -
     assert not list(out.glob(".crossbody-*"))
 
 
+BENCH = ("bench", "balls.py", "-e", "fake:slow", "--repeats", "1")
+
+
+def test_a_benchmark_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = begun(*BENCH, cwd=tmp_path)
+    wait_for(out, PARTS, process)
+    code, said = interrupted(process)
+    assert code == 130
+    assert "what is complete is kept in" in said
+    assert "the same command goes on" in said
+    (part,) = out.glob(PARTS)
+    kept = pd.read_parquet(part / "bench.parquet")
+    code, said = finished(begun(*BENCH, cwd=tmp_path))
+    assert code == 0, said
+    assert "1 parts of an interrupted run" in said
+    rows = pd.read_parquet(out / "bench.parquet")
+    assert rows["case"].nunique() == 2
+    pd.testing.assert_frame_equal(rows[rows["case"].isin(kept["case"])], kept)  # times too: it was not run again
+    assert not list(out.glob(".crossbody-*"))
+
+
+def test_a_replay_goes_on_with_the_engines_that_were_complete(tmp_path: Path) -> None:
+    out, given = tmp_path / "deep" / "out", {"a0": 1e4, "a1": 20.0, "a2": 0.0}
+    case = cases.load("bouncing_ball", "linear", t_end=0.5, **given)
+    hw.store(run_as_log(case, {"height": 0}, 1e-4), tmp_path / "log.parquet")
+    pairs = [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
+    words = ("replay", "log.parquet", "-m", "ball", "-e", "reference", "-e", "fake:slow", *pairs, "--out", str(out))
+    process = begun(*words, cwd=tmp_path)
+    wait_for(out, PARTS, process)
+    code, said = interrupted(process)
+    assert code == 130
+    assert "the same command goes on" in said
+    (part,) = out.glob(PARTS)
+    kept = part.stat().st_ino
+    process = begun(*words, cwd=tmp_path)
+    wait_for(out, PARTS, process, 2)
+    assert part.stat().st_ino == kept
+    code, said = finished(process)
+    assert code == 0, said
+    assert "1 parts of an interrupted run" in said
+    rows = pd.read_parquet(out / "replay.parquet")
+    errors = rows[rows["metric"] == "rmse"].set_index("who")["value"]
+    assert errors["reference:compiled"] == pytest.approx(errors["fake:slow"], rel=1e-6)
+    assert not list(out.glob(".crossbody-*"))
+
+
+def test_a_prediction_comes_back_as_it_was(tmp_path: Path) -> None:
+    case = cases.load("bouncing_ball", "linear", t_end=0.5)
+    log = run_as_log(case, {"height": 0}, 1e-4)
+    made: list[Prediction] = []
+
+    def never() -> Prediction:
+        raise AssertionError("it is there already")
+
+    def put(words: str, predict: Callable[[], Prediction]) -> Prediction:
+        with suppress(KeyboardInterrupt), Parts(tmp_path, "replay", {}) as parts:
+            made.append(keeper(parts)(words, predict))
+            made.append(keeper(parts)(words, never))
+            raise KeyboardInterrupt
+        return made[1]
+
+    hw.replay(log, "ball", restart=0.1, keep=put)
+    one, other = made
+    assert len(one.y) == len(other.y) == 4
+    for name in ("y", "yd"):
+        for mine, theirs in zip(getattr(one, name), getattr(other, name), strict=True):
+            assert mine.tobytes() == theirs.tobytes()
+    for name in ("engine", "profile", "settings", "outcomes", "messages", "wall_s", "steps"):
+        assert getattr(one, name) == getattr(other, name)
+
+
 def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:
     process = begun("run", "balls.py", "--variant", "linear", "-e", "fake:stuck", cwd=tmp_path)
     wait_for(tmp_path, "out/.crossbody-parts.*", process)
@@ -99,10 +178,10 @@ def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:
 
 
 def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_path: Path) -> None:
-    words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", "2")
+    words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", "4")
     code, said = finished(begun("run", "balls.py", "--variant", "linear", *words, cwd=tmp_path))
     assert code == 1, said
-    assert "fake:stuck: It did not come back within 2 s and was ended" in said
+    assert "fake:stuck: It did not come back within 4 s and was ended" in said
     assert "fake:crash: Its process was ended by SIGSEGV" in said
     assert "CROSSBODY_DEBUG=1" in said
     rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet").set_index("profile")
@@ -111,6 +190,22 @@ def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_p
         assert (mine["verdict"] == "outside").any()
         assert mine["why"].str.contains(why).any()
     assert not (rows.loc[["exact"], "verdict"] == "outside").any()
+
+
+def test_an_identification_that_never_comes_back_is_ended(tmp_path: Path) -> None:
+    log = run_as_log(cases.load("bouncing_ball", "linear", t_end=0.5), {"height": 0}, 1e-4)
+    hw.store(log, tmp_path / "log.parquet")
+    words = ("identify", "log.parquet", "-m", "ball", "-f", "a1", "--set", "a1=20", "--time-limit", "0.25")
+    began = time.monotonic()
+    process = begun(*words, cwd=tmp_path)
+    assert process.stderr is not None
+    said = process.stderr.readline()
+    assert "ball identified from log.parquet: It did not come back within 2.5 s and was ended" in said
+    assert time.monotonic() - began < 6.0 + 4.0 * load()  # 2 (1 + 0.25) s, and the start of the command
+    code, said = finished(process)
+    assert (code, said.count("\n")) == (2, 1)
+    assert said.startswith("crossbody: ball identified from log.parquet: It did not come back")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_fault_of_ours_has_a_code_and_a_file_of_its_own(tmp_path: Path) -> None:

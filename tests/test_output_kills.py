@@ -7,6 +7,8 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from swap_kills import everywhere
 
 from crossbody.cases import OutputError
 from crossbody.reports.runs import manifest
-from crossbody.reports.runs.output import MARKER, check, folder, recover
+from crossbody.reports.runs.output import MARKER, check, folder, gather, recover
 
 MINE = {"notes.md": "mine", "bench/own.csv": "mine too", "traces/sketch.txt": "and mine"}
 STUDIES = ("old", "new")
@@ -127,6 +129,86 @@ def law_of_recovery(tmp_path: Path, stride: int) -> None:
         recover(place)
         assert content(place) == expected("new")
     assert kills > 80 / stride
+
+
+@pytest.mark.parametrize("stride", [37, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_kill_while_a_study_comes_beside_others_loses_nothing(tmp_path: Path, stride: int) -> None:
+    in_a_new_process(law_of_other_swaps, tmp_path, stride)
+
+
+def add(place: Path) -> None:
+    """Add to a study, as a sweep does."""
+    with folder(place, "run", adds=True) as made:
+        (made / "b.json").write_text("new")
+
+
+def beside(place: Path) -> None:
+    """Write a study beside others, whose tables its pages show."""
+    with folder(place, "bode") as made:
+        (made / "bode.json").write_text("new")
+        gather(made)
+        (made / "index.html").write_text((made / "a.json").read_text())
+
+
+def in_the_way(place: Path) -> None:
+    """Find a file of the user's where one of the study should go."""
+    with suppress(OutputError):
+        put(place, "new")
+
+
+def with_a_file_in_the_way(place: Path) -> Path:
+    (fresh(place) / "b.json").write_text("by hand")
+    return place
+
+
+def law_of_other_swaps(tmp_path: Path, stride: int) -> None:
+    """Whatever is written where, a kill leaves what was or what was to be; the same command then comes to its end."""
+    old = expected("old")
+    kept = {f"run-1/{name}": "new" for name in FILES["new"]}
+    laws: dict[str, tuple[Callable[[Path], Path], Callable[[Path], None], dict[str, str], dict[str, str]]] = {
+        "first": (lambda place: place, lambda place: put(place, "new"), {}, dict.fromkeys(FILES["new"], "new")),
+        "adds": (fresh, add, old, old | {"b.json": "new"}),
+        "beside": (fresh, beside, old, old | {"bode.json": "new"}),
+        "in the way": (with_a_file_in_the_way, in_the_way, old | {"b.json": "by hand"}, old | kept),
+    }
+    for name, (made, work, before, after) in laws.items():
+        (tmp_path / name).mkdir()
+        start = made if name == "first" else copied(made, tmp_path / name)
+        ends = [before, before | after]
+        for place in everywhere(start, work, tmp_path / name, stride):
+            recover(place)
+            assert content(place) in ends, name
+            if name != "in the way":
+                work(place)
+                assert content(place) == ends[1], name
+        assert len(list((tmp_path / name).iterdir())) > 80 / stride
+
+
+TRACED = """
+import os, sys
+from pathlib import Path
+import test_output_kills as t
+from swap_kills import reaches_the_system
+place = t.fresh(Path(sys.argv[1]))
+sys.setprofile(lambda _, event, called: event == "c_call" and reaches_the_system(called) and os.getpgid(0))
+t.put(place, "new")
+sys.setprofile(None)
+"""
+CHANGES = "rename,renameat,renameat2,unlink,unlinkat,mkdir,mkdirat,rmdir,link,linkat,write,chmod,fchmod,getpgid"
+
+
+@pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
+def test_every_change_on_disk_has_a_kill_of_its_own_before_it(tmp_path: Path) -> None:
+    command = ["strace", "-f", "-z", "-e", f"trace={CHANGES}", "-o", str(tmp_path / "calls")]
+    command += [sys.executable, "-c", TRACED, str(tmp_path / "out")]
+    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    if done.returncode and "ptrace" in done.stderr.lower():
+        pytest.skip("strace may not look at a process here")
+    assert done.returncode == 0, done.stderr
+    calls = [line.split("(")[0].split()[-1] for line in (tmp_path / "calls").read_text().splitlines() if "(" in line]
+    swap = calls[calls.index("getpgid") :]
+    assert swap.count("rename") + swap.count("renameat") >= 2 + len(FILES["new"])
+    assert not [one for one, next_ in pairwise(swap) if "getpgid" not in (one, next_)]
 
 
 def test_what_a_killed_command_left_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

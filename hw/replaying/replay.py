@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -37,6 +38,7 @@ def replay(
     log: Log, model: str | Model, *, kind: str = "forward", wanted: Sequence[str] = ("reference",),
     parameters: Mapping[str, Value] | None = None, restart: float | None = None, horizon: float | None = None,
     delay: float = 0.0, settings: Mapping[str, Any] | None = None, tell: Callable[[str], None] = lambda _: None,
+    keep: Callable[[str, Callable[[], Prediction]], Prediction] = lambda _, predict: predict(),
 ) -> Comparison:  # fmt: skip
     """Run a model through a log.
 
@@ -56,6 +58,7 @@ def replay(
         delay: of the measured coordinates beyond what the column map says, s.
         settings: of the engines, where they have them.
         tell: is told what is being done.
+        keep: is given the words for a prediction and what makes it, and gives it, made or kept from before.
 
     Raises:
         UnknownName: for a model, kind, engine, profile or parameter that does not exist.
@@ -79,9 +82,11 @@ def replay(
     for text in wanted:
         name, _, profile = text.partition(":")
         profile = profile or chosen.profiles.get(name, "matched")
-        tell(f"{chosen.name} on {name}:{profile}, {len(cut)} windows")
+        words = f"{chosen.name} on {name}:{profile}, {len(cut)} windows"
+        tell(words)
+        predict = partial(_predict, chosen, numbers, cut, name, profile, kind, settings or {})
         try:
-            predictions.append(_predict(chosen, numbers, cut, name, profile, kind, settings or {}))
+            predictions.append(keep(words, predict))
         except (CaseUnsupported, EngineUnavailable) as error:
             skipped[name, profile] = str(error)
     return Comparison(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,14 @@ from crossbody import hw
 from crossbody.cases import CaseUnsupported
 from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import voice
-from crossbody.reports.commands import where
+from crossbody.reports.commands import identity, where
 from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison as replay
-from crossbody.reports.replay import limits
+from crossbody.reports.replay import kept, limits
 from crossbody.reports.runs import jobs, output, study, watch
 from crossbody.reports.runs.jobs import DEFAULT_ENGINES
+from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 
 GRACE = 2.0
@@ -84,20 +85,21 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
     engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
     if not engines:
         raise CaseUnsupported(f"No engine that was asked for has come back: {'; '.join(watch.all_lost())}.")
-    with voice.progress(len(engines)) as bar:
+    log = ask.log()
+    with Parts(out, command, _identity(ask, log, kind, wanted)) as parts, voice.progress(len(engines)) as bar:
 
         def tell(text: str) -> None:
             bar(text)
             watch.limited(text, limit)
 
         found = hw.replay(
-            ask.log(), ask.model, kind=kind, wanted=engines, parameters=jobs.parse_settings(ask.pairs),
-            restart=ask.restart, horizon=ask.horizon, delay=ask.delay, tell=tell,
+            log, ask.model, kind=kind, wanted=engines, parameters=jobs.parse_settings(ask.pairs), restart=ask.restart,
+            horizon=ask.horizon, delay=ask.delay, tell=tell, keep=kept.keeper(parts),
         )  # fmt: skip
-    watch.unlimited()
-    limits.check(given, found)
-    rows = replay.verdicts(found, command, given)
-    _write(out, found, rows, provenance(command, log=replay.log_about(found)), {}, "replay")
+        watch.unlimited()
+        limits.check(given, found)
+        rows = replay.verdicts(found, command, given)
+        _write(out, found, rows, provenance(command, log=replay.log_about(found)), {}, "replay")
     metrics = _metrics(found, rows)
     if not voice.told_as_json({"metrics": metrics, "findings": replay.findings(found)}):
         if not voice.quiet():
@@ -105,6 +107,15 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
         _say_outside(rows)
         where(out)
     return exit_code(rows["verdict"])
+
+
+def _identity(ask: Ask, log: Log, kind: str, wanted: Sequence[str]) -> dict[str, Any]:
+    """What decides what a replay predicts: the numbers of the log, the model and its source, engines and windows."""
+    return identity(
+        f"replay {kind}", (), (), log=asdict(log.provenance), model=ask.model,
+        source=kept.source(hw.models.load(ask.model)), pairs=ask.pairs, windows=(ask.restart, ask.horizon, ask.delay),
+        wanted=wanted,
+    )  # fmt: skip
 
 
 def run_identify(
@@ -134,6 +145,7 @@ def run_identify(
     label = f"{ask.model} identified from {ask.path}"
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label}: {why}")
+    watch.resumable("Nothing was replaced; the same command begins anew.")
     watch.limited(label, GRACE * (1.0 + limit))
     fit = hw.identify(
         log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,

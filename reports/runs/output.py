@@ -125,7 +125,7 @@ def folder(path: Path, study: str = "study", adds: bool = False) -> Iterator[Pat
     """
     check(path, study)
     home = path.absolute()
-    first = next((p for p in (*reversed(home.parents), home) if not p.exists()), None)
+    first = first_missing(home)
     try:
         home.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(prefix=f"{NEW}{study}.", dir=home))
@@ -144,11 +144,16 @@ def folder(path: Path, study: str = "study", adds: bool = False) -> Iterator[Pat
     finally:
         del _STAGED[made]
         shutil.rmtree(made, ignore_errors=True)
-        _take_away(home, first)
+        take_away(home, first)
 
 
-def _take_away(home: Path, first: Path | None) -> None:
-    """Remove the folders that were made for a study that failed."""
+def first_missing(home: Path) -> Path | None:
+    """The outermost folder that has to be made for a folder; None if it is there."""
+    return next((p for p in (*reversed(home.parents), home) if not p.exists()), None)
+
+
+def take_away(home: Path, first: Path | None) -> None:
+    """Remove the folders, from `first` on inwards, that were made for a study that failed, as far as they are empty."""
     while first is not None and first in (home, *home.parents):
         try:
             home.rmdir()

@@ -12,13 +12,13 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from crossbody.cases import OutputError
 from crossbody.reports import voice
-from crossbody.reports.runs import files, manifest, watch
+from crossbody.reports.runs import files, manifest, output, watch
 
 PARTS = ".crossbody-parts."
 ABOUT = "command.json"
@@ -40,6 +40,7 @@ class Parts:
         digest = hashlib.sha256(json.dumps(identity, sort_keys=True, default=repr).encode()).hexdigest()[:16]
         self.out, self.path = out.absolute(), out.absolute() / f"{PARTS}{digest}"
         self.command, self.found, self.lock = command, 0, -1
+        self.first = output.first_missing(self.out)
         try:
             self._open()
         except OutputError:
@@ -107,8 +108,7 @@ class Parts:
         """Take the parts away when what they were for is written, and where there are none; else say that they stay."""
         if kind is None or not self.found:
             shutil.rmtree(self.path, ignore_errors=True)
-            with suppress(OSError):
-                self.out.rmdir()  # if it is empty
+            output.take_away(self.out, self.first)
         elif issubclass(kind, OutputError):
             voice.note(self._kept())
         os.close(self.lock)

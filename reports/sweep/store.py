@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 from pyarrow import ArrowException
 
-from crossbody import cases, engines, reference
+from crossbody import cases, engines, hw, reference
 from crossbody.cases import OutputError
 from crossbody.reports import judging, metrics, sweep
 from crossbody.reports.runs import files, manifest, output
@@ -31,7 +31,7 @@ SWEEP, PARTS = "sweep.json", "parts"
 def code() -> str:
     """Digest of the sources that decide what comes out: of runs, and of how they are judged."""
     found = hashlib.sha256()
-    for package in (cases, engines, reference, judging, metrics, sweep):
+    for package in (cases, engines, reference, hw, judging, metrics, sweep):
         root = Path(next(iter(package.__path__)))
         for path in sorted(root.rglob("*.py")):
             found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
