@@ -98,6 +98,7 @@ def test_what_is_complete_is_kept_and_the_same_command_goes_on(tmp_path: Path) -
 BENCH = ("bench", "balls.py", "-e", "fake:slow", "--repeats", "1")
 
 
+@pytest.mark.slow
 def test_a_benchmark_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     out = tmp_path / "out"
     process = begun(*BENCH, cwd=tmp_path)
@@ -117,6 +118,7 @@ def test_a_benchmark_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     assert not list(out.glob(".crossbody-*"))
 
 
+@pytest.mark.slow
 def test_a_replay_goes_on_with_the_engines_that_were_complete(tmp_path: Path) -> None:
     out, given = tmp_path / "deep" / "out", {"a0": 1e4, "a1": 20.0, "a2": 0.0}
     case = cases.load("bouncing_ball", "linear", t_end=0.5, **given)
