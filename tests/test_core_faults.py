@@ -124,7 +124,8 @@ def test_buffers_grow_without_loss():
 
 def test_interrupt_is_answered_at_once():
     code = (
-        "import sys; sys.path.insert(0, 'tests'); from mechanisms import ball;"
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"  # else it may be ignored
+        "sys.path.insert(0, 'tests'); from mechanisms import ball;"
         "from crossbody.reference import simulate; simulate(ball(), [1.0], [0.0], 0.1); print('ready', flush=True);"
         "r = simulate(ball(), [1.0], [0.0], 1e4, max_step=1e-5,"
         " max_steps=10**9, samples=[0.0]); print(r.outcome, flush=True)"
