@@ -159,7 +159,7 @@ def test_wrong_use_is_told():
     system, q, v, u, _ = SCENES["grasp"]
     model = linearise(system, q, v, u, [0, 1])
     for wrong in ([0, 0], [2], [-1]):
-        with pytest.raises(SceneError, match="different rows below 2"):
+        with pytest.raises(SceneError, match="different ones below 2"):
             linearise(system, q, active=wrong)
     with pytest.raises(SceneError, match="coordinates"):
         linearise(system, q, names=("x",))

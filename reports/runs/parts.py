@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from crossbody.cases import OutputError
+from crossbody.cases import InvalidValue, OutputError, UnknownName
 from crossbody.reports import voice
 from crossbody.reports.runs import files, manifest, output, watch
 
@@ -105,8 +105,8 @@ class Parts:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Take the parts away when what they were for is written, and where there are none; else say that they stay."""
-        if kind is None or not self.found:
+        """Take the parts away when what they were for is written, where there are none, and after wrong use."""
+        if kind is None or not self.found or issubclass(kind, (InvalidValue, UnknownName)):
             shutil.rmtree(self.path, ignore_errors=True)
             output.take_away(self.out, self.first)
         elif issubclass(kind, OutputError):
