@@ -1,0 +1,93 @@
+"""Numbers that carry their first and second derivative in time: (x, x', x''), and vectors of three of them.
+
+A gap that is written once, in jets, has its rate and its second derivative with all terms of the shapes' curvature.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference import kernels
+
+Jet = Any
+"""(x, x', x'')."""
+Vector = Any
+"""Three jets."""
+
+
+@kernels.helper
+def add(a: Jet, b: Jet) -> Jet:
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernels.helper
+def less(a: Jet, b: Jet) -> Jet:
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernels.helper
+def shifted(a: Jet, c: float) -> Jet:
+    """Return a + c for a constant c."""
+    return a[0] + c, a[1], a[2]
+
+
+@kernels.helper
+def scaled(c: float, a: Jet) -> Jet:
+    """Return c a for a constant c."""
+    return c * a[0], c * a[1], c * a[2]
+
+
+@kernels.helper
+def times(a: Jet, b: Jet) -> Jet:
+    """Return a b."""
+    return a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]
+
+
+@kernels.helper
+def over(a: Jet, b: Jet) -> Jet:
+    """Return a / b."""
+    x = a[0] / b[0]
+    y = (a[1] - x * b[1]) / b[0]
+    return x, y, (a[2] - 2.0 * y * b[1] - x * b[2]) / b[0]
+
+
+@kernels.helper
+def root(a: Jet) -> Jet:
+    """Return the square root of a."""
+    x = np.sqrt(a[0])
+    y = 0.5 * a[1] / x
+    return x, y, (0.5 * a[2] - y * y) / x
+
+
+@kernels.helper
+def dot(x: Vector, y: Vector) -> Jet:
+    """Return the inner product of two vectors."""
+    return add(add(times(x[0], y[0]), times(x[1], y[1])), times(x[2], y[2]))
+
+
+@kernels.helper
+def apart(x: Vector, y: Vector) -> Vector:
+    """Return the vector x - y."""
+    return less(x[0], y[0]), less(x[1], y[1]), less(x[2], y[2])
+
+
+@kernels.helper
+def along(x: Vector, s: Jet, y: Vector) -> Vector:
+    """Return the vector x + s y."""
+    return add(x[0], times(s, y[0])), add(x[1], times(s, y[1])), add(x[2], times(s, y[2]))
+
+
+@kernels.helper
+def moved(x: Vector, c: float, y: Vector) -> Vector:
+    """Return the vector x + c y for a constant c."""
+    return add(x[0], scaled(c, y[0])), add(x[1], scaled(c, y[1])), add(x[2], scaled(c, y[2]))
+
+
+@kernels.helper
+def value(x: Vector) -> tuple[Any, Any, Any]:
+    """Return what a vector is now."""
+    return x[0][0], x[1][0], x[2][0]

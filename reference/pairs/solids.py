@@ -1,0 +1,137 @@
+"""A sphere or capsule against a solid: the gap between their nearest points.
+
+Every function returns the distance of a point from a solid as a jet, below 0 inside, and the unit vector from the solid
+to the point. The nearest point moves from face to edge to corner: distance and normal are continuous there, the second
+derivative is not.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference import kernels
+from crossbody.reference.pairs.jets import (
+    Jet,
+    Vector,
+    add,
+    along,
+    apart,
+    dot,
+    less,
+    over,
+    root,
+    scaled,
+    shifted,
+    times,
+    value,
+)
+
+Point = Any
+"""Three numbers."""
+Distance = Any
+"""A jet, and three numbers."""
+
+
+@kernels.helper
+def _held(s: Jet, low: float, high: float) -> Jet:
+    """Return s between its bounds, where it is at rest."""
+    if s[0].real < low:
+        return shifted(scaled(0.0, s), low)
+    if s[0].real > high:
+        return shifted(scaled(0.0, s), high)
+    return s
+
+
+@kernels.helper
+def _beyond(s: Jet, half: float) -> Jet:
+    """Return how far s is beyond -half .. half, with its sign; 0 between them."""
+    return less(s, _held(s, -half, half))
+
+
+@kernels.helper
+def _toward(D: Vector, d: Jet) -> Distance:
+    """Return the length d of D and its direction."""
+    x, y, z = value(D)
+    return d, (x / d[0], y / d[0], z / d[0])
+
+
+@kernels.helper
+def point(C: Vector, M: Vector) -> Distance:
+    """Return the distance of C from the point M."""
+    D = apart(C, M)
+    return _toward(D, root(dot(D, D)))
+
+
+@kernels.helper
+def segment(C: Vector, M: Vector, A: Vector, half: float) -> Distance:
+    """Return the distance of C from a segment about M along the unit vector A."""
+    return point(C, along(M, _held(dot(A, apart(C, M)), -half, half), A))
+
+
+@kernels.helper
+def _face(s: Jet, half: float, X: Vector) -> Distance:
+    """Return the distance from the nearer of two faces at -half and half along X."""
+    x, y, z = value(X)
+    if s[0].real < 0.0:
+        return shifted(scaled(-1.0, s), -half), (-x, -y, -z)
+    return shifted(s, -half), (x, y, z)
+
+
+@kernels.helper
+def box(C: Vector, M: Vector, X: Vector, Y: Vector, Z: Vector, size: Point) -> Distance:
+    """Return the distance of C from a box about M with half sides along X, Y, Z; inside, from its nearest face."""
+    D = apart(C, M)
+    x, y, z = dot(X, D), dot(Y, D), dot(Z, D)
+    a, b, c = _beyond(x, size[0]), _beyond(y, size[1]), _beyond(z, size[2])
+    square = add(add(times(a, a), times(b, b)), times(c, c))
+    if square[0].real > 0.0:
+        zero = scaled(0.0, a)
+        out = along(along(along((zero, zero, zero), a, X), b, Y), c, Z)
+        return _toward(out, root(square))
+    p, q, r = abs(x[0].real) - size[0], abs(y[0].real) - size[1], abs(z[0].real) - size[2]
+    if p >= q and p >= r:
+        return _face(x, size[0], X)
+    return _face(y, size[1], Y) if q >= r else _face(z, size[2], Z)
+
+
+@kernels.helper
+def _scaled_to(D: Vector, length: Jet, d: Jet) -> Vector:
+    """Return the vector D, which is d long, at another length."""
+    k = over(length, d)
+    return times(k, D[0]), times(k, D[1]), times(k, D[2])
+
+
+@kernels.helper
+def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float) -> Distance:
+    """Return the distance of C from a cylinder about M along A; inside, from its side or its nearer end."""
+    D = apart(C, M)
+    s = dot(A, D)
+    out = along(D, scaled(-1.0, s), A)
+    square = dot(out, out)
+    wide = square[0].real > radius * radius
+    if abs(s[0].real) > half:
+        if not wide:
+            return _face(s, half, A)
+        rho = root(square)
+        a, b = shifted(rho, -radius), _beyond(s, half)
+        far = root(add(times(a, a), times(b, b)))
+        return _toward(along(_scaled_to(out, a, rho), b, A), far)
+    if not wide and abs(s[0].real) - half > square[0].real ** 0.5 - radius:
+        return _face(s, half, A)
+    rho = root(square)
+    x, y, z = value(out)
+    return shifted(rho, -radius), (x / rho[0], y / rho[0], z / rho[0])
+
+
+@kernels.helper
+def segments(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float) -> Any:
+    """Return the nearest points of two segments about M and N along A and B, which are not parallel."""
+    D, b = apart(N, M), dot(A, B)
+    f, g = dot(A, D), dot(B, D)
+    free = shifted(scaled(-1.0, times(b, b)), 1.0)
+    s = _held(over(less(f, times(b, g)), free), -one, one)
+    t = less(times(s, b), g)
+    if abs(t[0].real) > two:
+        t = _held(t, -two, two)
+        s = _held(add(f, times(t, b)), -one, one)
+    return along(M, s, A), along(N, t, B)
