@@ -184,6 +184,27 @@ class Shape(_Named):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pair(_Named):
+    """Two shapes that may touch; their rows push only.
+
+    Attributes:
+        first, second: names of the shapes.
+        margin: distance at which the rows begin to act, m.
+        friction: along the two tangents, about the normal, about the two tangents.
+        dimension: 1 without friction, 3 with sliding, 4 with torsional, 6 with rolling friction.
+        law: of its rows.
+    """
+
+    first: str
+    second: str
+    margin: float = 0.0
+    friction: Vector = (0.0,) * 5
+    dimension: int = 1
+    law: RowLaw = STIFF
+    sizes: ClassVar[dict[str, int]] = {"friction": 5}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Loop(_Named):
     """Rows that are always on.
 
@@ -287,13 +308,14 @@ class Scene:
     Attributes:
         bodies: depth-first: behind its parent, and no other branch in between. Engines number them so.
         joints: those of one body stand together, in the order of the bodies.
-        shapes, loops, tendons, actuators: what else there is.
+        shapes, pairs, loops, tendons, actuators: what else there is.
         gravity: m/s^2.
     """
 
     bodies: tuple[Body, ...] = ()
     joints: tuple[Joint, ...] = ()
     shapes: tuple[Shape, ...] = ()
+    pairs: tuple[Pair, ...] = ()
     loops: tuple[Loop, ...] = ()
     tendons: tuple[Tendon, ...] = ()
     actuators: tuple[Actuator, ...] = ()
@@ -302,7 +324,7 @@ class Scene:
     def __post_init__(self) -> None:
         """Check that names are unique, that every name which is spoken of is there, and the order of the parts."""
         object.__setattr__(self, "gravity", _vector("Scene.gravity", self.gravity, 3))
-        for group in ("bodies", "joints", "shapes", "loops", "tendons", "actuators"):
+        for group in ("bodies", "joints", "shapes", "pairs", "loops", "tendons", "actuators"):
             object.__setattr__(self, group, tuple(getattr(self, group)))
             _unique(group, getattr(self, group))
         if len(self.bodies) > LARGEST:
@@ -312,6 +334,10 @@ class Scene:
         tendons = {t.name for t in self.tendons}
         for shape in self.shapes:
             _known(shape, "body", shape.body, bodies)
+        shapes = {shape.name for shape in self.shapes}
+        for pair in self.pairs:
+            _known(pair, "first", pair.first, shapes)
+            _known(pair, "second", pair.second, shapes)
         for loop in self.loops:
             among = joints | {""} if loop.type == "joint" else bodies
             _known(loop, "first", loop.first, among - {""})

@@ -1,0 +1,97 @@
+"""Which shapes of a compiled MuJoCo model may touch, and how: its filters, its own pairs and its rules of mixing.
+
+Rules: MuJoCo's documentation, "Computation: Collision detection" and "Contact".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases.scene import Pair, RowLaw
+
+SMALLEST = 1e-15
+"""Weights below it count as none."""
+
+
+def pairs_of(model: Any, name: Callable[[int], str], law: Callable[[Any, Any, Any], RowLaw]) -> tuple[Pair, ...]:
+    """Return the pairs of a compiled model.
+
+    Args:
+        model: MuJoCo's.
+        name: shape's number -> its name.
+        law: model, solref, solimp -> the law of a row.
+    """
+    given = [_explicit(model, i, name, law) for i in range(model.npair)]
+    listed = {frozenset((int(a), int(b))) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)}
+    return (*given, *(_mixed(model, a, b, name, law) for a, b in _met(model) if frozenset((a, b)) not in listed))
+
+
+def _met(model: Any) -> Iterator[tuple[int, int]]:
+    """Yield the numbers of shapes that the filters let touch."""
+    import mujoco
+
+    weld = model.body_weldid
+    above = weld[model.body_parentid[weld]]
+    parents = not model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+    apart = {(int(s) >> 16, int(s) & 0xFFFF) for s in model.exclude_signature}
+    types, wanted, body = model.geom_contype, model.geom_conaffinity, model.geom_bodyid
+    for a, b in combinations(range(model.ngeom), 2):
+        one, two = int(weld[body[a]]), int(weld[body[b]])
+        if one == two or not (types[a] & wanted[b] or types[b] & wanted[a]):
+            continue
+        if parents and one and two and (one == above[two] or two == above[one]):
+            continue
+        first, second = sorted((int(body[a]), int(body[b])))
+        if (first, second) not in apart and (second, first) not in apart:
+            yield a, b
+
+
+def _explicit(model: Any, i: int, name: Callable[[int], str], law: Callable[[Any, Any, Any], RowLaw]) -> Pair:
+    a, b = int(model.pair_geom1[i]), int(model.pair_geom2[i])
+    return Pair(
+        name=f"{name(a)}:{name(b)}",
+        first=name(a),
+        second=name(b),
+        margin=float(model.pair_margin[i]),
+        friction=tuple(map(float, model.pair_friction[i])),
+        dimension=int(model.pair_dim[i]),
+        law=law(model, model.pair_solref[i], model.pair_solimp[i]),
+    )
+
+
+def _mixed(model: Any, a: int, b: int, name: Callable[[int], str], law: Callable[[Any, Any, Any], RowLaw]) -> Pair:
+    """Return two shapes with what the one of higher priority says, or both: the larger friction, a mean of the rest."""
+    order = int(model.geom_priority[a]) - int(model.geom_priority[b])
+    if order:
+        ruling = a if order > 0 else b
+        friction, dimension = model.geom_friction[ruling], int(model.geom_condim[ruling])
+        solref, solimp = model.geom_solref[ruling], model.geom_solimp[ruling]
+    else:
+        friction = np.maximum(model.geom_friction[a], model.geom_friction[b])
+        dimension = int(max(model.geom_condim[a], model.geom_condim[b]))
+        share, one, two = _share(model, a, b), model.geom_solref[a], model.geom_solref[b]
+        direct = one[0] <= 0.0 or two[0] <= 0.0
+        solref = np.minimum(one, two) if direct else share * one + (1.0 - share) * two
+        solimp = share * model.geom_solimp[a] + (1.0 - share) * model.geom_solimp[b]
+    slide, spin, roll = map(float, friction)
+    return Pair(
+        name=f"{name(a)}:{name(b)}",
+        first=name(a),
+        second=name(b),
+        margin=float(model.geom_margin[a] + model.geom_margin[b]),
+        friction=(slide, slide, spin, roll, roll),
+        dimension=dimension,
+        law=law(model, solref, solimp),
+    )
+
+
+def _share(model: Any, a: int, b: int) -> float:
+    """Return the weight of the first shape's constants."""
+    one, two = float(model.geom_solmix[a]), float(model.geom_solmix[b])
+    if one >= SMALLEST and two >= SMALLEST:
+        return one / (one + two)
+    return 0.5 if one < SMALLEST and two < SMALLEST else float(one >= SMALLEST)
