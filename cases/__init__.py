@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
     from crossbody.cases.scene import Scene
 
-_VOCABULARY = ("files", "scene")
+_VOCABULARY = ("files", "scene", "scene_contacts")
 """Modules of this folder that are no cases."""
 _LAZY = {
     **dict.fromkeys(

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
-from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Scene, Tendon
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Pair, Scene, Shape, Tendon
+from crossbody.cases.scene_contacts import PLACES
 
 ALL = ("hinge", "slide", "ball", "free")
 SINGLE = ("hinge", "slide")
+KINDS = ("sphere", "capsule", "cylinder", "box", "ellipsoid")
 
 
 def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scene:
@@ -29,7 +32,7 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
     single = [joint for joint in joints if joint.type in SINGLE]
     return Scene(
         bodies=tuple(made), joints=tuple(joints), tendons=_tendons(rng, single), actuators=_actuators(rng, joints),
-        loops=_loops(rng, single), gravity=tuple(rng.normal(size=3) * 5.0),
+        loops=_loops(rng, single), **_contacts(rng, made), gravity=tuple(rng.normal(size=3) * 5.0),
     )  # fmt: skip
 
 
@@ -124,3 +127,22 @@ def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actua
             control_range=(-1.0, 2.0), force_range=(-4.0, 4.0),
         ))  # fmt: skip
     return tuple(made)
+
+
+def _contacts(rng: np.random.Generator, made: Sequence[Body]) -> dict[str, tuple]:
+    """Return a plane and a shape on every body, and the pairs that have rows."""
+    shapes = [_shape(rng, "floor", "", "plane")]
+    shapes += [_shape(rng, f"shape {i}", body.name, str(rng.choice(KINDS))) for i, body in enumerate(made)]
+    pairs = [
+        Pair(name=f"{one.name}:{two.name}", first=one.name, second=two.name, margin=float(rng.uniform(0.0, 0.1)))
+        for one, two in combinations(shapes, 2)
+        if (one.type, two.type) in PLACES or (two.type, one.type) in PLACES
+    ]
+    return {"shapes": tuple(shapes), "pairs": tuple(pairs[::3])}
+
+
+def _shape(rng: np.random.Generator, name: str, body: str, kind: str) -> Shape:
+    return Shape(
+        name=name, body=body, type=kind, size=tuple(rng.uniform(0.1, 0.4, 3)), position=tuple(rng.normal(size=3)),
+        orientation=_unit(rng, 4),
+    )  # fmt: skip

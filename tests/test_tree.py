@@ -81,9 +81,10 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     if not count:
         return
     rng, table, step = np.random.default_rng(seed), tabulate(scene), 1e-30
-    q, v, _ = random_state(scene, rng)
-    H, h, Hdv = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count)
-    mechanism.rows(0.0, q, v, table.p, np.zeros(table.scratch), np.arange(count), count, H, h, Hdv)
+    q, v, u = random_state(scene, rng)
+    H, h, Hdv, w = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count), np.zeros(table.scratch)
+    mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
+    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
     mechanism.gaps(0.0, q + 1j * step * v, v.astype(complex), table.p.astype(complex), *moved)
     assert close(moved[0].real, h)

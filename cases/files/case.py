@@ -16,6 +16,7 @@ from crossbody.cases._errors import SceneError, UnknownName
 from crossbody.cases.files.controls import read_controls
 from crossbody.cases.files.reading import findings_of, model_of, scene_of
 from crossbody.cases.scene import RowLaw, Scene
+from crossbody.cases.scene_contacts import contacts
 
 REFERENCE_POSE = "reference"
 OF_THE_FILE = -1.0
@@ -88,7 +89,7 @@ def overruled(scene: Scene, a0: float, a1: float) -> Scene:
         return RowLaw(a0=own.a0 if a0 < 0.0 else a0, a1=own.a1 if a1 < 0.0 else a1)
 
     changed: dict[str, Any] = {}
-    for group in ("joints", "loops", "tendons"):
+    for group in ("joints", "pairs", "loops", "tendons"):
         changed[group] = tuple(replace(part, law=law(part.law)) for part in getattr(scene, group))
     return scene.replace(**changed)
 
@@ -106,7 +107,7 @@ def case_of(
     file: str = "",
     findings: tuple[str, ...] = (),
 ) -> Case:
-    """Return a scene as a case: its rows are its loops, then the bounds of its joints and tendons.
+    """Return a scene as a case: its rows are its loops, then the bounds of its joints and tendons, then its contacts.
 
     Args:
         scene: what moves.
@@ -185,4 +186,8 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
                 names.append(f"{part.name} {side}")
                 laws.append(part.law)
                 unilateral.append(True)
+    for contact in contacts(scene):
+        names += contact.rows
+        laws += [contact.pair.law] * contact.places
+        unilateral += [True] * contact.places
     return names, laws, unilateral

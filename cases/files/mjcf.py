@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crossbody.cases._errors import SceneError
+from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
 from crossbody.cases.scene import (
     UNBOUNDED,
@@ -58,6 +59,7 @@ def scene_of(model: mujoco.MjModel) -> Scene:
         bodies=tuple(_body(model, i) for i in range(1, model.nbody)),
         joints=tuple(_joint(model, i) for i in range(model.njnt)),
         shapes=tuple(shape for i in range(model.ngeom) if (shape := _shape(model, i)) is not None),
+        pairs=pairs_of(model, _names(model, "geom"), law) if _on(model, "CONTACT") else (),
         loops=tuple(_loop(model, i) for i in range(model.neq) if model.eq_active0[i] and _on(model, "EQUALITY")),
         tendons=tuple(_tendon(model, i) for i in range(model.ntendon)),
         actuators=tuple(_actuator(model, i) for i in range(model.nu)),

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference import kernels
 from crossbody.reference.pairs.jets import (
     Jet,
@@ -28,6 +30,8 @@ from crossbody.reference.pairs.jets import (
 
 Point = Any
 """Three numbers."""
+PARALLEL = 1e-8
+"""Square of the sine below which two segments have no nearest points to more than half of the digits."""
 Distance = Any
 """A jet, and three numbers."""
 
@@ -35,9 +39,9 @@ Distance = Any
 @kernels.helper
 def _held(s: Jet, low: float, high: float) -> Jet:
     """Return s between its bounds, where it is at rest."""
-    if s[0].real < low:
+    if s[0].real < low.real:
         return shifted(scaled(0.0, s), low)
-    if s[0].real > high:
+    if s[0].real > high.real:
         return shifted(scaled(0.0, s), high)
     return s
 
@@ -88,7 +92,7 @@ def box(C: Vector, M: Vector, X: Vector, Y: Vector, Z: Vector, size: Point) -> D
         zero = scaled(0.0, a)
         out = along(along(along((zero, zero, zero), a, X), b, Y), c, Z)
         return _toward(out, root(square))
-    p, q, r = abs(x[0].real) - size[0], abs(y[0].real) - size[1], abs(z[0].real) - size[2]
+    p, q, r = abs(x[0].real) - size[0].real, abs(y[0].real) - size[1].real, abs(z[0].real) - size[2].real
     if p >= q and p >= r:
         return _face(x, size[0], X)
     return _face(y, size[1], Y) if q >= r else _face(z, size[2], Z)
@@ -108,15 +112,15 @@ def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float) -> Dis
     s = dot(A, D)
     out = along(D, scaled(-1.0, s), A)
     square = dot(out, out)
-    wide = square[0].real > radius * radius
-    if abs(s[0].real) > half:
+    wide = square[0].real > radius.real**2
+    if abs(s[0].real) > half.real:
         if not wide:
             return _face(s, half, A)
         rho = root(square)
         a, b = shifted(rho, -radius), _beyond(s, half)
         far = root(add(times(a, a), times(b, b)))
         return _toward(along(_scaled_to(out, a, rho), b, A), far)
-    if not wide and abs(s[0].real) - half > square[0].real ** 0.5 - radius:
+    if not wide and abs(s[0].real) - half.real > np.sqrt(square[0].real) - radius.real:
         return _face(s, half, A)
     rho = root(square)
     x, y, z = value(out)
@@ -125,13 +129,17 @@ def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float) -> Dis
 
 @kernels.helper
 def segments(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float) -> Any:
-    """Return the nearest points of two segments about M and N along A and B, which are not parallel."""
+    """Return the nearest points of two segments about M and N along A and B; the middle of their overlap if parallel."""
     D, b = apart(N, M), dot(A, B)
     f, g = dot(A, D), dot(B, D)
     free = shifted(scaled(-1.0, times(b, b)), 1.0)
-    s = _held(over(less(f, times(b, g)), free), -one, one)
+    if free[0].real > PARALLEL:
+        s = _held(over(less(f, times(b, g)), free), -one, one)
+    else:
+        reach = scaled(two, b) if b[0].real > 0.0 else scaled(-two, b)
+        s = scaled(0.5, add(_held(less(f, reach), -one, one), _held(add(f, reach), -one, one)))
     t = less(times(s, b), g)
-    if abs(t[0].real) > two:
+    if abs(t[0].real) > two.real:
         t = _held(t, -two, two)
         s = _held(add(f, times(t, b)), -one, one)
     return along(M, s, A), along(N, t, B)

@@ -5,8 +5,8 @@ from __future__ import annotations
 FREE, BALL, SLIDE, HINGE = range(4)
 
 # Head of the table: sizes, gravity, where each part begins, and the potential energy of what never moves.
-NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, RESTING, HEAD = (
-    0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14,
+NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, RESTING, AT_PAIR, HEAD = (
+    0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 15,
 )  # fmt: skip
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
@@ -22,7 +22,7 @@ ON_JOINT, ON_TENDON = 0, 1
 COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
-LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT = range(4)
+LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT = range(5)
 
 # What is kept of a node while it is computed: pose (rotation by rows, position), velocity, acceleration without v',
 # force, inertia; of a degree of freedom: its motion subspace (angular, linear).

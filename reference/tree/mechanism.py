@@ -8,6 +8,8 @@ import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
+from crossbody.reference.pairs import layout as pairs
+from crossbody.reference.pairs.rows import gradient, touch
 from crossbody.reference.tree import forces, layout, sweeps
 
 
@@ -65,11 +67,35 @@ def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
             H[int(p[o + 5].real)] -= slope
 
 
+@kernels.helper
+def _first_contact(p: Array, rows: int) -> int:
+    """Return the first row that is a contact of shapes; they stand behind all others."""
+    i, o = rows, int(p[layout.AT_ROW].real)
+    while i > 0 and int(p[o + layout.ROW * (i - 1)].real) == layout.CONTACT:
+        i -= 1
+    return i
+
+
+@kernels.helper
+def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
+    """Return where the pair of row i stands in p, and gap, normal and place of its contact."""
+    o = int(p[layout.AT_ROW].real) + layout.ROW * i
+    at = int(p[layout.AT_PAIR].real) + pairs.PAIR * int(p[o + pairs.WHICH].real)
+    return at, touch(p, w, at, int(p[o + pairs.PLACE].real))
+
+
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
-    """Of every row."""
-    for i in range(len(h)):
+    """Of every row; contacts of shapes need the poses of the bodies."""
+    first = _first_contact(p, len(h))
+    for i in range(first):
         h[i], hd[i], _ = _row(q, v, p, i)
+    if first < len(h):
+        w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
+        sweeps.outwards(q, v, p, w)
+        for i in range(first, len(h)):
+            found = _contact(p, w, i)[1][0]
+            h[i], hd[i] = found[0], found[1]
 
 
 @kernels.rows
@@ -77,8 +103,13 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
     """The active ones."""
     H[:na] = 0.0
     for j in range(na):
-        h[j], _, Hdv[j] = _row(q, v, p, idx[j])
-        _gradient(q, p, idx[j], H[j])
+        if int(p[int(p[layout.AT_ROW].real) + layout.ROW * idx[j]].real) == layout.CONTACT:
+            at, (gap, n, place) = _contact(p, w, idx[j])
+            h[j], Hdv[j] = gap[0], gap[2]
+            gradient(p, w, at, n, place, H[j])
+        else:
+            h[j], _, Hdv[j] = _row(q, v, p, idx[j])
+            _gradient(q, p, idx[j], H[j])
 
 
 @kernels.helper

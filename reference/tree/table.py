@@ -6,16 +6,23 @@ its parent is T0 + c T1 + s T2, with c, s = cos, sin of a hinge's angle or c = t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Scene, Tendon
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Scene, Shape, Tendon
+from crossbody.cases.scene_contacts import contacts
 from crossbody.reference._kinds import Index
+from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.tree import layout
 
+SHAPES = {
+    "plane": pairs.PLANE, "sphere": pairs.SPHERE, "capsule": pairs.CAPSULE, "ellipsoid": pairs.ELLIPSOID,
+    "cylinder": pairs.CYLINDER, "box": pairs.BOX,
+}  # fmt: skip
 TYPES = {"free": layout.FREE, "ball": layout.BALL, "slide": layout.SLIDE, "hinge": layout.HINGE}
 
 
@@ -185,9 +192,10 @@ class _Builder:
         )  # fmt: skip
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
         head[layout.RESTING] = self.resting
-        parts = [self.rows, self.dof_rows, actuators, tendons, rows]
+        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places)]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
-        head[[layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW]] = starts[:5]
+        where = [layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR]
+        head[where] = starts[:6]
         packed = np.concatenate([head, *(row for part in parts for row in part)])
         finite: Floats = np.clip(packed, -1e300, 1e300)
         return finite  # a bound that is not there: parameters are finite
@@ -247,7 +255,7 @@ def _pose(joint: Joint, before: Place) -> tuple[Floats, Floats, Floats]:
 
 
 def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
-    """Return the rows in the order of `crossbody.cases.scene_rows`: loops, bounds of joints, bounds of tendons."""
+    """Return the rows: loops, bounds of joints, bounds of tendons, contacts of shapes."""
     rows: list[Floats] = []
     for loop in scene.loops:
         rows += _loop(loop, builder)
@@ -258,7 +266,22 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
             bound = tendon.range[0 if sign > 0 else 1]
             if np.isfinite(bound):
                 rows.append(_row(layout.TENDON_LIMIT, sign, i, bound + sign * tendon.margin))
+    for i, contact in enumerate(contacts(scene)):
+        rows += [_row(layout.CONTACT, i, place) for place in range(contact.places)]
     return rows
+
+
+def pair_rows(scene: Scene, places: Mapping[str, Place]) -> list[Floats]:
+    """Return the pairs whose rows are contacts: two shapes, and where the rows begin."""
+    return [
+        np.concatenate([_shape(c.first, places), _shape(c.second, places), [c.pair.margin]]) for c in contacts(scene)
+    ]
+
+
+def _shape(shape: Shape, places: Mapping[str, Place]) -> Floats:
+    place = places[shape.body]
+    R, p = place.R @ rotation(shape.orientation), place.p + place.R @ np.array(shape.position)
+    return np.array([SHAPES[shape.type], place.node, *R.ravel(), *p, *shape.size])
 
 
 def _row(kind: int, *numbers: float) -> Floats:

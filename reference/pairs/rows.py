@@ -1,0 +1,161 @@
+"""The rows of pairs: gap, rate and second derivative from the sweeps of the tree, and the gradient.
+
+h' = n.(v2 - v1) of the material points where the shapes would meet, so that H = n.(J2 - J1) there; h'' at v' = 0 is
+the second derivative of the gap in closed form along the motion with which the nodes now move and accelerate.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference import kernels
+from crossbody.reference._kinds import Array
+from crossbody.reference.pairs import layout, planes, solids
+from crossbody.reference.pairs.jets import moved, shifted, value
+from crossbody.reference.tree import layout as tree
+from crossbody.reference.tree.sweeps import cross
+
+
+@kernels.helper
+def _point(p: Array, w: Array, o: int) -> Any:
+    """Return the origin of the shape at p[o:] and its motion."""
+    node, k = int(p[o + layout.NODE].real), o + layout.POSE
+    zero = 0.0 * w[0]
+    if node < 0:
+        return (p[k + 9] + zero, zero, zero), (p[k + 10] + zero, zero, zero), (p[k + 11] + zero, zero, zero)
+    x = tree.NODE_SCRATCH * node
+    a, b, c = p[k + 9], p[k + 10], p[k + 11]
+    r = (
+        w[x] * a + w[x + 1] * b + w[x + 2] * c + w[x + 9],
+        w[x + 3] * a + w[x + 4] * b + w[x + 5] * c + w[x + 10],
+        w[x + 6] * a + w[x + 7] * b + w[x + 8] * c + w[x + 11],
+    )
+    root = tree.NODE_SCRATCH * int(p[int(p[tree.AT_NODE].real) + tree.NODE * node + tree.ROOT].real)
+    d0, d1, d2 = r[0] - w[root + 9], r[1] - w[root + 10], r[2] - w[root + 11]
+    y, z, g = x + tree.V_AT, x + tree.A_AT, tree.GRAVITY
+    u = cross(w[y], w[y + 1], w[y + 2], d0, d1, d2)
+    u0, u1, u2 = u[0] + w[y + 3], u[1] + w[y + 4], u[2] + w[y + 5]
+    e = cross(w[z], w[z + 1], w[z + 2], d0, d1, d2)
+    f = cross(w[y], w[y + 1], w[y + 2], u0, u1, u2)
+    # The sweep holds the weight as an acceleration of the world; here it is taken out again.
+    return (
+        (r[0], u0, w[z + 3] + p[g] + e[0] + f[0]),
+        (r[1], u1, w[z + 4] + p[g + 1] + e[1] + f[1]),
+        (r[2], u2, w[z + 5] + p[g + 2] + e[2] + f[2]),
+    )
+
+
+@kernels.helper
+def _axis(p: Array, w: Array, o: int, column: int) -> Any:
+    """Return an axis of the shape at p[o:] and its motion."""
+    node, k = int(p[o + layout.NODE].real), o + layout.POSE + column
+    zero = 0.0 * w[0]
+    if node < 0:
+        return (p[k] + zero, zero, zero), (p[k + 3] + zero, zero, zero), (p[k + 6] + zero, zero, zero)
+    x = tree.NODE_SCRATCH * node
+    a, b, c = p[k], p[k + 3], p[k + 6]
+    r0 = w[x] * a + w[x + 1] * b + w[x + 2] * c
+    r1 = w[x + 3] * a + w[x + 4] * b + w[x + 5] * c
+    r2 = w[x + 6] * a + w[x + 7] * b + w[x + 8] * c
+    y, z = x + tree.V_AT, x + tree.A_AT
+    u = cross(w[y], w[y + 1], w[y + 2], r0, r1, r2)
+    e = cross(w[z], w[z + 1], w[z + 2], r0, r1, r2)
+    f = cross(w[y], w[y + 1], w[y + 2], u[0], u[1], u[2])
+    return (r0, u[0], e[0] + f[0]), (r1, u[1], e[1] + f[1]), (r2, u[2], e[2] + f[2])
+
+
+@kernels.helper
+def _sign(place: int, bit: int) -> float:
+    """Return -1 or 1 by a bit of a place: which end, cap or corner."""
+    return 1.0 if (place >> bit) & 1 else -1.0
+
+
+@kernels.helper
+def _over_plane(p: Array, w: Array, o: int, kind: int, place: int, P: Any, N: Any) -> Any:
+    """Return gap, normal and lowest point of the shape at p[o:] over a plane."""
+    C, s = _point(p, w, o), o + layout.SIZE
+    if kind == layout.SPHERE:
+        return planes.sphere(P, N, C, p[s])
+    Z = _axis(p, w, o, 2)
+    if kind == layout.CAPSULE:
+        return planes.sphere(P, N, moved(C, _sign(place, 0) * p[s + 1], Z), p[s])
+    if kind == layout.CYLINDER:
+        return planes.rim(P, N, moved(C, _sign(place, 0) * p[s + 1], Z), Z, p[s])
+    X, Y = _axis(p, w, o, 0), _axis(p, w, o, 1)
+    if kind == layout.BOX:
+        corner = moved(moved(C, _sign(place, 0) * p[s], X), _sign(place, 1) * p[s + 1], Y)
+        return planes.sphere(P, N, moved(corner, _sign(place, 2) * p[s + 2], Z), 0.0 * p[s])
+    return planes.ellipsoid(P, N, C, X, Y, Z, (p[s], p[s + 1], p[s + 2]))
+
+
+@kernels.helper
+def _from_solid(p: Array, w: Array, o: int, C: Any) -> Any:
+    """Return the distance of a point from the shape at p[o:], its rounding taken off, and the direction to the point."""
+    kind, M, s = int(p[o].real), _point(p, w, o), o + layout.SIZE
+    if kind == layout.SPHERE:
+        d, n = solids.point(C, M)
+        return shifted(d, -p[s]), n
+    if kind == layout.BOX:
+        return solids.box(C, M, _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2), (p[s], p[s + 1], p[s + 2]))
+    A = _axis(p, w, o, 2)
+    if kind == layout.CYLINDER:
+        return solids.cylinder(C, M, A, p[s], p[s + 1])
+    d, n = solids.segment(C, M, A, p[s + 1])
+    return shifted(d, -p[s]), n
+
+
+@kernels.helper
+def touch(p: Array, w: Array, o: int, place: int) -> Any:
+    """Return gap (value, rate, second derivative at v' = 0), normal from first to second, and where they would meet.
+
+    Args:
+        p: parameters of the scene.
+        w: filled by the outward sweep.
+        o: where the pair begins in p.
+        place: which of its places.
+    """
+    one, two = o + layout.FIRST, o + layout.SECOND
+    first, second = int(p[one].real), int(p[two].real)
+    if first == layout.PLANE:
+        h, n, at = _over_plane(p, w, two, second, place, _point(p, w, one), _axis(p, w, one, 2))
+        return shifted(h, -p[o + layout.MARGIN]), n, at
+    if first == layout.SPHERE:
+        C, r = _point(p, w, one), p[one + layout.SIZE]
+        d, m = _from_solid(p, w, two, C)
+        c = value(C)
+        return shifted(d, -r - p[o + layout.MARGIN]), (-m[0], -m[1], -m[2]), (
+            c[0] - r * m[0], c[1] - r * m[1], c[2] - r * m[2],
+        )  # fmt: skip
+    r, s = p[one + layout.SIZE], p[two + layout.SIZE]
+    K, L = solids.segments(
+        _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1],
+        _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1],
+    )  # fmt: skip
+    d, n = solids.point(L, K)
+    c = value(L)
+    return shifted(d, -r - s - p[o + layout.MARGIN]), n, (c[0] - s * n[0], c[1] - s * n[1], c[2] - s * n[2])
+
+
+@kernels.helper
+def _pull(p: Array, w: Array, node: int, sign: float, n: Any, at: Any, H: Array) -> None:
+    """Add what a unit force along n at a point of a node is in the velocities on the way to the world."""
+    if node < 0:
+        return
+    o = int(p[tree.AT_NODE].real) + tree.NODE * node
+    root = tree.NODE_SCRATCH * int(p[o + tree.ROOT].real)
+    m0, m1, m2 = cross(at[0] - w[root + 9], at[1] - w[root + 10], at[2] - w[root + 11], n[0], n[1], n[2])
+    kind, j = int(p[o + tree.TYPE].real), int(p[o + tree.V].real)
+    j += 0 if kind >= tree.SLIDE else (5 if kind == tree.FREE else 2)
+    spaces, at_dof = tree.NODE_SCRATCH * int(p[tree.NODES].real), int(p[tree.AT_DOF].real)
+    while j >= 0:
+        s = spaces + tree.DOF_SCRATCH * j
+        along_n = w[s + 3] * n[0] + w[s + 4] * n[1] + w[s + 5] * n[2]
+        H[j] += sign * (w[s] * m0 + w[s + 1] * m1 + w[s + 2] * m2 + along_n)
+        j = int(p[at_dof + tree.DOF * j].real)
+
+
+@kernels.helper
+def gradient(p: Array, w: Array, o: int, n: Any, at: Any, H: Array) -> None:
+    """Add H of the pair at p[o:] whose shapes would meet at a point with normal n."""
+    _pull(p, w, int(p[o + layout.FIRST + layout.NODE].real), -1.0, n, at, H)
+    _pull(p, w, int(p[o + layout.SECOND + layout.NODE].real), 1.0, n, at, H)
