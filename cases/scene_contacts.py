@@ -12,7 +12,7 @@ PLACES = {
     ("plane", "ellipsoid"): 1, ("sphere", "sphere"): 1, ("sphere", "capsule"): 1, ("sphere", "cylinder"): 1,
     ("sphere", "box"): 1, ("capsule", "capsule"): 1,
 }  # fmt: skip
-"""Where two shapes may meet: ends of a capsule, lowest points of a cylinder's caps and corners of a box over a plane."""
+"""Number of places where two shapes may meet: over a plane ends of a capsule, caps of a cylinder, corners of a box."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

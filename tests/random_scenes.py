@@ -32,7 +32,7 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
     single = [joint for joint in joints if joint.type in SINGLE]
     return Scene(
         bodies=tuple(made), joints=tuple(joints), tendons=_tendons(rng, single), actuators=_actuators(rng, joints),
-        loops=_loops(rng, single), **_contacts(rng, made), gravity=tuple(rng.normal(size=3) * 5.0),
+        loops=_loops(rng, single), **_contacts(rng, made, joints), gravity=tuple(rng.normal(size=3) * 5.0),
     )  # fmt: skip
 
 
@@ -129,14 +129,19 @@ def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actua
     return tuple(made)
 
 
-def _contacts(rng: np.random.Generator, made: Sequence[Body]) -> dict[str, tuple]:
+def _contacts(rng: np.random.Generator, made: Sequence[Body], joints: Sequence[Joint]) -> dict[str, tuple]:
     """Return a plane and a shape on every body, and the pairs that have rows."""
     shapes = [_shape(rng, "floor", "", "plane")]
     shapes += [_shape(rng, f"shape {i}", body.name, str(rng.choice(KINDS))) for i, body in enumerate(made)]
+    carriers = {"": ""}
+    for body in made:
+        moving = any(joint.body == body.name for joint in joints)
+        carriers[body.name] = body.name if moving else carriers[body.parent]
     pairs = [
         Pair(name=f"{one.name}:{two.name}", first=one.name, second=two.name, margin=float(rng.uniform(0.0, 0.1)))
         for one, two in combinations(shapes, 2)
-        if (one.type, two.type) in PLACES or (two.type, one.type) in PLACES
+        if ((one.type, two.type) in PLACES or (two.type, one.type) in PLACES)
+        and carriers[one.body] != carriers[two.body]
     ]
     return {"shapes": tuple(shapes), "pairs": tuple(pairs[::3])}
 

@@ -59,7 +59,7 @@ def scene_of(model: mujoco.MjModel) -> Scene:
         bodies=tuple(_body(model, i) for i in range(1, model.nbody)),
         joints=tuple(_joint(model, i) for i in range(model.njnt)),
         shapes=tuple(shape for i in range(model.ngeom) if (shape := _shape(model, i)) is not None),
-        pairs=pairs_of(model, _names(model, "geom"), law) if _on(model, "CONTACT") else (),
+        pairs=pairs_of(model, names(model, "geom"), law) if _on(model, "CONTACT") else (),
         loops=tuple(_loop(model, i) for i in range(model.neq) if model.eq_active0[i] and _on(model, "EQUALITY")),
         tendons=tuple(_tendon(model, i) for i in range(model.ntendon)),
         actuators=tuple(_actuator(model, i) for i in range(model.nu)),
@@ -85,7 +85,8 @@ def _name(model: Any, kind: str, index: int) -> str:
     return str(getattr(model, kind)(index).name) or f"{WORDS.get(kind, kind)}{index}"
 
 
-def _names(model: Any, kind: str) -> Callable[[int], str]:
+def names(model: Any, kind: str) -> Callable[[int], str]:
+    """Return what gives the name of a part of one kind by its number."""
     return lambda index: _name(model, kind, index)
 
 
@@ -177,7 +178,7 @@ def _loop(model: Any, i: int) -> Loop:
     import mujoco
 
     kind, data, name = int(model.eq_type[i]), model.eq_data[i], _name(model, "eq", i)
-    bodies, joints = _names(model, "body"), _names(model, "jnt")
+    bodies, joints = names(model, "body"), names(model, "jnt")
     one, two = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     given = law(model, model.eq_solref[i], model.eq_solimp[i])
     if kind == mujoco.mjtEq.mjEQ_JOINT:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -9,6 +10,7 @@ import numpy as np
 
 from crossbody.cases import CaseUnsupported
 from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Tendon
+from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
 
 
@@ -47,6 +49,8 @@ def spec_of(scene: Scene) -> Any:
         _add_loop(spec, loop)
     for actuator in scene.actuators:
         _add_actuator(spec, actuator)
+    for contact in contacts(scene):
+        _add_contact(spec, bodies, contact)
     return spec
 
 
@@ -88,6 +92,20 @@ def _add_loop(spec: Any, loop: Loop) -> None:
     added.name1, added.name2 = loop.first, loop.second
     added.data[:5] = loop.polynomial
     added.solref, added.solimp = _solref(loop.law), IMPEDANCE
+
+
+def _add_contact(spec: Any, bodies: Mapping[str, Any], contact: Contact) -> None:
+    """Add a pair by itself, and its shapes where no other pair has added them; nothing else touches them."""
+    for shape in (contact.first, contact.second):
+        if spec.geom(shape.name) is None:
+            bodies[shape.body].add_geom(
+                name=shape.name, type=getattr(mujoco.mjtGeom, f"mjGEOM_{shape.type.upper()}"), size=shape.size,
+                pos=shape.position, quat=shape.orientation, contype=0, conaffinity=0,
+            )  # fmt: skip
+    spec.add_pair(
+        name=contact.pair.name, geomname1=contact.first.name, geomname2=contact.second.name, condim=1,
+        margin=contact.pair.margin, solref=_solref(contact.pair.law), solimp=IMPEDANCE,
+    )  # fmt: skip
 
 
 def _add_actuator(spec: Any, actuator: Actuator) -> None:

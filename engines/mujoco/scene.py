@@ -14,6 +14,8 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import Scene
+from crossbody.cases.scene_contacts import Contact
+from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces, tendons
 from crossbody.engines.mujoco._build import compiled, spec_of
@@ -24,6 +26,7 @@ SLOWEST, OF_RATE = 1e-3, 0.02
 """Largest step of the matched profile, s, and the part of the fastest time constant that it is: Runge-Kutta 4 leaves
 (1/50)^4 a time constant."""
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
+TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 SOFT = "The file's rows are soft: their law varies with depth."
 HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
@@ -97,13 +100,13 @@ def _from_file(case: Case) -> Any:
 
 
 def matched(scene: Scene) -> Any:
-    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no contacts."""
+    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no other contacts."""
     spec = spec_of(scene)
     option = spec.option
     option.integrator, option.solver = mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_NEWTON
     option.tolerance, option.jacobian = 0.0, mujoco.mjtJacobian.mjJAC_DENSE
     off = mujoco.mjtDisableBit
-    option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE | off.mjDSBL_CONTACT)
+    option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE)
     model = compiled(spec, scene)
     without_regularisation(model)
     return model
@@ -147,7 +150,15 @@ class Rows:
                     if np.isfinite(bound):
                         self.places[kind, i, bool(upper)] = row
                         row += 1
-        self.nc = row
+        self.touching = Contacts(scene)
+        self.nc = row + self.touching.count
+        named = mjcf.names(model, "geom")
+        self.geoms = {named(i): i for i in range(model.ngeom)}
+        self.touches: dict[frozenset[int], tuple[Contact, int]] = {}
+        for contact in self.touching.all:
+            both = frozenset((self.geoms[contact.first.name], self.geoms[contact.second.name]))
+            self.touches[both] = (contact, row)
+            row += contact.places
 
     def constants(self) -> dict[str, Any]:
         """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
@@ -155,6 +166,7 @@ class Rows:
         solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
         bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
         solref += [bounds[kind][i] for kind, i, _ in self.places]
+        solref += [model.pair_solref[i] for i, contact in enumerate(self.touching.all) for _ in range(contact.places)]
         pairs = np.array(solref).reshape(-1, 2)
         if (pairs >= 0.0).any():
             return {"solref": pairs}
@@ -168,7 +180,18 @@ class Rows:
             kind, part = int(data.efc_type[j]), int(data.efc_id[j])
             if kind in LIMITS:
                 lam[self._place(j, kind, part)] += data.efc_force[j]
+            elif kind == TOUCH:
+                lam[self._touch(part)] += data.efc_force[j]
         return lam
+
+    def _touch(self, part: int) -> int:
+        """Return which row a contact is: its place is told by the signs of its point in the second shape's axes."""
+        found = self.data.contact[part]
+        contact, row = self.touches[frozenset(int(i) for i in found.geom)]
+        i = self.geoms[contact.second.name]
+        x = self.data.geom_xmat[i].reshape(3, 3).T @ (found.pos - self.data.geom_xpos[i])
+        bits = {1: (), 2: (x[2] > 0.0,), 8: tuple(x > 0.0)}[contact.places]
+        return row + sum(int(bit) << k for k, bit in enumerate(bits))
 
     def _place(self, j: int, kind: int, part: int) -> int:
         """Return which bound an active row is: the upper one has a falling gap."""
@@ -189,6 +212,10 @@ class Rows:
         data = mujoco.MjData(self.model)
         T = tendons(self.scene)
 
+        def poses(body: str) -> tuple[Floats, Floats]:
+            i = self.model.body(body or 0).id
+            return data.xmat[i].reshape(3, 3), data.xpos[i]
+
         def heights(q: Floats) -> list[float]:
             h: list[float] = []
             lengths = [*q, *(T @ q)]
@@ -206,7 +233,8 @@ class Rows:
                 mujoco.mj_fwdVelocity(self.model, data)
                 mujoco.mj_energyPos(self.model, data)
                 mujoco.mj_energyVel(self.model, data)
-                gaps[i] = [*data.efc_pos[: self.always], *heights(q[i])]
+                touching = [touch.gap for touch in self.touching.touches(poses)]
+                gaps[i] = [*data.efc_pos[: self.always], *heights(q[i]), *touching]
                 spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
                 energy[i] = data.energy[1], data.energy[0] + spared.sum()
             return gaps, energy

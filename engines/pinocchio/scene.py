@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,12 @@ from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import _scene as parts
+from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 
+Heights = Callable[[Floats], Floats]
 Placed = dict[str, tuple[int, Any]]
 """Body -> joint that carries it, and its pose in that joint's frame."""
 
@@ -41,13 +44,16 @@ def build(case: Case, algebra: str) -> Prepared:
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         tau[:] = forces(q + reference, v) + lifted(scene, model, data, placed, q)
 
+    touching = ContactRows(scene, model, placed)
     pinned = PinRows(
-        model, jacobian=lambda q: rows.jacobian(q + reference), heights=lambda q: rows.heights(q + reference),
-        drift=lambda q, v: rows.drift(q + reference, v), law=case.law, algebra=algebra, forces=apply,
+        model, jacobian=lambda q: np.vstack([rows.jacobian(q + reference), touching.jacobian(q)]),
+        heights=lambda q: np.concatenate([rows.heights(q + reference), touching.heights(q)]),
+        drift=lambda q, v: np.concatenate([rows.drift(q + reference, v), touching.drift(q, v)]),
+        law=case.law, algebra=algebra, forces=apply,
     )  # fmt: skip
     span = np.ones(scene.nv)
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, forces, rows, reference), sizes=(span, span),
+        rows=pinned, observe=_observe(scene, model, forces, pinned.heights, reference), sizes=(span, span),
         start=(case.q0 - reference, case.v0), chart=lambda q, v: (q + reference, v), world=_world(case, forces),
         audit=_audit(scene, pinned, forces, apply, reference),
     )  # fmt: skip
@@ -106,7 +112,7 @@ def lifted(scene: Scene, model: Any, data: Any, placed: Placed, q: Floats) -> Fl
     return total
 
 
-def _observe(scene: Scene, model: Any, forces: parts.Forces, rows: parts.Rows, reference: Floats) -> Any:
+def _observe(scene: Scene, model: Any, forces: parts.Forces, heights: Heights, reference: Floats) -> Any:
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
     placed = tree(scene)[1]
@@ -122,9 +128,8 @@ def _observe(scene: Scene, model: Any, forces: parts.Forces, rows: parts.Rows, r
                     carrier, pose = placed[body.name]
                     height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
                     energy[i, 1] += body.weightless * body.mass * height
-        at = q + reference
-        energy[:, 1] += forces.energy(at)
-        return np.array([rows.heights(one) for one in at]).reshape(len(q), -1), energy
+        energy[:, 1] += forces.energy(q + reference)
+        return np.array([heights(one) for one in q]).reshape(len(q), -1), energy
 
     return observe
 

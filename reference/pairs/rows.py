@@ -90,7 +90,7 @@ def _over_plane(p: Array, w: Array, o: int, kind: int, place: int, P: Any, N: An
 
 @kernels.helper
 def _from_solid(p: Array, w: Array, o: int, C: Any) -> Any:
-    """Return the distance of a point from the shape at p[o:], its rounding taken off, and the direction to the point."""
+    """Return the distance of a point from the surface of the shape at p[o:], and the direction to the point."""
     kind, M, s = int(p[o].real), _point(p, w, o), o + layout.SIZE
     if kind == layout.SPHERE:
         d, n = solids.point(C, M)

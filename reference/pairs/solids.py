@@ -129,7 +129,7 @@ def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float) -> Dis
 
 @kernels.helper
 def segments(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float) -> Any:
-    """Return the nearest points of two segments about M and N along A and B; the middle of their overlap if parallel."""
+    """Return the nearest points of segments about M and N along A and B; the middle of the overlap of parallel ones."""
     D, b = apart(N, M), dot(A, B)
     f, g = dot(A, D), dot(B, D)
     free = shifted(scaled(-1.0, times(b, b)), 1.0)

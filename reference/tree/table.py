@@ -272,10 +272,18 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
 
 
 def pair_rows(scene: Scene, places: Mapping[str, Place]) -> list[Floats]:
-    """Return the pairs whose rows are contacts: two shapes, and where the rows begin."""
-    return [
-        np.concatenate([_shape(c.first, places), _shape(c.second, places), [c.pair.margin]]) for c in contacts(scene)
-    ]
+    """Return the pairs whose rows are contacts: two shapes, and where the rows begin.
+
+    Raises:
+        SceneError: for shapes that do not move against each other.
+    """
+    rows = []
+    for contact in contacts(scene):
+        one, two = (_shape(shape, places) for shape in (contact.first, contact.second))
+        if one[pairs.NODE] == two[pairs.NODE]:
+            raise SceneError(f"Pair {contact.pair.name!r}: its shapes do not move against each other.")
+        rows.append(np.concatenate([one, two, [contact.pair.margin]]))
+    return rows
 
 
 def _shape(shape: Shape, places: Mapping[str, Place]) -> Floats:

@@ -1,0 +1,69 @@
+"""Contacts of a scene's shapes by Pinocchio's kinematics: gaps, gradients and, by differences, H' v."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import Scene
+from crossbody.engines._contacts import Contacts, Pose, Touch, gradient
+
+TURN = 1e-3
+"""Angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it."""
+
+
+class ContactRows:
+    """Rows of the contacts; no second derivative of a gap is written anywhere here.
+
+    Attributes:
+        count: number of rows.
+    """
+
+    def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
+        self.contacts = Contacts(scene)
+        self.count = self.contacts.count
+        self.model, self.data, self.placed = model, model.createData(), placed
+
+    def heights(self, q: Floats) -> Floats:
+        """Return h (n,)."""
+        return np.array([touch.gap for touch in self._touches(q)])
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Return H (n, nv)."""
+        if not self.count:
+            return np.zeros((0, self.model.nv))
+        touches = self._touches(q)
+        pin.computeJointJacobians(self.model, self.data, q)
+        return np.array([gradient(touch, self._velocity) for touch in touches])
+
+    def drift(self, q: Floats, v: Floats) -> Floats:
+        """Return H' v (n,), by a central difference of fourth order along the motion."""
+        if not self.count:
+            return np.zeros(0)
+        step = TURN / max(float(np.abs(v).max()), 1e-12)
+        ahead = [self.jacobian(pin.integrate(self.model, q, k * step * v)) @ v for k in (-2, -1, 1, 2)]
+        total: Floats = (ahead[0] - 8.0 * ahead[1] + 8.0 * ahead[2] - ahead[3]) / (12.0 * step)
+        return total
+
+    def _touches(self, q: Floats) -> list[Touch]:
+        pin.forwardKinematics(self.model, self.data, q)
+        return self.contacts.touches(self._pose)
+
+    def _pose(self, body: str) -> Pose:
+        carrier, pose = self.placed[body]
+        world = self.data.oMi[carrier] * pose
+        return world.rotation, world.translation
+
+    def _velocity(self, body: str, point: Floats) -> Floats:
+        """Return the Jacobian (3, nv) of a point's velocity."""
+        carrier = self.placed[body][0]
+        if carrier == 0:
+            return np.zeros((3, self.model.nv))
+        J = pin.getJointJacobian(self.model, self.data, carrier, pin.LOCAL_WORLD_ALIGNED)
+        arm = pin.skew(point - self.data.oMi[carrier].translation)
+        linear: Floats = J[:3] - arm @ J[3:]
+        return linear
