@@ -6,14 +6,14 @@ are sought in each shape's own axes, and nothing here knows a second derivative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Scene, Shape
+from crossbody.cases.scene import Scene, Shape, Vector
 from crossbody.cases.scene_contacts import Contact, contacts
 
 Pose = tuple[Floats, Floats]
@@ -46,26 +46,34 @@ class Contacts:
     def __init__(self, scene: Scene) -> None:
         self.all: Sequence[Contact] = contacts(scene)
         self.count = sum(contact.places for contact in self.all)
+        shapes = {shape.name: shape for contact in self.all for shape in (contact.first, contact.second)}
+        self.shapes = {name: (shape, rotation(shape.orientation)) for name, shape in shapes.items()}
 
     def touches(self, poses: Poses) -> list[Touch]:
         """Return all of them."""
-        return [touch for contact in self.all for touch in _touches(contact, poses)]
+        placed = {name: _placed(shape, R, poses(shape.body)) for name, (shape, R) in self.shapes.items()}
+        return [touch for contact in self.all for touch in _touches(contact, placed)]
 
 
-def _touches(contact: Contact, poses: Poses) -> Iterator[Touch]:
+def _touches(contact: Contact, placed: Mapping[str, Pose]) -> Iterator[Touch]:
     first, second = contact.first, contact.second
-    one, two = placed(first, poses), placed(second, poses)
+    one, two = placed[first.name], placed[second.name]
     found = _over(one, second, two) if first.type == "plane" else [_between(first, one, second, two)]
     for gap, normal, point in found:
         yield Touch(gap - contact.pair.margin, normal, point, first.body, second.body)
 
 
-def placed(shape: Shape, poses: Poses) -> Pose:
-    """Return where a shape is."""
-    R, p = poses(shape.body)
-    w, *xyz = np.array(shape.orientation) / np.linalg.norm(shape.orientation)
+def rotation(quaternion: Vector) -> Floats:
+    """Return the rotation matrix of a quaternion, w first, of any length above 0."""
+    w, *xyz = np.array(quaternion) / np.linalg.norm(quaternion)
     K = np.cross(np.eye(3), xyz)
-    return R @ (np.eye(3) + 2.0 * w * K + 2.0 * K @ K), p + R @ np.array(shape.position)
+    R: Floats = np.eye(3) + 2.0 * w * K + 2.0 * K @ K
+    return R
+
+
+def _placed(shape: Shape, turned: Floats, pose: Pose) -> Pose:
+    R, p = pose
+    return R @ turned, p + R @ shape.position
 
 
 def _over(floor: Pose, shape: Shape, at: Pose) -> list[tuple[float, Floats, Floats]]:

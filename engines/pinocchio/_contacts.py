@@ -27,6 +27,9 @@ class ContactRows:
         self.contacts = Contacts(scene)
         self.count = self.contacts.count
         self.model, self.data, self.placed = model, model.createData(), placed
+        self._at: Floats = np.full(model.nq, np.nan)
+        self._found: list[Touch] = []
+        self._H: Floats | None = None
 
     def heights(self, q: Floats) -> Floats:
         """Return h (n,)."""
@@ -37,8 +40,10 @@ class ContactRows:
         if not self.count:
             return np.zeros((0, self.model.nv))
         touches = self._touches(q)
-        pin.computeJointJacobians(self.model, self.data, q)
-        return np.array([gradient(touch, self._velocity) for touch in touches])
+        if self._H is None:
+            pin.computeJointJacobians(self.model, self.data, q)
+            self._H = np.array([gradient(touch, self._velocity) for touch in touches])
+        return self._H
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (n,), by a central difference of fourth order along the motion."""
@@ -50,8 +55,11 @@ class ContactRows:
         return total
 
     def _touches(self, q: Floats) -> list[Touch]:
-        pin.forwardKinematics(self.model, self.data, q)
-        return self.contacts.touches(self._pose)
+        """Return the contacts at q; those of the last one are kept, for a step asks several times."""
+        if not np.array_equal(q, self._at):
+            pin.forwardKinematics(self.model, self.data, q)
+            self._at, self._H, self._found = q.copy(), None, self.contacts.touches(self._pose)
+        return self._found
 
     def _pose(self, body: str) -> Pose:
         carrier, pose = self.placed[body]
