@@ -76,6 +76,15 @@ class Table:
     coordinates: dict[str, int]
 
     @property
+    def quaternions(self) -> list[int]:
+        """First coordinate of every quaternion."""
+        first = int(self.p[layout.AT_NODE])
+        nodes = self.p[first : first + layout.NODE * self.nodes].reshape(-1, layout.NODE)
+        kinds, at = nodes[:, layout.TYPE], nodes[:, layout.Q].astype(int)
+        found: list[int] = (at + 3 * (kinds == layout.FREE))[kinds < layout.SLIDE].tolist()
+        return found
+
+    @property
     def scratch(self) -> int:
         """Length of w that the kernels need; the actuators' sums stand at its end."""
         return self.nodes * layout.NODE_SCRATCH + int(self.p[layout.DOFS]) * (layout.DOF_SCRATCH + 1)
