@@ -13,7 +13,7 @@ from crossbody.cases import Case, CaseUnsupported, Mode, SceneError
 from crossbody.cases._arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
-from crossbody.cases.scene import Joint, Scene, Tendon
+from crossbody.cases.scene import Scene
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces, tendons
 from crossbody.engines.mujoco._build import compiled, spec_of
@@ -145,14 +145,13 @@ class Rows:
         self.always = sum(loop.width for loop in scene.loops)
         self.places: dict[tuple[int, int, bool], int] = {}
         row = self.always
-        groups: tuple[tuple[int, tuple[Joint | Tendon, ...]], ...]
-        groups = (int(LIMITS[0]), scene.joints), (int(LIMITS[1]), scene.tendons)
-        for kind, parts in groups:
-            for i, part in enumerate(parts):  # in the model's order: a file need not name them
-                for upper, bound in enumerate(part.range):
-                    if np.isfinite(bound):
-                        self.places[kind, i, bool(upper)] = row
-                        row += 1
+        for j, part in enumerate(scene.bounded):  # in the model's order: a file need not name them
+            tendon = j - len(scene.joints)
+            kind, i = (int(LIMITS[0]), j) if tendon < 0 else (int(LIMITS[1]), tendon)
+            for upper, bound in enumerate(part.range):
+                if np.isfinite(bound):
+                    self.places[kind, i, bool(upper)] = row
+                    row += 1
         self.nc = row
 
     def constants(self) -> dict[str, Any]:
