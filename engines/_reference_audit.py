@@ -11,6 +11,10 @@ from crossbody.cases.scene import Scene
 from crossbody.reference import System
 
 
+DEPENDENT = 1e6
+"""Condition of H M^-1 H^T beyond which rounding of the rows alone parts two engines' multipliers by more than 1e-9."""
+
+
 def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
     """Constants, start, and functions at zero input: M (n, n), bias (n,) = -f, H (nc, n), lam (nc,) N, gap (nc,) m.
 
@@ -39,7 +43,7 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
         inverse = np.linalg.solve(mass, np.column_stack([rows.T, f]))
         push = rows @ inverse[:, -1] + Hdv + a1 * (rows @ v) + a0 * h + a2 * h**3
         G = rows @ inverse[:, :-1]
-        if np.linalg.matrix_rank(G) < system.nc:  # up to rounding: both bounds of one joint are never exactly dependent
+        if np.linalg.cond(G) > DEPENDENT:  # both bounds of one joint are dependent up to rounding, never exactly
             return np.full(system.nc, np.nan)
         return np.asarray(np.linalg.solve(G, -push))
 
