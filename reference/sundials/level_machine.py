@@ -278,10 +278,11 @@ class LevelMachine:
         self.guards = [guard for i in self.rows for guard in self._guards(i, view, t, q, v)]
 
     def _guards(self, i: int, view: View, t: float, q: Floats, v: Floats) -> list[Guard]:
-        mode, closed = self.modes[i], view.gap[i] <= TOUCH * max(1.0, float(np.abs(q).max()))
+        mode, touch = self.modes[i], TOUCH * max(1.0, float(np.abs(q).max()))
+        closed, frozen = view.gap[i] <= touch, i in self.frozen
         # The rate's own zero is the place; one that stands still there already must close first. So must a gap that has
         # just opened, whose next values round to either side; a gap that was open cannot close without a rate below 0.
-        still = i in self.frozen or view.rate[i] <= self.slow
+        still = view.rate[i] <= self.slow or (frozen and mode != Mode.FREE)
         closing = Term(Kind.RATE, i, self.slow if still and (closed or mode != Mode.FREE) else 0.0)
         if mode in ACTIVE:
             lam, noise = float(view.lam[i]), float(view.noise[i])
@@ -291,9 +292,11 @@ class LevelMachine:
                 return [released]
             return [released, Guard(i, Watch.OTHER, [Term(Kind.SPENT, i, sides=sides) for sides in SIDES])]
         if mode == Mode.FREE:
-            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i), closing])]
+            # A collision may leave so little speed that the gap never opens by more than rounding: it is at rest again
+            # where it would turn back, not at a zero that rounding has put anywhere.
+            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i, -touch if frozen and closed else 0.0), closing])]
         catch = [closing]
-        if i not in self.frozen:
+        if not frozen:
             lam, band = self.pressure(i, t, q, v, self.error)  # likewise: one that has just let go is at zero
             catch.append(Term(Kind.PRESS, i, band if abs(lam) <= band else 0.0))
         return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i)]), Guard(i, Watch.OTHER, catch)]
