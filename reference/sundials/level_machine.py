@@ -293,8 +293,9 @@ class LevelMachine:
             return [released, Guard(i, Watch.OTHER, [Term(Kind.SPENT, i, sides=sides) for sides in SIDES])]
         if mode == Mode.FREE:
             # A collision may leave so little speed that the gap never opens by more than rounding: it is at rest again
-            # where it would turn back, not at a zero that rounding has put anywhere.
-            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i, -touch if frozen and closed else 0.0), closing])]
+            # where it turns back, not at a zero that rounding has put anywhere. Opened by `touch`, it is open.
+            opened = 2.0 * touch if frozen and closed else 0.0
+            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i, -opened), closing])]
         catch = [closing]
         if not frozen:
             lam, band = self.pressure(i, t, q, v, self.error)  # likewise: one that has just let go is at zero
