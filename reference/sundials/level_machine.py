@@ -111,6 +111,11 @@ class LevelMachine:
     def _active_mode(self, i: int) -> Mode:
         return Mode.COLLISION if self.equations.fast[i, 0] > 0.0 else Mode.CONTACT
 
+    @staticmethod
+    def _touch(q: Floats) -> float:
+        """How large a gap rounding alone can make of a touch, m."""
+        return TOUCH * max(1.0, float(np.abs(q).max()))
+
     def _touches(self, i: int, h: float, q: Floats) -> bool:
         """Whether gap i is closed."""
         return h <= 0.0
@@ -170,13 +175,13 @@ class LevelMachine:
             return Mode.FREE
         if closing and i in self.frozen:
             return mode  # it collides
-        if mode != Mode.FREE:
+        if mode != Mode.FREE and not (i in self.frozen and h >= -self.deep):
             return self._active_mode(i) if closing and presses() else mode
         if closing:
             return self._active_mode(i)
         if h < -self.deep:
             return self._active_mode(i) if presses() else Mode.BALLISTIC
-        return self._active_mode(i) if rate <= self.slow and presses() else Mode.FREE
+        return self._active_mode(i) if rate <= self.slow and presses() else mode
 
     def _released(self, i: int, h: float) -> Mode:
         if h > 0.0:
@@ -278,7 +283,7 @@ class LevelMachine:
         self.guards = [guard for i in self.rows for guard in self._guards(i, view, t, q, v)]
 
     def _guards(self, i: int, view: View, t: float, q: Floats, v: Floats) -> list[Guard]:
-        mode, touch = self.modes[i], TOUCH * max(1.0, float(np.abs(q).max()))
+        mode, touch = self.modes[i], self._touch(q)
         closed, frozen = view.gap[i] <= touch, i in self.frozen
         # The rate's own zero is the place; one that stands still there already must close first. So must a gap that has
         # just opened, whose next values round to either side; a gap that was open cannot close without a rate below 0.
