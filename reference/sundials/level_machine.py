@@ -5,8 +5,8 @@
     BALLISTIC -> FREE     h > 0                   BALLISTIC -> active   h <= 0, h' < 0, lam would be > 0
     COLLISION -> CONTACT  max(b1, sqrt(b0)) |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
 
-h' counts as zero below 1e-9 of the largest rate seen, lam as zero below what rounding makes of it. A gap below -1e-9 m
-that does not close was started in penetration: it is active if it would press, else BALLISTIC.
+h' counts as zero below 1e-9 of the largest rate seen, and both h' and lam below what rounding makes of them. A gap
+below -1e-9 m that does not close was started in penetration: it is active if it would press, else BALLISTIC.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class LevelMachine:
         self.frozen: frozenset[int] = frozenset()
         self.work = np.zeros(system.nc)
         self.deep = DEEP
-        self.fastest = 0.0
+        self.fastest = self._rounding = 0.0
         self._instant = -np.inf
         self._seen: set[tuple[int, ...]] = set()
         self._one_by_one = False
@@ -105,8 +105,8 @@ class LevelMachine:
 
     @property
     def slow(self) -> float:
-        """The rate below which a gap stands still."""
-        return SLOW * self.fastest
+        """The rate below which a gap stands still: a part of the fastest one seen, and no less than rounding."""
+        return max(SLOW * self.fastest, self._rounding)
 
     def _active_mode(self, i: int) -> Mode:
         return Mode.COLLISION if self.equations.fast[i, 0] > 0.0 else Mode.CONTACT
@@ -138,6 +138,8 @@ class LevelMachine:
         if not (np.isfinite(gap).all() and np.isfinite(rate).all()):
             raise Ended(Outcome.NOT_FINITE)
         self.fastest = max([self.fastest, *(abs(float(rate[i])) for i in self.rows)])
+        if self.rows:  # where bodies slide along each other, their gaps hardly move at all
+            self._rounding = 8.0 * ULP * float((np.abs(e.held(t, q, v, self.rows)[1]) @ np.abs(v)).max())
         noise, size = e.noise(t, q, v, self.fastest)
         vd, lam = e.accelerate(t, q, v)
         return View(gap, rate, vd, lam, noise, size)
