@@ -188,7 +188,8 @@ def _assemble(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Fl
 @inlined
 def _by_law(s: Workspace, law: Floats2, i: int, t: float) -> tuple[float, float]:
     """Gap and rate of a row that has followed its linear law since a known instant."""
-    return linear_arc(law[i, 0], law[i, 1], s.arc[i, 1], s.arc[i, 2], t - s.arc[i, 0])
+    h, rate = linear_arc(law[i, 0], law[i, 1], s.arc[i, 1], s.arc[i, 2], t - s.arc[i, 0])
+    return h, rate
 
 
 @compiled
