@@ -202,6 +202,8 @@ class SundialsRun:
             self.state = arc.at(self._next_sample())
             self._sample(arc.multipliers(self.state))
         self.state = state
+        if fired.rows:
+            self._put_on_law()
         self._check_progress(state.t - before.t > 16.0 * ULP * stop)
         if self.natural:
             self._record(arc.multipliers(state))
@@ -221,8 +223,6 @@ class SundialsRun:
     def _fire(self, fired: Fired) -> bool:
         """Apply what was located; whether the arc ends there."""
         s = self.state
-        if fired.rows:
-            self._put_on_law()
         switched = self.machine.fire(s.t, s.q, s.v, fired.rows) if fired.rows else False
         for guard in fired.guards:
             self._discretely(guard)
@@ -244,6 +244,8 @@ class SundialsRun:
         ).T
         s.q, s.v = s.q.copy(), s.v.copy()
         self.equations.project(s.q, s.v, rows, np.where(laws[:, 0] > 0.0, h, np.nan), rate)
+        if not self.rigid:
+            s.lam = self.equations.accelerate(s.t, s.q, s.v)[1]
 
     def _follow_law(self, view: View, anew: bool) -> None:
         """Note from where each active row follows its law; one that did so before goes on, unless all begin anew."""
