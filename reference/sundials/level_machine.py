@@ -307,4 +307,6 @@ class LevelMachine:
         if not frozen:
             lam, band = self.pressure(i, t, q, v, self.error)  # likewise: one that has just let go is at zero
             catch.append(Term(Kind.PRESS, i, band if abs(lam) <= band else 0.0))
-        return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i)]), Guard(i, Watch.OTHER, catch)]
+        # One that was let go at its touch while it closes is at zero: what rounds to above it does not open.
+        sinks = -touch <= view.gap[i] and view.rate[i] < -self.slow
+        return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i, touch if sinks else 0.0)]), Guard(i, Watch.OTHER, catch)]
