@@ -8,6 +8,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._align import aligned
+from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -22,15 +23,16 @@ STILL = 1e-9
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests."""
     inside, exact = aligned(truth, run)
-    scale = _scale(truth.trajectory, case)
     if not inside.any():
         return None
-    return float(np.max(np.abs(run.q[inside] - exact.q) / np.where(scale > 0.0, scale, 1.0)))
+    return float(np.max(np.abs(run.q[inside] - exact.q) / _scale(truth.trajectory, case)))
 
 
 def _scale(exact: Trajectory, case: Case) -> Floats:
-    """Largest |q_truth| of each coordinate (n,); of all that share its unit, for one that rests but for rounding."""
+    """Largest |q_truth| of each coordinate (n,); of all that share its unit, for one that rests but for rounding.
+
+    Where all of these rest, what the case says of their size.
+    """
     own: Floats = np.max(np.abs(exact.q), axis=0)
-    units = np.array([coordinate.unit for coordinate in case.coordinates])
-    shared = np.array([own[units == unit].max() for unit in units])
-    return np.where(own > STILL * shared, own, shared)
+    shared, smallest = of_like(own, case), least(case)
+    return np.where(shared < smallest, smallest, np.where(own > STILL * shared, own, shared))
