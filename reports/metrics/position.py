@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
-STILL = 1e-9
+SMALL, STILL = 1e-6, 1e-9
 """A coordinate that moves less than this part of its like rests."""
 
 
@@ -31,8 +31,9 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
 def _scale(exact: Trajectory, case: Case) -> Floats:
     """Largest |q_truth| of each coordinate (n,); of all that share its unit, for one that rests but for rounding.
 
-    Where all of these rest, what the case says of their size.
+    Where all of these rest, what the case says of their size. Errors below 1e-12, what absolute tolerances are, pass
+    the usual limit of 1e-6.
     """
     own: Floats = np.max(np.abs(exact.q), axis=0)
     shared, smallest = of_like(own, case), least(case)
-    return np.where(shared < smallest, smallest, np.where(own > STILL * shared, own, shared))
+    return np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
