@@ -155,7 +155,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     @cache_of_one
     def at(times: Floats) -> Trajectory:
         run = reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)).run()
-        # Samples cut steps, which moves events by the tolerance: one motion has one set of them.
+        # A run that is asked for samples need not take the same steps: its events move by the tolerance.
         return replace(with_both_sides(run, first), events=first.events, switches=first.switches)
 
     dense = at(sample_times(first, case.t_end))
