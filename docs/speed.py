@@ -1,6 +1,6 @@
 """The tables of docs/explanation/speed.md, measured: `make speed` writes them anew.
 
-    python docs/speed.py [MINUTES]      of the largest part, the ladders of all engines on all cases; 7 if not given
+    python docs/speed.py [MINUTES]      of the largest part, the ladders of all engines on all cases; 6 if not given
 
 All of them in one process after another on the machine as it is: run it where nothing else runs. What is not between
 a pair of marks of the page is left as it stands.
@@ -18,7 +18,7 @@ from pathlib import Path
 import pandas as pd
 
 PAGE = Path(__file__).parent / "explanation" / "speed.md"
-MINUTES = sys.argv[1] if len(sys.argv) > 1 else "7"
+MINUTES = sys.argv[1] if len(sys.argv) > 1 else "6"
 PACKAGES = ("mujoco", "pin", "exudyn", "drake", "dartpy", "pymunk", "scikit-sundae")
 DROP = "bouncing_ball:elastic(a0=100000,a1=0,a2=0,t_end=2)"
 

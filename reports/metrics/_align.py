@@ -39,7 +39,7 @@ def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
     if releases:
         knots += [(b.release, a.release) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
     kept = [(start, start)]
-    for knot in sorted(knots):
+    for knot in sorted(knots) if releases else knots:
         if knot[0] > kept[-1][0] and knot[1] > kept[-1][1]:
             kept.append(knot)
     here, there = np.array(kept).T
