@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from crossbody import cases, engines
+from crossbody.cases._defaults import limits_of
+from crossbody.cases._soft.claims import STEP
+from crossbody.cases._soft.scene import numbers
+from crossbody.engines._soft_contact import fastest
+from crossbody.engines.mujoco import soft_contact as axis
+from crossbody.engines.mujoco import soft_delta as robot
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.truth import _tight, truth_of
+from crossbody.reports.judging.verdict import limit_for
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import with_collisions
 from crossbody.reports.runs import jobs
 
+MAZES = cases.variants("ball_maze")
 FACTORS = (0.1, 0.5, 2.0)
 EVERY = [(name, variant, factor) for name in cases.names() for variant in cases.variants(name) for factor in FACTORS]
 LATE = ("ball_maze", "solve", 2.0)
@@ -62,3 +72,31 @@ def test_an_impulse_does_not_depend_on_the_side_of_a_release_on_which_a_sample_s
     theirs = with_collisions(exact, truth.trajectory.events)
     off = np.abs(with_collisions(run, run.events)[inside] - theirs).max() / np.abs(theirs).max()
     assert 0.0 < off < 1e-8
+
+
+@pytest.mark.parametrize(("name", "variant"), [("soft_contact", "axis"), ("soft_contact", "delta")])
+def test_the_sizes_that_a_case_names_are_no_larger_than_its_motion(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-6).run()
+    units = np.array([coordinate.unit for coordinate in case.coordinates])
+    assert any(coordinate.size for coordinate in case.coordinates)
+    for coordinate in case.coordinates:
+        like = units == coordinate.unit
+        assert coordinate.size <= 1.1 * np.abs(run.q[:, like]).max()
+        assert coordinate.rate <= 1.1 * np.abs(run.v[:, like]).max()
+
+
+@pytest.mark.parametrize(("variant", "module"), [("axis", axis), ("delta", robot)])
+def test_the_fixed_step_of_the_limits_is_that_of_the_engine(variant: str, module: Any) -> None:
+    case = cases.load("soft_contact", variant)
+    p = numbers(case.parameters)
+    rate = fastest(p, p["flange_mass"] if variant == "axis" else p["m3"])
+    assert pytest.approx(module.default_step(case, "matched") * rate) == STEP
+
+
+def test_a_ball_that_hardly_moves_is_allowed_the_tolerance_of_its_height() -> None:
+    """1e-9 over 1 - cos(1e-3) for a swing of 1e-3 rad; nothing beyond the default where the ball goes far."""
+    given = {v: limit_for(limits_of(cases.load("ball_maze", v)), "energy_drift", "pinocchio", "law") for v in MAZES}
+    allowed = {variant: limit.value for variant, limit in given.items() if limit is not None}
+    assert allowed.pop("inside") == pytest.approx(1e-9 / (1.0 - np.cos(1e-3)), rel=1e-6)
+    assert set(allowed.values()) == {1e-6}
