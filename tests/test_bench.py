@@ -156,7 +156,7 @@ def test_what_is_python_is_said_and_the_native_loop_stands_beside_it() -> None:
     assert (rows.loc[["reference"], "interpreted"] == "").all()
     assert rows.loc[["reference"], "native_ms"].isna().all()
     assert rows.loc[["mujoco"], "interpreted"].str.contains("Python|loop over steps").all()
-    assert (rows.loc[["mujoco"], "native_ms"] > 0.0).all()
+    assert (rows.loc[["mujoco"], "native_ms"] > 0.02 * rows.loc[["mujoco"], "median_ms"]).all(), "all of its steps"
     assert (rows.loc[["mujoco"], "native_ms"] < rows.loc[["mujoco"], "median_ms"]).all()
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from crossbody import cases, engines
+from crossbody.cases import Tier
 from crossbody.cases._defaults import limits_of
 from crossbody.cases._soft.claims import STEP
 from crossbody.cases._soft.scene import numbers
@@ -55,6 +56,7 @@ def test_no_integrator_of_ours_is_outside_at_any_horizon(name: str, variant: str
 def test_a_truth_has_both_sides_of_every_event_of_one_motion(name: str, variant: str) -> None:
     case = cases.load(name, variant)
     truth, natural = truth_of(case), _tight(case)
+    assert truth.tier is Tier.C, "what it is held against is independent"
     assert truth.trajectory.events == natural.events
     events = np.array([event.t for event in natural.events if 0.0 < event.t < case.t_end])
     sampled = truth.at(np.repeat(events, 2))
