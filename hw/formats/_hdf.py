@@ -12,7 +12,7 @@ import numpy as np
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
-from crossbody.hw.formats._grouping import Table, grouped, layout, place, spans
+from crossbody.hw.formats._grouping import Table, grouped, layout, places, spans
 from crossbody.hw.formats._guard import library, parsing
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -50,6 +50,7 @@ class HdfReader:
             self._file.close()
             raise
         self.groups = grouped(self._tables)
+        self._places = places(self._tables)
 
     def _walk(self, prefix: str, group: Any, depth: int) -> None:
         """List the datasets below a group, each object once, whatever links lead to it."""
@@ -103,7 +104,7 @@ class HdfReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`. Every chunk is decoded once: those that a block of rows cuts through are kept."""
-        wanted = {name: place(self._tables, name) for name in columns}
+        wanted = {name: self._places[name] for name in columns}
         with parsing(self._path, self._what):
             items = self._items({table.key for table, _ in wanted.values()})
         for start, stop in spans(group.rows or 0):
