@@ -17,6 +17,7 @@ from crossbody.hw.formats._guard import library, parsing
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MOST_OBJECTS = 20_000  # groups and datasets of a file
+MOST_CHUNKS, TINY = 50_000, 1024  # chunks of a dataset, where they have fewer bytes than this: each takes some 20 us
 DEEPEST = 32  # groups inside one another; the library itself recurses without an end
 LONGEST = 4096  # bytes of an attribute that is read
 CACHE = 1 << 20  # bytes of chunks that HDF5 keeps of its own accord
@@ -88,6 +89,9 @@ class HdfReader:
             return f"holds {str(item.dtype)[:LONGEST]}, not numbers"
         if item.shape is None or not layout(item.shape):
             return f"has shape {item.shape}, which is no table"
+        small = item.chunks and math.prod(item.chunks) * item.dtype.itemsize < TINY
+        if small and _chunks(item) > MOST_CHUNKS:
+            return f"is cut into more than {MOST_CHUNKS} chunks of less than {TINY} bytes: `h5repack` joins them"
         return ""
 
     def _add(self, key: str, name: str, item: Any) -> None:
@@ -149,12 +153,16 @@ def _chunk_bytes(item: Any) -> int:
     return int(math.prod(item.chunks) * item.dtype.itemsize * across)
 
 
+def _chunks(item: Any) -> int:
+    """Number of chunks that a dataset's shape asks for; 0 for what is not chunked."""
+    return math.prod(-(-n // c) for n, c in zip(item.shape, item.chunks, strict=True)) if item.chunks else 0
+
+
 def _missing(item: Any) -> str:
     """Why a dataset's numbers are not all in this file; empty if they are."""
     if item.external or item.is_virtual:
         return "keeps its numbers in another file"
-    chunks = math.prod(-(-n // c) for n, c in zip(item.shape, item.chunks, strict=True)) if item.chunks else 0
-    if item.chunks and item.id.get_num_chunks() < chunks:
+    if item.chunks and item.id.get_num_chunks() < _chunks(item):
         return "is declared but not written in full: cut off?"
     if not item.chunks and item.size and not item.id.get_storage_size():
         return "is declared but never written: cut off?"
