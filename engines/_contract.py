@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
+from crossbody.cases._entry_points import checked_arguments
+
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-
 
 QUANTITIES = ("masses", "gravity", "constants", "q0", "v0", "M", "bias", "H", "lam", "ledger")
 """What an engine must show or name in `hidden`: keys of its audit where the reference has them, `lam` of its
 trajectories where there are rows, and their account of energy."""
 
 
+@checked_arguments
 def hidden(engine: Engine, profile: str) -> Mapping[str, str]:
     """What an engine does not show under a profile, and why; a quantity of `QUANTITIES` each."""
     told: Mapping[str, Mapping[str, str]] = getattr(engine, "hidden", {})

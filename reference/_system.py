@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from crossbody.cases import SceneError
 from crossbody.cases._arguments import flag, shown
 from crossbody.cases._arrays import frozen, full, is_number
+from crossbody.cases._entry_points import checked_arguments, finite
 from crossbody.reference import kernels as kernel_types
-from crossbody.reference._entry_points import checked_arguments, finite
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
 
