@@ -214,6 +214,23 @@ def test_a_loop_given_twice_moves_as_once(tmp_path: Path) -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
+def test_loops_move_alike_in_three_engines(tmp_path: Path) -> None:
+    """A four-bar in MuJoCo and in Pinocchio, whose rows are its own; and a robot with redundant loops in both."""
+    path = tmp_path / "bar.xml"
+    loop = '<connect name="loop" body1="last" anchor="0 0 -.4" solref="-1 -2"/>'
+    path.write_text(FOUR_BAR.format(loops=loop), encoding="utf-8")
+    bar = cases.load(str(path), t_end=0.3, without="contacts", assemble=True)
+    for case in (bar, robot("agility_cassie/cassie", assemble=True, t_end=0.004)):
+        runs = [
+            engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
+            engines.load("mujoco").prepare(case, "matched", dt=2e-4).run(),
+            engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
+        ]
+        for run in runs:
+            assert run.outcome is Outcome.FINISHED
+            assert np.abs(run.q[-1] - runs[0].q[-1]).max() < 1e-8
+
+
 def test_a_row_that_was_left_out_and_does_not_follow_ends_the_run() -> None:
     """Dropping a row that holds by itself is seen: its gap opens."""
     from mechanisms import ball
