@@ -12,6 +12,8 @@ from crossbody.cases._errors import InvalidValue
 
 _Kind = TypeVar("_Kind")
 SHOWN = 80
+LONGEST_NAME, LONGEST_PATH = 255, 4095
+"""Bytes that file systems take of a name, and of a whole path."""
 
 
 def shown(value: object) -> str:
@@ -43,9 +45,11 @@ def path(where: str, value: object) -> str:
     if not isinstance(value, (str, os.PathLike)) or "\0" in (text := str(value)) or not text:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a path.")
     try:
-        os.fsencode(text)
+        raw = os.fsencode(text)
     except UnicodeError:
         raise InvalidValue(f"{where} is {shown(value)}; no file system can have such a path.") from None
+    if len(raw) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in raw.split(os.fsencode(os.sep))):
+        raise InvalidValue(f"{where} is {shown(value)}; a name has at most {LONGEST_NAME} bytes, a path {LONGEST_PATH}.")
     return text
 
 

@@ -84,10 +84,18 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coordinate:
-    """Name and unit of one generalised coordinate; its velocity has the unit per second."""
+    """Name and unit of one generalised coordinate; its velocity has the unit per second.
+
+    Attributes:
+        name, unit: what it is called, and in which SI unit it counts.
+        size, rate: what it and its rate are at least when they do something, in that unit; a motion that stays below is
+            judged by these. 0 where the scene knows none.
+    """
 
     name: str
     unit: str
+    size: float = 0.0
+    rate: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

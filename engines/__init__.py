@@ -6,9 +6,9 @@ An engine is a module here with one public name, `ENGINE`, an object that follow
 from __future__ import annotations
 
 from crossbody.cases import EngineUnavailable, _registry
-from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden
+from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden, interpreted
 
-__all__ = ["QUANTITIES", "Engine", "Run", "hidden", "load", "names", "summary"]
+__all__ = ["QUANTITIES", "Engine", "Run", "hidden", "interpreted", "load", "names", "summary"]
 
 
 def names() -> tuple[str, ...]:
