@@ -221,6 +221,7 @@ class Work:
     ends: Index  # largest column past an active row and all before it
     struck: Index  # (nc,) how each row takes part in a frozen collision
     before: Bytes  # modes before a switch
+    settled: Bytes  # modes that rows left in the last pass
     kind: Index  # (nc,) which guard fired
     pivot: Index
     # Where q' is not v, and empty elsewhere:
