@@ -24,16 +24,21 @@ START, SECOND = np.arange(2)  # stages, as values
 @compiled
 def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> int:
     """k[stage] = (v, v'), and the powers of the ledger if it is kept."""
-    n = s.n
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[:n], y[n:], OWN) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.n], y[s.n :], OWN) != 0:
         return 1
-    k, vd = w.k[stage], w.vd
+    keep(K, s, m, w, t, y, stage)
+    return 0
+
+
+@inlined
+def keep(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> None:
+    """k[stage] = (v, v') from the acceleration in the workspace, and the powers."""
+    n, k, vd = s.n, w.k[stage], w.vd
     for i in range(n):
         k[i] = y[n + i]
         k[n + i] = vd[i]
     if s.ledger:
         powers(K, s, m, w, t, y, stage)
-    return 0
 
 
 @inlined
