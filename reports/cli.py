@@ -16,8 +16,9 @@ import tempfile
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from functools import wraps
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import click
 
@@ -63,6 +64,32 @@ def list_(plain: bool) -> None:
             click.echo(f"  {name:<{width}}  {source.summary(name)}")
 
 
+def _parameters(command: _Work) -> _Work:
+    """Options that give parameters of the case; the command takes all of them as `pairs`, texts K=V."""
+
+    @wraps(command)
+    def gathered(
+        *given: Any, pairs: tuple[str, ...], t_end: float | None, law: str | None, ctrl: str | None,
+        without: str | None, **others: Any,
+    ) -> int:  # fmt: skip
+        named = {"t_end": t_end, "ctrl": ctrl, "without": without}
+        own = [f"{name}={value}" for name, value in named.items() if value is not None]
+        return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **others)
+
+    options = (
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
+        click.option("--t-end", type=float, metavar="S", help="Horizon, s; as --set t_end=S."),
+        click.option("--law", metavar="a0=,a1=", help="Constants of the rows; as --set for each of them."),
+        click.option("--ctrl", metavar="FILE", help="Of a robot's file: table of controls (CSV, Parquet, NPZ)."),
+        click.option("--without", metavar="PARTS", help="Of a robot's file: parts to leave out of every engine."),
+    )
+    told: Any = gathered
+    for option in reversed(options):
+        told = option(told)
+    taking: _Work = told
+    return taking
+
+
 def _shared(command: _Work) -> _Work:
     """Options that say what is run."""
     options = (
@@ -71,7 +98,7 @@ def _shared(command: _Work) -> _Work:
         click.option(
             "--variant", "--key", metavar="V", help="Variant of the case, keyframe of a robot's file; all if not given."
         ),
-        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
+        _parameters,
         click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR"),
     )
     for option in reversed(options):
@@ -205,7 +232,7 @@ def stress(
 
 @cli.command()
 @click.argument("name", metavar="CASE")
-@click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
+@_parameters
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
 @speaks
 def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
@@ -218,7 +245,7 @@ def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
 @cli.command()
 @click.argument("name", metavar="CASE")
 @click.option("--variant", "--key", metavar="V", help="Variant of the case; the first if not given.")
-@click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.")
+@_parameters
 @click.option("--at", metavar="K=V", multiple=True, help="Where to look: x, y, z of the flange, m; repeatable.")
 @click.option("--bode", is_flag=True, help="Frequency responses too.")
 @click.option("--locus", metavar="PARAM=a..b", help="Poles over a parameter of the case.")

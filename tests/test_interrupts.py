@@ -180,10 +180,11 @@ def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:
 
 
 def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_path: Path) -> None:
-    words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", "4")
+    limit = str(4 + round(4 * load()))  # what is not stuck needs more of it on a busy machine
+    words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", limit)
     code, said = finished(begun("run", "balls.py", "--variant", "linear", *words, cwd=tmp_path))
     assert code == 1, said
-    assert "fake:stuck: It did not come back within 4 s and was ended" in said
+    assert f"fake:stuck: It did not come back within {limit} s and was ended" in said
     assert "fake:crash: Its process was ended by SIGSEGV" in said
     assert "CROSSBODY_DEBUG=1" in said
     rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet").set_index("profile")

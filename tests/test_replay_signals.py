@@ -19,6 +19,7 @@ from crossbody.hw.replaying.rank import conditions
 from crossbody.hw.replaying.rates import rates_by_fit
 from crossbody.hw.replaying.turns import advanced, deviation, difference, increments, way
 from crossbody.hw.replaying.whiteness import autocorrelation, crosscorrelation, noise_level, stride_of
+from crossbody.hw.replaying.windows import windows
 
 STEP = 1e-3
 SEEDS = st.integers(0, 2**32 - 1)
@@ -145,9 +146,20 @@ def test_a_window_that_starts_beside_a_bounce_starts_with_its_rate() -> None:
     apex = int(np.flatnonzero(np.abs(rate) < 0.02)[-1])
     log = log_of(t[apex:], channels("coordinates", "m", {"height": y[apex:]}))
     model = hw.models.load("ball")
-    from crossbody.hw.replaying.windows import windows
-
     assert abs(windows(log, model)[0].segment.yd[0] - rate[apex]) < 0.03
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("late", range(-3, 4))
+def test_a_window_never_starts_with_the_rate_of_an_impact(seed: int, late: int) -> None:
+    """A start in an impact was off by up to half of what the impact changes."""
+    t, y, rate, _ = bouncing(np.random.default_rng(seed), 1e-4)
+    hits = np.flatnonzero(np.diff(rate) > 0.1)
+    log = log_of(t, channels("coordinates", "m", {"height": y}))
+    begin = int(hits[1]) + late
+    cut = windows(log.window(float(t[begin]), float(t[-1])), hw.models.load("ball"))[0]
+    at = int(np.searchsorted(t, cut.t[0] - 1e-9))
+    assert abs(cut.segment.yd[0] - rate[at]) < 0.06
 
 
 def residuals(random: np.random.Generator, defect: float, windows: int = 12, n: int = 2000):

@@ -11,11 +11,14 @@ import numpy as np
 from crossbody.cases import InvalidValue, SceneError, _arguments
 from crossbody.hw.models._contract import Floats, Model, Segment
 from crossbody.hw.reading.log import Log
+from crossbody.hw.replaying.impacts import impacts, least_of
 from crossbody.hw.replaying.rates import rates_by_fit
 from crossbody.hw.replaying.turns import advanced
 
 FEWEST = 8
 """Samples of a window."""
+BESIDE = 3
+"""Samples on each side of an impact at which no polynomial through neighbours gives a rate."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,6 +47,9 @@ def windows(
 ) -> tuple[Window, ...]:
     """Cut a log.
 
+    Where rates are not recorded, a window that would start beside an impact starts behind it: samples within three of
+    an impact show neither the rate before it nor the one behind.
+
     Args:
         log: what was recorded.
         model: what it is replayed on.
@@ -69,6 +75,8 @@ def windows(
     u = log.matrix("inputs", recorded) if len(recorded) == len(model.inputs) else np.zeros((len(log), 0))
     cuts = _cuts(log.time, length, reach)
     if yd is None:
+        if model.falls >= 0:
+            cuts = _behind_impacts(log.time, y[:, model.falls], cuts)
         starts = np.array([a for a, _ in cuts])
         yd = np.zeros_like(y)
         yd[starts] = rates_by_fit(log.time, y, starts)
@@ -93,6 +101,16 @@ def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:
             f"The log spans {t[-1] - t[0]:g} s with {len(t)} samples: no window of {length:g} s with {FEWEST} of them."
         )
     return found
+
+
+def _behind_impacts(t: Floats, y: Floats, cuts: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The same windows, but for starts that stand beside an impact; a window too short for that stays as it is."""
+    hits = impacts(t, y, least_of(t, y)).t
+    beside = np.zeros(len(t), dtype=bool)
+    for row in np.searchsorted(t, hits):
+        beside[max(0, row - BESIDE) : row + BESIDE + 1] = True
+    moved = [(a + int(np.argmin(beside[a:])), b) for a, b in cuts]
+    return [new if new[1] - new[0] >= FEWEST else old for new, old in zip(moved, cuts, strict=True)]
 
 
 def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, turns: Sequence[int], a: int, b: int) -> Window:

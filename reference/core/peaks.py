@@ -47,9 +47,9 @@ def _slopes(K: Any, s: Any, m: Model, w: Work, at_end: bool) -> bool:
     """Leave in w.la the change of the active multipliers along the motion at an end of the step; False if ill posed."""
     step, y, k = NUDGE * s.hs, w.y1 if at_end else w.y, w.k[s.end if at_end else START]
     t = s.t_old + step + (s.hs if at_end else 0.0)
-    for a in range(2 * s.n):
+    for a in range(s.nq + s.n):
         w.ys[a] = y[a] + step * k[a]
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
         return False
     for j in range(s.na):
         w.la[j] -= w.lams[NODES - 1 if at_end else 0, w.idx[j]]
@@ -142,7 +142,7 @@ def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, theta: float) -> floa
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
     known = dense.put_on_rows(K, s, m, w, theta, w.ys)
-    if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
+    if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
         return -np.inf
     for j in range(s.na):
         if w.idx[j] == i:

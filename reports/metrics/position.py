@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import differences
 from crossbody.reports.metrics._align import aligned
 
 if TYPE_CHECKING:
@@ -20,12 +21,16 @@ STILL = 1e-9
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests."""
+    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests.
+
+    A quaternion is told by the angle between both, rad, since q and -q are the same rotation.
+    """
     inside, exact = aligned(truth, run)
     scale = _scale(truth.trajectory, case)
     if not inside.any():
         return None
-    return float(np.max(np.abs(run.q[inside] - exact.q) / np.where(scale > 0.0, scale, 1.0)))
+    off = differences(run.q[inside], exact.q, case.quaternions)
+    return float(np.max(off / np.where(scale > 0.0, scale, 1.0)))
 
 
 def _scale(exact: Trajectory, case: Case) -> Floats:
@@ -33,4 +38,6 @@ def _scale(exact: Trajectory, case: Case) -> Floats:
     own: Floats = np.max(np.abs(exact.q), axis=0)
     units = np.array([coordinate.unit for coordinate in case.coordinates])
     shared = np.array([own[units == unit].max() for unit in units])
-    return np.where(own > STILL * shared, own, shared)
+    scale = np.where(own > STILL * shared, own, shared)
+    scale[list(case.quaternions)] = 1.0  # rad
+    return scale
