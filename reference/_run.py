@@ -99,7 +99,8 @@ class CompiledRun:
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
             "loops": system.solve is None and bool(np.any(system.held)),
-            "keep_events": options.events, "has_control": system.control is not None,
+            "keep_events": options.events, "has_energy": system.energy is not _none.energy,
+            "has_control": system.control is not None,
             "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
             "tick": system.tick,
         }  # fmt: skip
@@ -141,7 +142,7 @@ class CompiledRun:
                     return Outcome.STEP_LIMIT
                 code = self.slice(min(budget, limit - steps))
                 if code == layout.DONE:
-                    return Outcome.FINISHED if self._finite_rows() == self.state["rows"][0] else Outcome.NOT_FINITE
+                    return Outcome.NOT_FINITE if self.state["spoilt"][0] else Outcome.FINISHED
                 if code < 0:
                     return self._ended(code)
                 self._grow(code)
