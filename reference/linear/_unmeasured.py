@@ -17,7 +17,7 @@ from crossbody.cases._arrays import frozen
 from crossbody.reference._entry_points import different, wholes
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
-from crossbody.reference.linear._derivatives import STEP, Point, terms
+from crossbody.reference.linear._derivatives import STEP, Point, check_coordinates, terms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -75,6 +75,7 @@ class Record:
     def __init__(
         self, system: System, t: ArrayLike, u: ArrayLike | None, unknown: Unknown, active: Sequence[int] | None
     ) -> None:
+        check_coordinates(system)
         self.system, self.unknown = system, unknown
         self.t = frozen("estimate", "t", t, (None,))
         given = np.zeros((len(self.t), system.inputs)) if u is None else u

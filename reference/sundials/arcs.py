@@ -47,7 +47,7 @@ ENDLESS = 2**62
 
 @dataclass(slots=True)
 class State:
-    """One instant: t, q (n,), v (n,), work z; lam (nc,) where the solver carries it."""
+    """One instant: t, q (nq,), v (n,), work z; lam (nc,) where the solver carries it."""
 
     t: float
     q: Floats
@@ -113,7 +113,8 @@ class Arc:
     """
 
     def __init__(self, scene: Scene, start: State, view: View, longest: float, single: bool) -> None:
-        self.scene, self.options, self.n = scene, scene.options, scene.equations.system.n
+        self.scene, self.options = scene, scene.options
+        self.nq, self.ny = scene.equations.system.nq, scene.equations.system.nq + scene.equations.system.n
         self.single, self.fresh = single, True
         self.guards = [*scene.machine.guards, *scene.discrete.watched()]
         scene.looks.begin(self.guards, scene.machine.frozen)
@@ -159,7 +160,8 @@ class Arc:
     def _tolerances(self) -> Floats:
         """Absolute ones, for q, v and the work."""
         share = SHARE * self.options.tolerance
-        return np.concatenate([np.full(2 * self.n, share), np.full(self.scene.nz, share * self.scene.scale)])
+        motion = SHARE * self.options.absolute(self.scene.equations.system)
+        return np.concatenate([motion, np.full(self.scene.nz, share * self.scene.scale)])
 
     def _events(self) -> Any:
         """The bound in the place of a root function, in the form that the library calls."""
@@ -279,8 +281,8 @@ class CvodeArc(Arc):
         return solver, y
 
     def _state(self, t: float, y: Floats) -> State:
-        n = self.n
-        return State(t, y[:n], y[n : 2 * n], y[2 * n :])
+        nq, ny = self.nq, self.ny
+        return State(t, y[:nq], y[nq:ny], y[ny:])
 
 
 class BdfArc(CvodeArc):
@@ -302,14 +304,14 @@ class IdaArc(Arc):
         return events
 
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
-        n, nc, nz, e = self.n, self.scene.equations.system.nc, self.scene.nz, self.scene.equations
+        ny, nc, nz, e = self.ny, self.scene.equations.system.nc, self.scene.nz, self.scene.equations
         bilateral = ~np.asarray(e.system.unilateral, dtype=bool)
         self.rigid = np.flatnonzero(bilateral).tolist() if self.options.index == 3 else []
         nb = len(self.rigid)
-        self.lam, self.mu = slice(2 * n, 2 * n + nc), slice(2 * n + nc, 2 * n + nc + nb)
-        self.work = slice(2 * n + nc + nb, None)
+        self.lam, self.mu = slice(ny, ny + nc), slice(ny + nc, ny + nc + nb)
+        self.work = slice(ny + nc + nb, None)
         looks = self.scene.looks
-        call, lines, slopes = looks.call, looks.lines, looks.work["slopes"][: 2 * n + nc + nb + nz]
+        call, lines, slopes = looks.call, looks.lines, looks.work["slopes"][: ny + nc + nb + nz]
         looks.work["rigid"][:] = -1
         looks.work["rigid"][self.rigid] = range(nb)
         looks.work["scale"][e.active] = self._masses(start)
@@ -320,15 +322,16 @@ class IdaArc(Arc):
                 raise Ended(ENDS[code], e.active)
 
         own = self._tolerances()
-        atol = np.concatenate([own[: 2 * n], np.full(nc + nb, UNWATCHED), own[2 * n :]])
+        atol = np.concatenate([own[:ny], np.full(nc + nb, UNWATCHED), own[ny:]])
         solver = IDA(
-            residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), first_step=self._first_step(),
+            residual, atol=atol, algebraic_idx=list(range(ny, ny + nc + nb)), first_step=self._first_step(),
             **self.common,
         )  # fmt: skip
         powers = e.powers(start.t, start.q, start.v, view.lam) if nz else np.zeros(0)
         zero = np.zeros(nb)
         y = np.concatenate([start.q, start.v, view.lam, zero, start.z])
-        solver.init_step(start.t, y, np.concatenate([start.v, view.vd, np.zeros(nc), zero, powers]))
+        qd = e.system.rates(start.q, start.v, start.t, e.p)
+        solver.init_step(start.t, y, np.concatenate([qd, view.vd, np.zeros(nc), zero, powers]))
         return solver, y
 
     def _masses(self, start: State) -> Floats:
@@ -349,6 +352,6 @@ class IdaArc(Arc):
         return float(CAUTIOUS * np.sqrt(SHARE * self.options.rtol) / fastest)
 
     def _state(self, t: float, y: Floats) -> State:
-        n = self.n
+        nq, ny = self.nq, self.ny
         # At index 1 lam follows from the state.
-        return State(t, y[:n], y[n : 2 * n], y[self.work], y[self.lam] if self.rigid else None)
+        return State(t, y[:nq], y[nq:ny], y[self.work], y[self.lam] if self.rigid else None)

@@ -149,7 +149,7 @@ class Equations:
 
         Args:
             t: instant, s.
-            q: positions (n,).
+            q: positions (nq,).
             v: velocities (n,).
             speed: rate at which gaps may close, m/s.
             error: of positions and velocities, beside their rounding.
@@ -190,7 +190,7 @@ class Equations:
         """
         with self._selected(rows):
             for _ in range(PROJECTIONS):
-                q -= self._least(q, v, lambda H, h: h)
+                q -= self.system.displacement(q, self._least(q, v, lambda H, h: h), self.p)
             v -= self._least(q, v, lambda H, h: H @ v)
 
     @contextmanager

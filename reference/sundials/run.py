@@ -51,6 +51,8 @@ class SundialsRun:
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         if options.fsm != "level":
             raise InvalidValue(f"fsm is {options.fsm!r} with solver {options.solver!r}; valid: 'level'.")
+        if options.index == 3 and system.velocity is not None:
+            raise InvalidValue("index is 3; valid: 1, since the system has a kernel velocity: q' is not v.")
         self.system, self.options, self.q0, self.v0 = system, options, q0, v0
         self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
         self.natural = options.samples is None
@@ -268,16 +270,17 @@ class SundialsRun:
             gap, energy = self.system.gap(self.q0, self.v0)[0], self.equations.energy(self.q0, self.v0)
             nothing, start = np.zeros(self.system.nc), [int(m) for m in self.machine.modes]
             self.rows.append((0.0, self.q0, self.v0, gap, nothing, energy, start, np.zeros(self.scene.nz)))
-        n, nc, count = self.system.n, self.system.nc, len(self.rows)
+        n, nq, nc, count = self.system.n, self.system.nq, self.system.nc, len(self.rows)
         columns = list(zip(*self.rows, strict=True))
-        widths = (n, n, nc, nc, 2, nc, self.scene.nz)
+        widths = (nq, n, nc, nc, 2, nc, self.scene.nz)
         t = np.array(columns[0], dtype=np.float64)
         q, v, gap, lam, energy, mode, z = (
             np.array(c, dtype=np.float64).reshape(count, w) for c, w in zip(columns[1:], widths, strict=True)
         )
         modes = mode.astype(np.int8)
         return Trajectory(
-            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, events=tuple(self.machine.events),
+            t=t, q=self.system.normalised("run", q), v=v, gap=gap, lam=lam, energy=energy, mode=modes,
+            events=tuple(self.machine.events),
             switches=tuple(self.discrete.switches),
             outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
             counts=MappingProxyType({"rhs": self.scene.evaluations}),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Tier, Trajectory, _arguments
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import differences
 from crossbody.cases._trajectory import Ledger
 from crossbody.reports.judging._between import between
 from crossbody.reports.judging.modes import violated
@@ -185,7 +186,7 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
 
 def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
     """The truth with what a second source says of it: agreement, until when, and how fast they part if they do."""
-    t, off = _apart(truth, second)
+    t, off = _apart(truth, second, case)
     parted = off > PARTED
     trusted = math.inf if second.outcome.ok else float(second.t[-1]) if len(second.t) else 0.0
     growth = math.nan
@@ -199,13 +200,14 @@ def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> 
     return replace(truth, trusted=agreed, parted=trusted, allowed=allowed, growth=growth, agreement=agreement)
 
 
-def _apart(truth: Truth, second: Trajectory) -> tuple[Floats, Floats]:
+def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats]:
     """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
     from crossbody.reports.metrics._align import aligned
 
     inside, exact = aligned(truth, second)
     scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0)) or 1.0
-    return second.t[inside], np.max(np.abs(second.q[inside] - exact.q), axis=1, initial=0.0) / scale
+    off = differences(second.q[inside], exact.q, case.quaternions)
+    return second.t[inside], np.max(off, axis=1, initial=0.0) / scale
 
 
 def _growth(t: Floats, off: Floats) -> float:

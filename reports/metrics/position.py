@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import differences
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._scale import least, of_like
 
@@ -21,11 +22,15 @@ SMALL, STILL = 1e-6, 1e-9
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests."""
+    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests.
+
+    A quaternion is told by the angle between both, rad, since q and -q are the same rotation.
+    """
     inside, exact = aligned(truth, run)
     if not inside.any():
         return None
-    return float(np.max(np.abs(run.q[inside] - exact.q) / _scale(truth.trajectory, case)))
+    off = differences(run.q[inside], exact.q, case.quaternions)
+    return float(np.max(off / _scale(truth.trajectory, case)))
 
 
 def _scale(exact: Trajectory, case: Case) -> Floats:
@@ -35,5 +40,7 @@ def _scale(exact: Trajectory, case: Case) -> Floats:
     the usual limit of 1e-6.
     """
     own: Floats = np.max(np.abs(exact.q), axis=0)
-    shared, smallest = of_like(own, case), least(case)
-    return np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
+    shared, smallest = of_like(own, case.coordinates), least(case.coordinates)
+    scale = np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
+    scale[list(case.quaternions)] = 1.0  # rad
+    return scale

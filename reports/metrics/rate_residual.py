@@ -33,6 +33,6 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     moved = np.diff(run.q, axis=0)
     way = np.sum(np.abs(moved), axis=0)
     off = np.abs(np.sum((moved - mean * np.diff(run.t)[:, None]) * np.sign(mean), axis=0))
-    longest = of_like(way, case)
-    moving = (way > STILL * longest) & (longest > least(case))
+    longest = of_like(way, case.coordinates)
+    moving = (way > STILL * longest) & (longest > least(case.coordinates))
     return float(np.max(off[moving] / way[moving])) if moving.any() else None

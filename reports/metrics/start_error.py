@@ -5,11 +5,14 @@ A known property of an engine never explains where it starts.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases._case import Coordinate
+from crossbody.cases._rotations import differences
 from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:
@@ -27,13 +30,13 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """
     if not len(run.t) or run.t[0] != 0.0 or run.q.shape[1] != len(case.q0):
         return None
-    pairs = [(run.q[0], case.q0, truth.trajectory.q, least(case))]
+    off = differences(run.q[:1], case.q0[None], case.quaternions)[0]
+    pairs = [(off, truth.trajectory.q, case.coordinates, False)]
     if not any(event.impulse and event.t == 0.0 for event in run.events):  # else the first row may be behind it
-        pairs.append((run.v[0], case.v0, truth.trajectory.v, least(case, rates=True)))
-    n = len(case.coordinates)
-    return max(_apart(case, *pair) for pair in pairs if pair[2].shape[1] == n)
+        pairs.append((np.abs(run.v[0] - case.v0), truth.trajectory.v, case.velocities, True))
+    return max(_apart(*pair) for pair in pairs if pair[1].shape[1] == len(pair[2]))
 
 
-def _apart(case: Case, mine: Floats, given: Floats, motion: Floats, smallest: Floats) -> float:
-    scale = np.maximum(of_like(np.max(np.abs(motion), axis=0, initial=0.0), case), smallest)
-    return float(np.max(np.abs(mine - given) / scale, initial=0.0))
+def _apart(off: Floats, motion: Floats, named: Sequence[Coordinate], rates: bool) -> float:
+    largest = of_like(np.max(np.abs(motion), axis=0, initial=0.0), named)
+    return float(np.max(off / np.maximum(largest, least(named, rates)), initial=0.0))
