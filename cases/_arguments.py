@@ -49,7 +49,9 @@ def path(where: str, value: object) -> str:
     except UnicodeError:
         raise InvalidValue(f"{where} is {shown(value)}; no file system can have such a path.") from None
     if len(raw) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in raw.split(os.fsencode(os.sep))):
-        raise InvalidValue(f"{where} is {shown(value)}; a name has at most {LONGEST_NAME} bytes, a path {LONGEST_PATH}.")
+        raise InvalidValue(
+            f"{where} is {shown(value)}; a name has at most {LONGEST_NAME} bytes, a path {LONGEST_PATH}."
+        )
     return text
 
 
