@@ -671,5 +671,6 @@ def bombs() -> Iterator[Bomb]:
 
 HDF: dict[str, Callable[[object], None]] = {
     "big-chunk": _hdf_big_chunk, "small-chunk-unfolds": _hdf_small_chunk_unfolds, "many-chunks": _hdf_many_chunks,
-    "deep": _hdf_deep, "many": _hdf_many, "tiny-chunks": _hdf_tiny_chunks, "cycle": _hdf_cycle, "attribute": _hdf_attribute,
+    "deep": _hdf_deep, "many": _hdf_many, "tiny-chunks": _hdf_tiny_chunks,
+    "cycle": _hdf_cycle, "attribute": _hdf_attribute,
 }  # fmt: skip
