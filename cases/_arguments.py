@@ -9,20 +9,11 @@ from collections.abc import Collection
 from typing import Any, TypeGuard, TypeVar, cast
 
 from crossbody.cases._errors import InvalidValue
+from crossbody.cases._errors import shown as shown  # a name of this module too
 
 _Kind = TypeVar("_Kind")
-SHOWN = 80
 LONGEST_NAME, LONGEST_PATH = 255, 4095
 """Bytes that file systems take of a name, and of a whole path."""
-
-
-def shown(value: object) -> str:
-    """A value in a message: cut where it is long, and never a fault of its own."""
-    try:
-        text = repr(value)
-    except Exception:
-        text = f"a {type(value).__name__}"
-    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
 
 
 def instance(where: str, value: object, kind: type[_Kind] | tuple[type[_Kind], ...], wanted: str) -> _Kind:

@@ -8,8 +8,8 @@ import numba.core.config as numba_config
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, Trajectory
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._check import check_once
-from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._options import Options, checked
 from crossbody.reference._start import check_start
 from crossbody.reference._system import System
@@ -20,7 +20,7 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
 
     Args:
         system: the mechanism.
-        q0: positions at the start (n,), finite.
+        q0: positions at the start (nq,), finite.
         v0: velocities at the start (n,), finite.
         t_end: horizon, s, above 0.
         options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples, consistent, ledger, ...

@@ -68,6 +68,98 @@ def test_published_robots_have_the_dynamics_of_mujoco(robot: str) -> None:
         assert np.abs(f - theirs).max() <= SAME * np.abs(theirs).max()
 
 
+FLOATING = """
+<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="base" pos="0 0 1"><freejoint/>
+<geom type="box" size=".2 .15 .05" mass="3"/>
+<body name="leg" pos=".2 0 0"><joint name="hip" type="ball" {ball}/>
+<geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="1"/>
+<body name="shank" pos="0 0 -.4"><joint name="knee" axis="0 1 0" stiffness="4" springref=".5"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".6"/></body></body>
+<body name="tail" pos="-.2 0 0"><joint name="tail" axis="0 1 1"/>
+<geom type="capsule" fromto="0 0 0 -.3 0 .1" size=".02" mass=".4"/>
+</body></body></worldbody><contact><exclude body1="base" body2="leg"/><exclude body1="base" body2="tail"/>
+<exclude body1="base" body2="shank"/><exclude body1="leg" body2="shank"/><exclude body1="leg" body2="tail"/>
+<exclude body1="shank" body2="tail"/></contact>
+<keyframe><key name="thrown" qpos="0 0 1 .9 .3 .2 -.1 .8 .1 -.4 .2 .3 -.2"
+qvel=".5 -.3 4 1.5 -2.5 1 .5 2 -1 3 -2"/></keyframe>
+</mujoco>
+"""
+
+
+def floating(folder: Path, **fields: str) -> str:
+    path = folder / "floating.xml"
+    path.write_text(FLOATING.format(**{"ball": "", **fields}), encoding="utf-8")
+    return str(path)
+
+
+def turned(q: Any) -> Any:
+    """Rotations of the base and of the hip."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(np.concatenate([q[:, 3:7], q[:, 7:11]]), scalar_first=True).as_matrix()
+
+
+def test_a_floating_robot_moves_alike_in_three_engines(tmp_path: Path) -> None:
+    case = cases.load(floating(tmp_path, ball='damping=".05" stiffness="3"'), t_end=1.0)
+    assert case.quaternions == (3, 7)
+    assert (len(case.coordinates), len(case.velocities)) == (13, 11)
+    ours = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
+    others = [
+        engines.load("reference").prepare(case, "cvode", rtol=1e-12).run(),
+        engines.load("reference").prepare(case, "ida", rtol=1e-12).run(),
+        engines.load("pinocchio").prepare(case, "law", rtol=1e-12).run(),
+        engines.load("mujoco").prepare(case, "matched", dt=2e-4).run(),
+    ]
+    for run in others:
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(turned(run.q[-1:]) - turned(ours.q[-1:])).max() <= 1e-8
+        assert np.abs(run.q[-1, [0, 1, 2, 11, 12]] - ours.q[-1, [0, 1, 2, 11, 12]]).max() <= 1e-8
+        assert np.abs(run.v[-1] - ours.v[-1]).max() <= 1e-7
+        assert np.abs(run.energy[-1].sum() - ours.energy[-1].sum()) <= 1e-7
+
+
+def momenta(model: Any, q: Any, v: Any) -> Any:
+    """Linear momentum and angular momentum about the centre, by MuJoCo, at every row."""
+    data, found = mujoco.MjData(model), []
+    for one, rate in zip(q, v, strict=True):
+        data.qpos[:], data.qvel[:] = one, rate
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        found.append([*data.subtree_linvel[0] * model.body_subtreemass[0], *data.subtree_angmom[0]])
+    return np.array(found)
+
+
+def test_a_floating_robot_keeps_energy_and_momenta(tmp_path: Path) -> None:
+    """Over 5 s at rtol 1e-11 nothing drifts by more than 1e-10 of its size."""
+    path = floating(tmp_path)
+    case = cases.load(path, t_end=5.0)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-11, samples=101).run()
+    assert run.outcome is Outcome.FINISHED
+    energy = run.energy.sum(axis=1)
+    size = np.abs(run.energy).max()
+    assert np.abs(energy - energy[0]).max() <= 1e-10 * size
+    momentum = momenta(mujoco.MjModel.from_xml_path(path), run.q, run.v)
+    momentum[:, 2] += 5.0 * 9.81 * run.t
+    assert np.abs(momentum - momentum[0])[:, :3].max() <= 1e-10 * np.abs(momentum[:, :3]).max()
+    assert np.abs(momentum - momentum[0])[:, 3:].max() <= 1e-10 * np.abs(momentum[:, 3:]).max()
+
+
+def test_an_unnamed_floating_box_runs_in_every_engine(tmp_path: Path) -> None:
+    path = write(tmp_path, more='<body name="box" pos="3 0 2"><freejoint/><geom size=".1"/></body>')
+    text = Path(path).read_text(encoding="utf-8")
+    Path(path).write_text(text[: text.index("<keyframe>")] + "</mujoco>", encoding="utf-8")
+    case = cases.load(path, t_end=0.2)
+    for engine, profile in (
+        ("reference", "compiled"),
+        ("mujoco", "matched"),
+        ("mujoco", "default"),
+        ("pinocchio", "law"),
+    ):
+        run = engines.load(engine).prepare(case, profile).run()
+        assert run.outcome is Outcome.FINISHED
+        assert run.q[-1, 4] == pytest.approx(2.0 - 0.5 * 9.81 * 0.2**2, abs=1e-2 if profile == "default" else 1e-9)
+
+
 def test_an_arm_moves_alike_in_three_engines(tmp_path: Path) -> None:
     case = cases.load(write(tmp_path), "raised")
     ours = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
@@ -148,7 +240,6 @@ def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
     ("fields", "said"),
     [
         ({"shoulder": 'frictionloss=".1"'}, "shoulder.*friction"),
-        ({"more": '<body name="box"><freejoint/><geom size=".1"/></body>'}, "free"),
         ({"shoulder": 'actuatorgravcomp="true" actuatorfrclimited="true" actuatorfrcrange="-1 1"'}, "shoulder"),
         ({"integrator": 'RK4" wind="1 0 0'}, "wind"),
         ({"integrator": 'RK4" density="1'}, "medium"),

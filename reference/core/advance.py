@@ -56,6 +56,7 @@ class Kernels(NamedTuple):
     rows: Any
     energy: Any
     power: Any
+    velocity: Any
     solve: Any
     control: Any
     watch: Any
@@ -72,7 +73,7 @@ def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
             w.u[i] += b.inputs_u[s.next_input, i] - (b.inputs_u[before, i] if before >= 0 else 0.0)
         s.next_input += 1
     if s.has_control and s.next_tick * s.tick <= s.t:
-        K.control(s.t, w.y[: s.n], w.y[s.n :], w.u, w.s, m.p)
+        K.control(s.t, w.y[: s.nq], w.y[s.nq :], w.u, w.s, m.p)
         s.next_tick += 1
     s.stop = s.t_end
     if s.next_input < len(b.inputs_t):
@@ -141,13 +142,13 @@ def _move(s: Any, w: Work, t: float) -> None:
 @inlined
 def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Apply the transitions that fired at the step's end and settle what follows from them."""
-    n = s.n
+    nq = s.nq
     if s.natural:
         if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
             return ILL_POSED
         scatter(s, w, w.lam0)
         record.here(K, s, m, w, b.mode, b.out, b.modes)
-    K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+    K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     journal.remember(s, b)
     moved = False
     for i in range(s.nc):
@@ -260,12 +261,12 @@ def _room(s: Any, b: Buffers) -> int:
 
 
 def advance(
-    dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, solve: Any, control: Any, watch: Any, switch: Any,
-    state: Any, model: Index, work: Index, buffers: Index, budget: int,
+    dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, velocity: Any, solve: Any, control: Any, watch: Any,
+    switch: Any, state: Any, model: Index, work: Index, buffers: Index, budget: int,
 ) -> int:  # fmt: skip
     """Go on for at most `budget` steps.
 
-    The nine kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
+    The ten kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
     tables of the bundles in `layout`.
 
     Returns:
@@ -273,7 +274,7 @@ def advance(
         or a negative code for a numerical failure. All that is needed to go on is in the arguments.
     """
     s = state[0]
-    K = Kernels(dynamics, gaps, rows, energy, power, solve, control, watch, switch)
+    K = Kernels(dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch)
     m, w, b = open_model(model), open_work(work), open_buffers(buffers)
     if not s.started or s.unsettled:
         code = _begin(K, s, m, w, b)

@@ -36,7 +36,7 @@ def _keep_rows(s: Any, m: Model, w: Work) -> None:
 @compiled
 def begin(K: Any, s: Any, m: Model, w: Work) -> int:
     """Take the pivots and the rows of the present instant as those of the start; 1 if ill posed."""
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) != 0:
         return 1
     for j in range(s.na):
         w.pivot0[w.idx[j]] = w.G[j, j]

@@ -24,7 +24,7 @@ HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to C
 @inlined
 def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
     """Lam of the active row i at the state in ys."""
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
         return np.nan
     for j in range(s.na):
         if w.idx[j] == i:
@@ -41,7 +41,7 @@ def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> None:
     functions, of which the largest counts.
     """
     elastic, spring, inertial = np.nan, 0.0, 0.0
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], GENERAL) == 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], GENERAL) == 0:
         for j in range(s.na):
             if w.idx[j] == i:
                 elastic = max(w.law[i, 1], np.sqrt(w.law[i, 0])) * w.hda[j]
@@ -79,7 +79,7 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     s.guards += 1
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
-    q, v = w.ys[: s.n], w.ys[s.n :]
+    q, v = w.ys[: s.nq], w.ys[s.nq :]
     if kind in (RELEASE, HANDOVER):
         dense.put_on_rows(K, s, m, w, theta, w.ys)
     if kind == RELEASE:
@@ -129,7 +129,7 @@ def largest(w: Work, count: int) -> float:
 def _rounding(s: Any, w: Work) -> float:
     """What rounding of the positions makes of a gap."""
     largest = 0.0
-    for a in range(s.n):
+    for a in range(s.nq):
         largest = max(largest, abs(w.y[a]))
     return 8.0 * ULP * largest
 

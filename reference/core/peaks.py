@@ -24,9 +24,9 @@ NUDGE = 1e-5  # part of the step along which a slope is taken
 def _slopes(K: Any, s: Any, m: Model, w: Work, t: float, y: Any, stage: int, lam: Any) -> bool:
     """Leave in w.la the change of the active multipliers from lam, along k[stage] for a short while; False if none."""
     step = NUDGE * s.hs
-    for a in range(2 * s.n):
+    for a in range(s.nq + s.n):
         w.ys[a] = y[a] + step * w.k[stage, a]
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t + step, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t + step, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
         return False
     for j in range(s.na):
         w.la[j] -= lam[w.idx[j]]
@@ -80,7 +80,7 @@ def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, theta: float) -> floa
     dense.state(s, m, w, theta, w.ys)
     dense.put_on_rows(K, s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
         return -np.inf
     for j in range(s.na):
         if w.idx[j] == i:

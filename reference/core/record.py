@@ -21,15 +21,15 @@ def write_row(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, y: Array, lam: Array, z: Array, out: Floats, modes: Bytes
 ) -> None:  # fmt: skip
     """Append one row."""
-    n, nc, r = s.n, s.nc, s.rows
+    nq, nc, r = s.nq, s.nc, s.rows
+    at = 1 + nq + s.n
     out[r, 0] = t
-    out[r, 1 : 1 + 2 * n] = y
-    at = 1 + 2 * n
-    K.gaps(t, y[:n], y[n:], m.p, w.gap, w.rate)
+    out[r, 1:at] = y
+    K.gaps(t, y[:nq], y[nq:], m.p, w.gap, w.rate)
     out[r, at : at + nc] = w.gap
     out[r, at + nc : at + 2 * nc] = lam
     at += 2 * nc
-    K.energy(y[:n], y[n:], m.p, w.e)
+    K.energy(y[:nq], y[nq:], m.p, w.e)
     out[r, at] = w.e[0]
     out[r, at + 1] = w.e[1]
     out[r, at + 2 : at + 2 + s.nz] = z
@@ -52,7 +52,7 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     dense.state(s, m, w, theta, w.ys)
     if s.na > 0:
         dense.put_on_rows(K, s, m, w, theta, w.ys)
-        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN)
+        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN)
     scatter(s, w, w.lam)
     z = w.z
     if s.ledger and s.method != EXACT:

@@ -84,7 +84,7 @@ def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
     """What a machine asks for besides `evaluate`: the general algebra's rows and the noise of the multipliers."""
     if s.fsm != EDGE and s.na > 0:
         if s.has_solve:
-            accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL)
+            accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL)
         noise(s, m, w)
 
 
@@ -92,7 +92,7 @@ def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
 def _touching(s: Any, w: Work) -> None:
     """How large a gap rounding alone can make of a touch."""
     largest = 1.0
-    for a in range(s.n):
+    for a in range(s.nq):
         largest = max(largest, abs(w.y[a]))
     s.touch = TOUCHING * largest
 
@@ -128,7 +128,7 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 def switch(K: Any, s: Any, m: Model, w: Work, b: Buffers, fired: int) -> int:
     """Let the mechanism change its discrete variables; UNCHANGED, CHANGED or LOST of the kernels."""
     keep_discrete(s, m, w, b)
-    result = K.switch(s.t, w.y[: s.n], w.y[s.n :], m.p, b.mode, fired)
+    result = K.switch(s.t, w.y[: s.nq], w.y[s.nq :], m.p, b.mode, fired)
     write_discrete(s, m, w, b)
     s.have_free = 0
     return int(result)

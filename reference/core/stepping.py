@@ -60,7 +60,7 @@ def _finite_mass(s: Any, w: Work) -> bool:
 @inlined
 def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Evaluate the end of the step, derivative, multipliers, gaps, and check it."""
-    n = s.n
+    nq = s.nq
     last = NODES - 1
     end = s.end
     t = s.t + s.hs
@@ -73,14 +73,14 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     scatter(s, w, w.lams[last])
     if s.nc > 0:
         s.guards += 1
-        K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
+        K.gaps(t, w.y1[:nq], w.y1[nq:], m.p, w.gaps[last], w.rates[last])
     copy(w.lam0, w.lams[0])
     if not (all_finite(w.gaps[last]) and all_finite(w.rates[last]) and all_finite(w.lams[last])):
         return NOT_FINITE
     if not all_finite(w.k[end]) or not _finite_mass(s, w):
         return NOT_FINITE
     y1 = w.y1
-    for i in range(2 * n):
+    for i in range(nq + s.n):
         if abs(y1[i]) > FAR:
             return DIVERGED
     if s.loops and folds.passed(s, m, w, b) != 0:

@@ -10,6 +10,8 @@ from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
 from crossbody.reference.tree import forces, layout, sweeps
 
+PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
+
 
 @kernels.dynamics
 def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Array, w: Array) -> None:
@@ -142,6 +144,34 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         speed = forces.rate(v, p, o)
         taken += speed * forces.damper(p, o + layout.DAMP, speed)
     e[0], e[1] = given, taken
+
+
+@kernels.helper
+def _turn(q: Array, at: int, v: Array, j: int, qd: Array) -> None:
+    """Fill q' = q w / 2 + PULL (1 - |q|^2) q of the quaternion at q[at:] with the angular velocity w at v[j:].
+
+    The pull keeps the length at 1 and turns nothing: R is that of q / |q|.
+    """
+    w, x, y, z = q[at], q[at + 1], q[at + 2], q[at + 3]
+    a, b, c = 0.5 * v[j], 0.5 * v[j + 1], 0.5 * v[j + 2]
+    g = PULL * (1.0 - w * w - x * x - y * y - z * z)
+    qd[at], qd[at + 1] = g * w - x * a - y * b - z * c, g * x + w * a + y * c - z * b
+    qd[at + 2], qd[at + 3] = g * y + w * b + z * a - x * c, g * z + w * c + x * b - y * a
+
+
+@kernels.velocity
+def velocity(t: float, q: Array, v: Array, p: Array, qd: Array) -> None:
+    """The rates of all positions: v itself of hinges, slides and free joints' origins."""
+    for i in range(int(p[layout.NODES].real)):
+        o = int(p[layout.AT_NODE].real) + layout.NODE * i
+        kind, at, j = p[o + layout.TYPE].real, int(p[o + layout.Q].real), int(p[o + layout.V].real)
+        if kind >= layout.SLIDE:
+            qd[at] = v[j]
+        elif kind == layout.FREE:
+            qd[at], qd[at + 1], qd[at + 2] = v[j], v[j + 1], v[j + 2]
+            _turn(q, at + 3, v, j + 3, qd)
+        else:
+            _turn(q, at, v, j, qd)
 
 
 KERNELS: dict[str, Any] = {"dynamics": dynamics, "gaps": gaps, "rows": rows, "energy": energy, "power": power}

@@ -8,6 +8,7 @@ import numpy as np
 
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import away
+from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+STILL = 1e-9
+"""Velocities below this part of what would carry their like through the horizon are rest but for rounding."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -24,11 +27,10 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     collisions that take no time are left out: several may share one, and a sample does not say behind which it stands.
     """
     inside, exact = aligned(truth, run)
-    own = np.max(np.abs(truth.trajectory.v), axis=0)
-    units = np.array([coordinate.unit for coordinate in case.coordinates])
-    scale = np.array([own[units == unit].max() for unit in units])
     if not inside.any():
         return None
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
-    off = np.abs(run.v[inside] - exact.v)[smooth] / np.where(scale > 0.0, scale, 1.0)
+    largest = of_like(np.max(np.abs(truth.trajectory.v), axis=0), case.velocities)
+    scale = np.maximum(largest, least(case.velocities, rates=True))
+    off = np.abs(run.v[inside] - exact.v)[smooth] / scale
     return float(np.max(off, initial=0.0))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 import re
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
@@ -108,6 +110,24 @@ def read_inside(folder: Path, name: str) -> bytes:
     """Return what a file in a folder holds; errors as `open_inside`."""
     with open_inside(folder, name) as file:
         return file.read()
+
+
+def digest(folder: Path, name: str) -> str:
+    """Return the digest of a file in a folder; errors as `open_inside`."""
+    with open_inside(folder, name) as file:
+        status = os.fstat(file.fileno())
+        return _digest(str(folder / name), status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+
+@lru_cache(maxsize=4096)
+def _digest(path: str, *_status: int) -> str:
+    """Digest what has not changed since only once a process."""
+    place = Path(path)
+    made = hashlib.blake2b(digest_size=16)
+    with open_inside(place.parent, place.name) as file:
+        while block := file.read(1 << 20):
+            made.update(block)
+    return made.hexdigest()
 
 
 def listed(folder: Path, name: str = "") -> list[str]:
