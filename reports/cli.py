@@ -375,10 +375,10 @@ def _obey(arguments: list[str] | None) -> int:
 
 REFUSED = (
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE,
-    errno.ENFILE, errno.ENOMEM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.EBUSY,
-    errno.ETXTBSY,
+    errno.ENFILE, errno.ENOMEM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR,
+    errno.EBUSY, errno.ETXTBSY,
 )  # fmt: skip
-"""What the system may refuse whatever a program does."""
+"""What the system may refuse whatever a program does, paths that a user gave among it."""
 
 
 def _enough() -> int:

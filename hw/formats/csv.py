@@ -90,9 +90,8 @@ class CsvReader:
         if width > MOST_COLUMNS:  # before anything is made for each of them
             raise LogFormatError(path, f"has {width} columns; a log of more than {MOST_COLUMNS} is not read.")
         # pyarrow ends the process where memory is denied to it: it is not begun with less than it needs.
-        self._block = min(
-            max(BLOCK_BYTES, BLOCK_LINES * len(line)), LARGEST_BLOCK, max(path.stat().st_size, BLOCK_BYTES)
-        )
+        most = max(BLOCK_BYTES, min(LARGEST_BLOCK, path.stat().st_size))
+        self._block = min(max(BLOCK_BYTES, BLOCK_LINES * len(line)), most)
         current(path).hold(OPENING + COLUMN * width + BLOCKS * self._block, f"a table of {width} columns")
         self.library = library("pyarrow")
         self.refused: dict[str, str] = {}

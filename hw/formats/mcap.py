@@ -16,7 +16,7 @@ from crossbody.cases import LogFormatError
 from crossbody.hw.formats._budget import Budget, current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._guard import library, parsing
-from crossbody.hw.formats._messages import Leaf, refuse_large, rows_of, too_large, topic_group
+from crossbody.hw.formats._messages import Leaf, crowded, refuse_large, rows_of, too_large, topic_group
 from crossbody.hw.formats._metered import MeteredFile
 from crossbody.hw.formats._unfold import Chunks
 
@@ -87,8 +87,12 @@ class McapReader:
                 )
                 self.refused[topic] = why or kind
                 continue
-            group, leaves = topic_group(topic, count, decode(data), CLOCKS)
-            self._leaves[topic] = leaves
+            message = decode(data)
+            why = crowded(message)
+            if why:
+                self.refused[topic] = why
+                continue
+            group, self._leaves[topic] = topic_group(topic, count, message, CLOCKS)
             yield group
 
     def _counts(self) -> tuple[dict[str, int], dict[str, tuple[Any, Any, bytes]]]:

@@ -163,10 +163,20 @@ def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns
         found = msgspec.toml.decode(text)
     except (msgspec.DecodeError, ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
         raise ColumnMapError(path, "$", f"is no TOML: {str(error)[:LONGEST]}.") from None
+    _check_numbers(found, "$", path)
     _signals_one_by_one(found, path)
     columns: Columns = _convert(found, Columns, "$", path)
     _check(columns, path)
     return columns
+
+
+def _check_numbers(value: Any, key: str, path: str | Path) -> None:
+    """Refuse whole numbers beyond the 64 bits of TOML, which Python takes: not even a message could show them."""
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ColumnMapError(path, key, "is a whole number of more than 64 bits.")
+    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for name, one in inside:
+        _check_numbers(one, f"{key}.{name}", path)
 
 
 def dump_columns(columns: Columns) -> str:
