@@ -16,6 +16,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import _registry
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.cases._errors import (
     CaseUnsupported,
     ColumnMapError,
@@ -94,11 +95,13 @@ def names() -> tuple[str, ...]:
     return _registry.plugin_names(__name__, list(__path__), _VOCABULARY)
 
 
+@checked_arguments
 def summary(name: str) -> str:
     """What a case is, in one line; imports nothing."""
     return _registry.summary(__name__, list(__path__), name)
 
 
+@checked_arguments
 def variants(name: str) -> tuple[str, ...]:
     """The variants of a case, the default first."""
     from crossbody.cases._load import module
@@ -123,6 +126,7 @@ def load(name: str, variant: str | None = None, **overrides: Value) -> Case:
     return build(name, variant, overrides)
 
 
+@checked_arguments
 def from_file(path: str | PathLike[str], key: str | None = None, **overrides: Value) -> Case:
     """Build a case from a robot's file.
 
@@ -139,6 +143,7 @@ def from_file(path: str | PathLike[str], key: str | None = None, **overrides: Va
     return load(fspath(path), key, **overrides)
 
 
+@checked_arguments
 def from_scene(scene: Scene, **given: Any) -> Case:
     """Build a case from a scene; see `crossbody.cases.files.case.case_of` for what else may be given."""
     from crossbody.cases.files.case import case_of

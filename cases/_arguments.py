@@ -9,18 +9,11 @@ from collections.abc import Collection
 from typing import Any, TypeGuard, TypeVar, cast
 
 from crossbody.cases._errors import InvalidValue
+from crossbody.cases._errors import shown as shown  # a name of this module too
 
 _Kind = TypeVar("_Kind")
-SHOWN = 80
-
-
-def shown(value: object) -> str:
-    """A value in a message: cut where it is long, and never a fault of its own."""
-    try:
-        text = repr(value)
-    except Exception:
-        text = f"a {type(value).__name__}"
-    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
+LONGEST_NAME, LONGEST_PATH = 255, 4095
+"""Bytes that file systems take of a name, and of a whole path."""
 
 
 def instance(where: str, value: object, kind: type[_Kind] | tuple[type[_Kind], ...], wanted: str) -> _Kind:
@@ -43,9 +36,13 @@ def path(where: str, value: object) -> str:
     if not isinstance(value, (str, os.PathLike)) or "\0" in (text := str(value)) or not text:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a path.")
     try:
-        os.fsencode(text)
+        raw = os.fsencode(text)
     except UnicodeError:
         raise InvalidValue(f"{where} is {shown(value)}; no file system can have such a path.") from None
+    if len(raw) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in raw.split(os.fsencode(os.sep))):
+        raise InvalidValue(
+            f"{where} is {shown(value)}; a name has at most {LONGEST_NAME} bytes, a path {LONGEST_PATH}."
+        )
     return text
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases._arguments import shown
-from crossbody.cases._arrays import Floats, frozen
-from crossbody.cases._errors import InvalidValue, SceneError
+from crossbody.cases._arguments import real, shown
+from crossbody.cases._arrays import Floats, frozen, numbers
+from crossbody.cases._entry_points import checked_arguments, checked_fields
+from crossbody.cases._errors import InvalidValue, SceneError, UnknownName
 from crossbody.cases._trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -84,10 +85,18 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coordinate:
-    """Name and unit of one generalised coordinate; its velocity has the unit per second."""
+    """Name and unit of one generalised coordinate; its velocity has the unit per second.
+
+    Attributes:
+        name, unit: what it is called, and in which SI unit it counts.
+        size, rate: what it and its rate are at least when they do something, in that unit; a motion that stays below is
+            judged by these. 0 where the scene knows none.
+    """
 
     name: str
     unit: str
+    size: float = 0.0
+    rate: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +120,7 @@ class Law:
 
     def __post_init__(self) -> None:
         """Check shapes and signs."""
-        nc = len(np.atleast_1d(self.a0))
+        nc = np.size(numbers("Law", "a0", self.a0))
         for name in ("a0", "a1", "a2", "b0", "b1"):
             given = getattr(self, name)
             array = frozen("Law", name, np.zeros(nc) if name[0] == "b" and np.size(given) == 0 else given, (nc,))
@@ -133,6 +142,7 @@ class Law:
         return not self.a2.any()
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inputs:
     """What acts on a mechanism from outside: each row of values holds from its time on, zero before the first.
@@ -221,6 +231,7 @@ class Chaos:
     why: str
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """A scene, complete: any engine can build its own model from it.
@@ -299,6 +310,14 @@ class Case:
         """Name and variant in one word."""
         return f"{self.name}:{self.variant}"
 
+    @checked_arguments
     def number(self, parameter: str) -> float:
-        """One parameter as a float."""
-        return float(self.parameters[parameter])
+        """One parameter as a float.
+
+        Raises:
+            UnknownName: if the case does not have it.
+            InvalidValue: if it is a word.
+        """
+        if parameter not in self.parameters:
+            raise UnknownName(f"parameter of {self.label}", parameter, self.parameters)
+        return real(f"{self.label}: {parameter}", self.parameters[parameter])

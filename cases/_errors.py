@@ -21,6 +21,17 @@ import difflib
 import os
 from collections.abc import Iterable
 
+SHOWN = 80
+
+
+def shown(value: object) -> str:
+    """A value in a message: cut where it is long, and never a fault of its own."""
+    try:
+        text = repr(value)
+    except Exception:
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
+
 
 class CrossbodyError(Exception):
     """Wrong use, told in one sentence: what is wrong, where, and what would be valid."""
@@ -39,7 +50,7 @@ class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other
         self.kind, self.name, self.known = kind, name, tuple(sorted(known))
         close = difflib.get_close_matches(name, self.known, n=1) if isinstance(name, str) else ()
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        super().__init__(f"There is no {kind} {repr(name)[:80]}.{hint} Known: {', '.join(self.known) or 'none'}.")
+        super().__init__(f"There is no {kind} {shown(name)}.{hint} Known: {', '.join(self.known) or 'none'}.")
 
 
 class InvalidValue(CrossbodyError, ValueError):  # noqa: N818

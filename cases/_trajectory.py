@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases._arrays import Bytes, Floats, frozen
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.cases._outcome import Outcome
 
 
@@ -118,10 +119,11 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Check every shape once and make every array read-only."""
-        n, nc = len(self.t), np.shape(self.gap)[-1] if np.ndim(self.gap) == 2 else 0
-        shapes: dict[str, tuple[int | None, ...]] = {
-            "t": (n,), "q": (n, None), "v": (n, None), "gap": (n, nc), "lam": (n, nc), "energy": (n, 2),
-        }  # fmt: skip
+        object.__setattr__(self, "t", frozen("Trajectory", "t", self.t, (None,)))
+        n = len(self.t)
+        object.__setattr__(self, "gap", frozen("Trajectory", "gap", self.gap, (n, None)))
+        nc = self.gap.shape[1]
+        shapes = {"q": (n, None), "v": (n, None), "lam": (n, nc), "energy": (n, 2)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen("Trajectory", name, getattr(self, name), shape))
         object.__setattr__(self, "mode", frozen("Trajectory", "mode", self.mode, (n, nc), np.int8))
@@ -132,6 +134,7 @@ class Trajectory:
         total: Floats = self.energy.sum(axis=1)
         return total
 
+    @checked_arguments
     def transitions(self, contact: int | None = None) -> tuple[Event, ...]:
         """The events of one contact, or all."""
         return tuple(e for e in self.events if contact is None or e.contact == contact)

@@ -6,9 +6,10 @@ An engine is a module here with one public name, `ENGINE`, an object that follow
 from __future__ import annotations
 
 from crossbody.cases import EngineUnavailable, _registry
-from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden
+from crossbody.cases._entry_points import checked_arguments
+from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden, interpreted
 
-__all__ = ["QUANTITIES", "Engine", "Run", "hidden", "load", "names", "summary"]
+__all__ = ["QUANTITIES", "Engine", "Run", "hidden", "interpreted", "load", "names", "summary"]
 
 
 def names() -> tuple[str, ...]:
@@ -16,6 +17,7 @@ def names() -> tuple[str, ...]:
     return _registry.plugin_names(__name__, list(__path__))
 
 
+@checked_arguments
 def summary(name: str) -> str:
     """What an engine is, in one line; imports nothing."""
     return _registry.summary(__name__, list(__path__), name)

@@ -5,19 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
+from crossbody.cases._entry_points import checked_arguments
+
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-
 
 QUANTITIES = ("masses", "gravity", "constants", "q0", "v0", "M", "bias", "H", "lam", "ledger")
 """What an engine must show or name in `hidden`: keys of its audit where the reference has them, `lam` of its
 trajectories where there are rows, and their account of energy."""
 
 
+@checked_arguments
 def hidden(engine: Engine, profile: str) -> Mapping[str, str]:
     """What an engine does not show under a profile, and why; a quantity of `QUANTITIES` each."""
     told: Mapping[str, Mapping[str, str]] = getattr(engine, "hidden", {})
     return {**told.get("*", {}), **told.get(profile, {})}
+
+
+def interpreted(engine: Engine, profile: str) -> str:
+    """What of an engine's timed runs is Python; empty for nothing."""
+    told: Mapping[str, str] = getattr(engine, "interpreted", {})
+    return told.get(profile, told.get("*", ""))
 
 
 class Run(Protocol):
@@ -62,6 +70,9 @@ class Engine(Protocol):
 
     An engine may have `orders`, profile -> promised order of the error in its step `dt` or its tolerance `rtol`; the
     benchmark holds the observed one against it.
+
+    An engine may have `interpreted`, profile ("*" for all) -> what of its timed runs is Python, which the benchmark
+    says beside its times; and its runs `native()`, the time in which its own loop makes the same steps without that, s.
 
     An engine may have `linearise(case, spot) -> tuple[Tangent, ...]` (`crossbody.engines._linear`): its derivatives of
     the accelerations at an equilibrium of the case, by each way that it has.

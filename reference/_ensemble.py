@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases._arrays import frozen, numbers
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._cache import embedding
 from crossbody.reference._check import check_once
-from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._options import Options, checked
 from crossbody.reference._program import address, kept_with_kernels

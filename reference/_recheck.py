@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import Mode, Trajectory, _arguments
-from crossbody.reference._entry_points import checked_arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.sundials.compiled import evaluation

@@ -8,8 +8,8 @@ import numba.core.config as numba_config
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, Trajectory
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._check import check_once
-from crossbody.reference._entry_points import checked_arguments
 from crossbody.reference._options import Options, checked
 from crossbody.reference._start import check_start
 from crossbody.reference._system import System

@@ -240,7 +240,7 @@ def test_start_that_does_not_close_offers_one_that_does(robot):
 
 @pytest.mark.parametrize("name", [f.name for f in fields(delta.Robot)])
 def test_bad_number_is_refused_by_name(name):
-    with pytest.raises(InvalidValue, match=f"Robot: {name} is nan"):
+    with pytest.raises(InvalidValue, match=f"Robot.{name} is nan"):
         replace(delta.LIGHT, **{name: float("nan")})
 
 

@@ -115,6 +115,9 @@ class Pinocchio:
     }
     versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": sksundae.__version__}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    interpreted: Mapping[str, str] = {
+        "*": "the loop over steps, the rows of the law, gaps; Pinocchio's algorithms are called from Python"
+    }
     hidden: Mapping[str, Mapping[str, str]] = {"*": {"ledger": "These runs keep no account of the work of their rows."}}
 
     def why_not(self, case: Case, profile: str) -> str | None:

@@ -14,6 +14,7 @@ from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import _scene as parts
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio._joined import Joined, by_least_norm
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -36,7 +37,7 @@ def build(case: Case, algebra: str) -> Prepared:
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     forces = parts.Forces(scene)
-    rows = parts.Rows(scene, forces)
+    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if loop.type != "connect")), forces)
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
@@ -47,20 +48,42 @@ def build(case: Case, algebra: str) -> Prepared:
         ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
         tau[:] = to.back(q, ours) + lifted(scene, model, data, placed, q)
 
+    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type == "connect"))
     touching = ContactRows(scene, model, placed)
-    pinned = PinRows(
-        model, jacobian=lambda q: np.vstack([to.back(q, rows.jacobian(to.ours(q))), touching.jacobian(q)]),
-        heights=lambda q: np.concatenate([rows.heights(to.ours(q)), touching.heights(q)]),
-        drift=lambda q, v: np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), touching.drift(q, v)]),
-        law=case.law, algebra=algebra, forces=apply,
-    )  # fmt: skip
+    order = _order(scene)
+
+    def heights(q: Floats) -> Floats:
+        own = np.concatenate([rows.heights(to.ours(q)), joined.heights(q)])[order]
+        return np.concatenate([own, touching.heights(q)])
+
+    def jacobian(q: Floats) -> Floats:
+        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q)])[order]
+        return np.concatenate([own, touching.jacobian(q)])
+
+    def drift(q: Floats, v: Floats) -> Floats:
+        own = np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v)])[order]
+        return np.concatenate([own, touching.drift(q, v)])
+
+    pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
+    if joined.ends:  # planar loops have rows that depend on each other
+        pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
     start = to.theirs(case.q0)
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, forces, pinned.heights, to), sizes=(np.ones(to.nq), np.ones(to.nv)),
+        rows=pinned, observe=_observe(scene, model, forces, heights, to), sizes=(np.ones(to.nq), np.ones(to.nv)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def _order(scene: Scene) -> list[int]:
+    """Return where each row of a scene stands where all of `connect` come last."""
+    wide = np.repeat([loop.type == "connect" for loop in scene.loops], [loop.width for loop in scene.loops])
+    bounds = np.isfinite([part.range for part in scene.bounded]).sum()
+    last = np.concatenate([wide, np.zeros(bounds)]).astype(bool)
+    stands = np.empty(len(last), dtype=int)
+    stands[np.concatenate([np.flatnonzero(~last), np.flatnonzero(last)])] = np.arange(len(last))
+    return list(stands.tolist())
 
 
 def tree(scene: Scene) -> tuple[Any, Placed]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import InvalidValue, SceneError, Value, _arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.hw import models
 from crossbody.hw.fitting.deadline import Deadline, TimeOver
 from crossbody.hw.fitting.derivative import DELAY, Exact
@@ -28,6 +29,7 @@ MOST_DERIVATIVES = 20_000_000
 """Derivatives by starts that "auto" lets be unknowns: 160 MB, and several times that in the search."""
 
 
+@checked_arguments
 def identify(
     log: Log | Sequence[Log], model: str | Model, free: Sequence[str], *, parameters: Mapping[str, Value] | None = None,
     restart: float | None = None, horizon: float | None = None, starts: str = "auto", hold: int = 2,
@@ -65,26 +67,12 @@ def identify(
     """
     chosen = models.chosen(model)
     numbers = chosen.numbers(parameters)
-    free, hold, stride = (
-        _arguments.texts("free", free),
-        _arguments.whole("hold", hold, 0),
-        _arguments.whole("stride", stride),
-    )
-    budget = _arguments.real("budget", budget)
-    time_limit = _arguments.real("time_limit", time_limit)
+    hold, stride = _arguments.whole("hold", hold, 0), _arguments.whole("stride", stride)
     if not time_limit > 0.0:
         raise InvalidValue(f"time_limit is {time_limit!r} s; it must be above 0.")
     deadline = Deadline(time_limit)
-    _arguments.instance("starts", starts, str, "measured or free")
-    _arguments.instance("engine", engine, str, "E or E:PROFILE")
-    for name, pair in _arguments.instance("bounds", bounds or {}, Mapping, "a table of names and pairs").items():
-        ends: Any = _arguments.instance(f"bounds of {name}", pair, (tuple, list), "a pair of numbers")
-        for end in ends:
-            _arguments.real(f"bounds of {name}", end)
     _check(chosen, free, starts, hold, stride, budget)
-    logs = (
-        [log] if isinstance(log, Log) else list(_arguments.instance("log", log, Sequence, "a log, or a list of logs"))
-    )
+    logs = [log] if isinstance(log, Log) else log
     cut = [window for one in logs for window in windows(one, chosen, restart, delay, horizon)]
     held = [i for i in range(len(cut)) if hold and i % hold == hold - 1]
     fitted = [i for i in range(len(cut)) if i not in held]

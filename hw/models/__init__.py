@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from crossbody.cases import _arguments, _registry
+from crossbody.cases._entry_points import checked_arguments
 
 if TYPE_CHECKING:
     from crossbody.hw.models._contract import Model
@@ -20,6 +21,7 @@ def names() -> tuple[str, ...]:
     return _registry.plugin_names(__name__, list(__path__))
 
 
+@checked_arguments
 def summary(name: str) -> str:
     """What a model is, in one line; imports nothing."""
     return _registry.summary(__name__, list(__path__), name)

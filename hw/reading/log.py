@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import SceneError, UnknownName, _arguments
+from crossbody.cases import SceneError, UnknownName
+from crossbody.cases._entry_points import checked_arguments, checked_fields
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading.columns import Role
 
@@ -90,6 +91,7 @@ class Provenance:
     about: str = ""
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Log:
     """What a rig recorded: one time axis, its channels, where they come from, what is doubtful about them.
@@ -125,6 +127,7 @@ class Log:
     def __len__(self) -> int:
         return len(self.time)
 
+    @checked_arguments
     def channel(self, role: Role | str, name: str) -> Channel:
         """One channel.
 
@@ -137,10 +140,12 @@ class Log:
             known = (f"{c.role}.{c.name}" for c in self.channels)
             raise UnknownName("channel", f"{role}.{name}", known) from None
 
+    @checked_arguments
     def names(self, role: Role | str) -> tuple[str, ...]:
         """Names of the channels of one role, in the order of the map."""
         return tuple(c.name for c in self.channels if c.role == role)
 
+    @checked_arguments
     def matrix(self, role: Role | str, names: Iterable[str] | None = None) -> Floats:
         """Values (n, k) of channels of one role, a column each, in the order of `names` (all if not given).
 
@@ -150,10 +155,12 @@ class Log:
         found = [self.channel(role, name).values for name in (self.names(role) if names is None else names)]
         return np.column_stack(found) if found else np.zeros((len(self), 0))
 
+    @checked_arguments
     def times(self, role: Role | str, name: str) -> Floats:
         """When the values of a channel were true: the log's times less the channel's delay (n,), s."""
         return self.time - self.channel(role, name).delay
 
+    @checked_arguments
     def window(self, start: float, stop: float) -> Log:
         """The rows with start <= time < stop, s; nothing is copied.
 
@@ -161,7 +168,6 @@ class Log:
             SceneError: if that leaves no row.
             InvalidValue: for what is no number.
         """
-        start, stop = _arguments.real("start", start), _arguments.real("stop", stop)
         a, b = np.searchsorted(self.time, (start, stop))
         if a >= b:
             raise SceneError(

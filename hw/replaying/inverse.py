@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crossbody.cases import SceneError, Value, _arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.engines._equations import system_of
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model, Segment
@@ -62,6 +63,7 @@ class _Balance:
     noise: Floats
 
 
+@checked_arguments
 def inverse(
     log: Log, model: str | Model, *, parameters: Mapping[str, Value] | None = None, delay: float = 0.0,
     half: int = HALF, degree: int = DEGREE, stride: int = 1,
@@ -93,6 +95,7 @@ def inverse(
     return _solved(balance, B, balance.needed, chosen, chosen.inputs, "N m", recorded)
 
 
+@checked_arguments
 def estimate_force(
     log: Log, model: str | Model, *, parameters: Mapping[str, Value] | None = None, delay: float = 0.0,
     half: int = HALF, degree: int = DEGREE, stride: int = 1,
@@ -160,8 +163,7 @@ def _balance(
     log: Log, model: Model, parameters: Mapping[str, Value] | None, delay: float, half: int, degree: int, stride: int
 ) -> _Balance:
     model.check_log(log)
-    delay = _arguments.real("delay", delay)
-    half, degree = _arguments.whole("half", half), _arguments.whole("degree", degree, 0)
+    half, degree = _arguments.whole("half", half), _arguments.whole("degree", degree, 2)
     stride = _arguments.whole("stride", stride)
     y, _ = model.read(model, log)
     rows = _rows(log, half, stride)

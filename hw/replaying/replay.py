@@ -18,8 +18,8 @@ from crossbody.cases import (
     Trajectory,
     UnknownName,
     Value,
-    _arguments,
 )
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
@@ -34,6 +34,7 @@ REFERENCE = {"rtol": 1e-8}
 """Settings of the reference: far below what a rig measures."""
 
 
+@checked_arguments
 def replay(
     log: Log, model: str | Model, *, kind: str = "forward", wanted: Sequence[str] = ("reference",),
     parameters: Mapping[str, Value] | None = None, restart: float | None = None, horizon: float | None = None,
@@ -67,10 +68,7 @@ def replay(
     """
     chosen = models.chosen(model)
     numbers = chosen.numbers(parameters)
-    wanted = _arguments.texts("wanted", wanted)
-    if settings is not None:
-        _arguments.instance("settings", settings, Mapping, "a table of names and values")
-    if _arguments.instance("kind", kind, str, f"one of {', '.join(KINDS)}") not in KINDS:
+    if kind not in KINDS:
         raise UnknownName("kind of replay", kind, KINDS)
     if kind == "closed_loop" and chosen.loop is None:
         raise InvalidValue(f"{chosen.name} has no controller; replay it forward.")

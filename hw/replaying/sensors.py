@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from crossbody.cases import InvalidValue, _arguments
+from crossbody.cases import InvalidValue
 from crossbody.cases._arrays import frozen
+from crossbody.cases._entry_points import checked_arguments, checked_fields
 
 Floats = NDArray[np.float64]
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor:
     """A sensor: y = ks/(s + ks) of the quantity a delay ago, rounded to counts.
@@ -36,10 +38,8 @@ class Sensor:
             InvalidValue: naming the attribute.
         """
         for name in ("rate", "quantum"):
-            if not 0.0 <= getattr(self, name) < math.inf:
+            if not getattr(self, name) >= 0.0:
                 raise InvalidValue(f"Sensor: {name} is {getattr(self, name)!r}; it must be at least 0.")
-        if not math.isfinite(self.delay):
-            raise InvalidValue(f"Sensor: delay is {self.delay!r} s; it must be finite.")
 
     def read(self, t: Floats, x: Floats, xd: Floats | None = None) -> Floats:
         """What it shows of x (n, k) at times t (n,), s.
@@ -86,6 +86,7 @@ class Unlagged:
     std: Floats
 
 
+@checked_arguments
 def unlagged(t: Floats, y: Floats, rate: float, noise: float, quantum: float = 0.0) -> Unlagged:
     """Undo a first-order lag: x_k = (y_(k+1) - c y_k)/(1 - c), c = e^(-ks (t_(k+1) - t_k)), for x that holds.
 
@@ -101,8 +102,6 @@ def unlagged(t: Floats, y: Floats, rate: float, noise: float, quantum: float = 0
     Raises:
         InvalidValue: for a rate or a noise outside its range.
     """
-    rate, noise = _arguments.real("rate", rate), _arguments.real("noise", noise)
-    quantum = _arguments.real("quantum", quantum)
     if not (0.0 < rate < math.inf and noise >= 0.0 and quantum >= 0.0):
         raise InvalidValue(f"rate is {rate!r} 1/s, noise {noise!r}, quantum {quantum!r}; valid: above 0, at least 0.")
     t, y = frozen("unlagged", "t", t, (None,)), frozen("unlagged", "y", y, (None, None))

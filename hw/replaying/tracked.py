@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from crossbody.cases import Value
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.engines._equations import system_of
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
@@ -21,6 +22,7 @@ from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, derivatives
 from crossbody.reference.linear import Unknown, filtered
 
 
+@checked_arguments
 def track_force(
     log: Log, model: str | Model, *, size: float, memory: float, parameters: Mapping[str, Value] | None = None,
     delay: float = 0.0, stride: int = 1,

@@ -16,6 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import lfilter
 
 from crossbody.cases import InvalidValue
+from crossbody.cases._entry_points import checked_arguments, checked_fields
 from crossbody.hw.checks.every import Checks
 from crossbody.hw.formats import Group
 from crossbody.hw.reading.columns import Role, Signal
@@ -29,6 +30,7 @@ ABOUT = "SYNTHETIC, no measurement: delta robot in MuJoCo"
 MOTORS = (0, 3, 6)
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensors:
     """What stands between the plant and its log; all of it is assumed.
@@ -69,6 +71,7 @@ class Sensors:
                 raise InvalidValue(f"Sensors: {field.name} is {value!r}; valid: {low:g} to {high:g}, finite.")
 
 
+@checked_arguments
 def delta_log(plant: Plant, sensors: Sensors | None = None, seed: int = 0) -> Log:
     """Measure a plant.
 

@@ -9,12 +9,14 @@ import numpy as np
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Inputs, InvalidValue, SceneError, Trajectory
+from crossbody.cases._entry_points import checked_arguments, checked_fields
 from crossbody.hw.reading.rows import Floats
 from crossbody.reference.delta import scene
 
 NAMES = ("torque 1 [N m]", "torque 2 [N m]", "torque 3 [N m]", "force x [N]", "force y [N]", "force z [N]")
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Push:
     """A constant force on the flange for a while; both ends are moved to the next tick of the controller.
@@ -55,6 +57,7 @@ class Plant:
     r: Floats
 
 
+@checked_arguments
 def delta_plant(pushes: Iterable[Push] = (), **parameters: float | int | str | bool) -> Plant:
     """Run the sampled closed loop of `delta_tracking` in MuJoCo.
 

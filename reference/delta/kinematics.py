@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, SceneError
+from crossbody.cases._arguments import shown
+from crossbody.cases._arrays import frozen, numbers
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference.delta.robot import Robot
 from crossbody.reference.systems import _delta_kinematics as compiled
@@ -22,9 +25,16 @@ def vector(name: str, value: ArrayLike, length: int) -> Floats:
     Raises:
         InvalidValue: if it has another shape or is not finite.
     """
-    array = np.ascontiguousarray(value, dtype=np.float64)
+    array: Floats
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        array = np.ascontiguousarray(value)
+    else:
+        try:
+            array = numbers("", name, value)
+        except SceneError:
+            raise InvalidValue(f"{name} is {shown(value)}; it must be {length} finite numbers.") from None
     if array.shape != (length,) or not np.all(np.isfinite(array)):
-        raise InvalidValue(f"{name} is {np.asarray(value).tolist()}; it must be {length} finite numbers.")
+        raise InvalidValue(f"{name} is {array.tolist()}; it must be {length} finite numbers.")
     return array
 
 
@@ -51,18 +61,21 @@ def _tips(robot: Robot, q: Floats) -> Floats:
     return turned
 
 
+@checked_arguments
 def flange(robot: Robot, q: ArrayLike) -> Floats:
     """Flange z = (psi(q1) + R2 psi(q2) + R3 psi(q3))/3 (3,), m."""
     mean: Floats = tips(robot, q).mean(axis=0)
     return mean
 
 
+@checked_arguments
 def flanges(robot: Robot, q: ArrayLike) -> Floats:
     """Flange (n, 3), m, of many poses q (n, 9)."""
-    mean: Floats = _tips(robot, np.asarray(q, dtype=np.float64)).mean(axis=-2)
+    mean: Floats = _tips(robot, frozen("flanges", "q", q, (None, 9))).mean(axis=-2)
     return mean
 
 
+@checked_arguments
 def inverse(robot: Robot, z: ArrayLike, *, outward: bool = True) -> Floats:
     """Angles (9,) that bring the flange to z, explicitly.
 
@@ -110,6 +123,7 @@ def _arm_inverse(robot: Robot, local: Floats, outward: bool) -> Floats:
     return np.array([q1, math.atan2(math.hypot(local[0], down), y), math.atan2(local[0], down)])
 
 
+@checked_arguments
 def forward(robot: Robot, y: ArrayLike, guess: ArrayLike | None = None) -> Floats:
     """Angles (9,) of the closed pose with these motor angles.
 
@@ -173,6 +187,7 @@ def inverse_of_spheres(robot: Robot, y: Floats) -> Floats:
     return np.column_stack([y, q2, np.arctan2(distal[:, 0], distal[:, 2])]).ravel()
 
 
+@checked_arguments
 def closed_pose(robot: Robot, q: ArrayLike, tolerance: float = 1e-9) -> Floats:
     """Check that a pose closes the loops.
 
@@ -190,6 +205,7 @@ def closed_pose(robot: Robot, q: ArrayLike, tolerance: float = 1e-9) -> Floats:
     )
 
 
+@checked_arguments
 def jacobians(robot: Robot, q: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Flange z (3,), control Jacobian Jy = dz/dy (3, 3) and X = dx/dy (6, 3) of a closed pose.
 
@@ -204,6 +220,7 @@ def jacobians(robot: Robot, q: ArrayLike) -> tuple[Floats, Floats, Floats]:
     return z, Jy, X
 
 
+@checked_arguments
 def virtual_jacobian(robot: Robot, q: ArrayLike) -> Floats:
     """Jv = [dpsi1, R2 dpsi2, R3 dpsi3]/3 (3, 9): a flange force f acts as Jv^T f on all nine joints."""
     angles = vector("q", q, 9).reshape(3, 3)

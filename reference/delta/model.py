@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, Law, SceneError
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.delta.kinematics import vector
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 ROWS = 6
 
 
+@checked_arguments
 def system(robot: Robot, *, p: float = 5.0, servo: Servo | None = None, program: Program | None = None) -> System:
     """The robot with its loops closed by h'' + 2 p h' + p^2 h = 0.
 
@@ -35,7 +37,7 @@ def system(robot: Robot, *, p: float = 5.0, servo: Servo | None = None, program:
         InvalidValue: if p is negative or not finite.
         SceneError: if both a servo and a program are given.
     """
-    if not 0 <= p < np.inf:
+    if not p >= 0.0:
         raise InvalidValue(f"p is {p!r} 1/s; it must be at least 0.")
     if servo is not None and program is not None:
         raise SceneError("Give either continuous servos or a sampled program, not both.")
@@ -60,6 +62,7 @@ def law_of(closed: System, law: Law) -> System:
     return replace(closed, a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral)
 
 
+@checked_arguments
 def kick(robot: Robot, q: ArrayLike, v: ArrayLike, impulse: ArrayLike) -> Floats:
     """Velocities (9,) behind a Dirac impulse on the flange.
 

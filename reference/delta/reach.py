@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases._arrays import frozen
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference.delta.kinematics import rotations
 from crossbody.reference.delta.robot import Robot
 
 
+@checked_arguments
 def inverses(robot: Robot, z: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
     """Angles that bring the flange to each of many positions, elbows outward, and where the robot reaches.
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 
 import numpy as np
 
 from crossbody.cases import InvalidValue
+from crossbody.cases._entry_points import checked_arguments, checked_fields
 from crossbody.reference._kinds import Floats
 from crossbody.reference.systems import _delta_arm as arm
 from crossbody.reference.systems import delta as kernels
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
     """Geometry, masses, gravity and friction (spec 3.2); the defaults are the `light` set.
@@ -50,14 +51,10 @@ class Robot:
         """
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name in ("g", "sign"):
-                good, valid = math.isfinite(value), "a finite number"
-            elif field.name in ("l1", "l2"):
-                good, valid = 0 < value < math.inf, "above 0 m"
-            else:
-                good, valid = 0 <= value < math.inf, "at least 0"
-            if not good:
-                raise InvalidValue(f"Robot: {field.name} is {value!r}; it must be {valid}.")
+            if field.name in ("l1", "l2") and not value > 0.0:
+                raise InvalidValue(f"Robot: {field.name} is {value!r}; it must be above 0 m.")
+            if field.name not in ("g", "sign") and not value >= 0.0:
+                raise InvalidValue(f"Robot: {field.name} is {value!r}; it must be at least 0.")
         if self.sign not in (1, -1):
             raise InvalidValue(f"Robot: sign is {self.sign!r}; it must be 1 or -1.")
         if self.m2 + self.m3 == 0 or self.m1 + self.m2 + self.jm == 0:
@@ -68,12 +65,14 @@ class Robot:
         """R = r_base - r_flange, m."""
         return self.r_base - self.r_flange
 
+    @checked_arguments
     def array(self, servo: Servo | None = None) -> Floats:
         """The parameters p of the kernels (n,)."""
         own = [getattr(self, name) for name in arm.NAMES]
         return np.array(own + (servo or Servo()).values(), dtype=np.float64)
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Servo:
     """Continuous PD servos on the motors; without gains they do nothing.
@@ -100,13 +99,10 @@ class Servo:
             InvalidValue: naming the attribute.
         """
         for name in ("kp", "kd"):
-            if not 0 <= getattr(self, name) < math.inf:
+            if not getattr(self, name) >= 0.0:
                 raise InvalidValue(f"Servo: {name} is {getattr(self, name)!r}; it must be at least 0.")
-        if not -math.inf < self.start <= self.end < math.inf:
+        if not self.start <= self.end:
             raise InvalidValue(f"Servo: start is {self.start} s and end {self.end} s; end must not be before start.")
-        for name in ("y_start", "y_end"):
-            if len(getattr(self, name)) != 3 or not np.all(np.isfinite(getattr(self, name))):
-                raise InvalidValue(f"Servo: {name} is {getattr(self, name)!r}; it must be three finite angles.")
 
     def values(self) -> list[float]:
         """Its part of the parameters, in the order of the kernels."""

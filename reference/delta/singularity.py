@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference.delta.kinematics import rotations, vector
 from crossbody.reference.delta.robot import Robot
@@ -30,6 +31,7 @@ class Margins:
     chart: Floats
 
 
+@checked_arguments
 def margins(robot: Robot, q: ArrayLike) -> Margins:
     """The distances of a pose q (9,) from the singularities."""
     a, b, c = np.reshape(vector("q", q, 9), (3, 3)).T
@@ -40,6 +42,7 @@ def margins(robot: Robot, q: ArrayLike) -> Margins:
     return Margins(direct=direct, inverse=np.abs(along), chart=np.abs(np.sin(b)))
 
 
+@checked_arguments
 def elbow_angle(robot: Robot) -> float:
     """The motor angle y* at which the three elbows coincide: R + l1 cos y* = 0, rad.
 
@@ -51,6 +54,7 @@ def elbow_angle(robot: Robot) -> float:
     return math.acos(-robot.offset / robot.l1)
 
 
+@checked_arguments
 def ill_posed_tilts(robot: Robot) -> Floats:
     """Directions (3, 3) of the distal links, unit vectors, at which H loses rank with the elbows together.
 
@@ -65,6 +69,7 @@ def ill_posed_tilts(robot: Robot) -> Floats:
     )
 
 
+@checked_arguments
 def pendulum_rate(robot: Robot) -> float:
     """Angular frequency of small swings with the elbows held together, rad/s.
 

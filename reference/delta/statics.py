@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, SceneError
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS, vector, virtual_jacobian
 from crossbody.reference.delta.robot import Robot
@@ -31,6 +32,7 @@ def gravity_gradient(robot: Robot, q: ArrayLike) -> Floats:
     return np.column_stack([-k1 * c1, -k2 * c2 * c3, k2 * s2 * s3]).ravel()
 
 
+@checked_arguments
 def gravity_torque(robot: Robot, q: ArrayLike, cutoff: float = 1e-3) -> tuple[Floats, Floats]:
     """Motor torques (3,), N m, and lam (6,), N, that hold a pose: [B H^T](tau; lam) = dV/dq.
 
@@ -46,6 +48,7 @@ def gravity_torque(robot: Robot, q: ArrayLike, cutoff: float = 1e-3) -> tuple[Fl
     return solution[:3], solution[3:]
 
 
+@checked_arguments
 def holding_pose(robot: Robot, y: float) -> Floats:
     """The symmetric pose (9,) with all motors at y and the flange on the axis below the elbows.
 
@@ -58,6 +61,7 @@ def holding_pose(robot: Robot, y: float) -> Floats:
     return np.tile([y, math.acos(c2), 0.0], 3)
 
 
+@checked_arguments
 def task_mass(robot: Robot, q: ArrayLike, *, exact: bool = True) -> Floats:
     """Mass matrix felt by the motors (3, 3), kg m^2.
 

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
 from crossbody.cases._arrays import frozen, full
-from crossbody.reference._entry_points import LARGEST, checked_arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.linear._derivatives import STEP, Point, dense, residual, terms
-from crossbody.reference.linear._unmeasured import Estimate, Record, Unknown, input_columns
+from crossbody.reference.linear._unmeasured import LARGEST, Estimate, Record, Unknown, input_columns
 
 
 @checked_arguments

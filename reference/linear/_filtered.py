@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
 from crossbody.cases._arrays import frozen, full
-from crossbody.reference._entry_points import LARGEST, checked_arguments, different
+from crossbody.cases._entry_points import checked_arguments
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.linear._kalman import Filter
 from crossbody.reference.linear._linearise import point
-from crossbody.reference.linear._unmeasured import Estimate, Record, Unknown
+from crossbody.reference.linear._unmeasured import LARGEST, Estimate, Record, Unknown
 
 
 @checked_arguments

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError, UnknownName
 from crossbody.cases._arrays import frozen
-from crossbody.reference._entry_points import checked_arguments, different
+from crossbody.cases._entry_points import checked_arguments
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._analytic import check_analytic

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
 from crossbody.cases._arrays import frozen
-from crossbody.reference._entry_points import checked_arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear import _compiled

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import EngineUnavailable, InvalidValue, SceneError, UnknownName
 from crossbody.cases._arrays import frozen
+from crossbody.cases._entry_points import checked_arguments, checked_fields
 from crossbody.reference._kinds import Floats, Index
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 Complex = NDArray[np.complex128]
 
 
+@checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearModel:
     """A state-space model whose rows and columns have names.
@@ -79,6 +81,7 @@ class LinearModel:
         found: Complex = np.linalg.eigvals(self.A).astype(np.complex128)
         return found[np.lexsort((-found.imag, -found.real))]
 
+    @checked_arguments
     def response(self, omega: ArrayLike) -> Complex:
         """Frequency response C (i w - A)^-1 B + D (m, ny, nu) at angular frequencies omega (m,), rad/s.
 
@@ -97,6 +100,7 @@ class LinearModel:
         found: Complex = (self.C @ solved + self.D).astype(np.complex128)
         return found
 
+    @checked_arguments
     def pick(self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None) -> LinearModel:
         """The same dynamics with some outputs and inputs only, in the order asked for.
 
@@ -110,6 +114,7 @@ class LinearModel:
             inputs=tuple(self.inputs[i] for i in columns), outputs=tuple(self.outputs[i] for i in rows),
         )  # fmt: skip
 
+    @checked_arguments
     def combined(self, weights: ArrayLike, outputs: Sequence[str]) -> LinearModel:
         """The outputs W y under new names; weights W is (len(outputs), ny)."""
         W = frozen("LinearModel.combined", "weights", weights, (len(outputs), len(self.outputs)))
@@ -133,6 +138,7 @@ class LinearModel:
             states=tuple(self.states[i] for i in kept),
         )  # fmt: skip
 
+    @checked_arguments
     def restricted(self, conditions: ArrayLike, tolerance: float = 1e-9, size: ArrayLike | None = None) -> LinearModel:
         """The same model on the subspace conditions @ dx = 0, which the dynamics must not leave.
 

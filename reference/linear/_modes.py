@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from crossbody.cases import InvalidValue
 from crossbody.cases._arguments import instance
 from crossbody.cases._arrays import frozen, is_number
-from crossbody.reference._entry_points import checked_arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference.linear._model import Complex, LinearModel
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError
-from crossbody.reference._entry_points import checked_arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear import _held

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
-from crossbody.reference._entry_points import checked_arguments
+from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes

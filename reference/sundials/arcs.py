@@ -2,7 +2,7 @@
 
     cvode            q' = v, v' from the KKT matrix
     ida, index 1     q' = v, M v' = f + H_A^T lam_A, active rows H M^-1 (f + H_A^T lam_A) + H' v + a1 h' + a0 h + a2 h^3
-                     = 0, else lam = 0; the multipliers are out of the error control
+                     = 0, else lam = 0; the multipliers are all but out of the error control
     ida, index 3     for bilateral rows h = 0 in the stabilised form of index 2 (Gear, Leimkuhler and Gupta 1985):
                      q' = v + H^T mu, h = 0, H v = 0; unilateral rows keep their law
 
@@ -36,7 +36,8 @@ CHUNK = 500  # internal steps between two looks at the clock
 TOO_MUCH_WORK = -1
 ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
 STALLED, DAMPED = 200, 0.3  # steps bound by stability; damping ratio: beyond both the arc is stiff
-UNWATCHED = 1e6  # N: multipliers follow from the state; at index 2 their errors are errors of the motion over the step
+UNWATCHED = 1e6  # N: in no error control
+LOOSE = 1e-2  # of the size of a multiplier: it follows from the state
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 FAR = 1e30  # beyond this a motion has diverged
 SAME_INSTANT = 8.0 * ULP
@@ -305,7 +306,7 @@ class IdaArc(Arc):
 
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
         ny, nc, nz, e = self.ny, self.scene.equations.system.nc, self.scene.nz, self.scene.equations
-        bilateral = ~np.asarray(e.system.unilateral, dtype=bool)
+        bilateral = e.system.held
         self.rigid = np.flatnonzero(bilateral).tolist() if self.options.index == 3 else []
         nb = len(self.rigid)
         self.lam, self.mu = slice(ny, ny + nc), slice(ny + nc, ny + nc + nb)
@@ -322,7 +323,7 @@ class IdaArc(Arc):
                 raise Ended(ENDS[code], e.active)
 
         own = self._tolerances()
-        atol = np.concatenate([own[:ny], np.full(nc + nb, UNWATCHED), own[ny:]])
+        atol = np.concatenate([own[:ny], self._watched(start), np.full(nb, UNWATCHED), own[ny:]])
         solver = IDA(
             residual, atol=atol, algebraic_idx=list(range(ny, ny + nc + nb)), first_step=self._first_step(),
             **self.common,
@@ -342,6 +343,21 @@ class IdaArc(Arc):
         H, X = e.mobility(start.t, start.q, start.v, e.active)
         masses: Floats = 1.0 / np.einsum("ij,ji->i", H, X)
         return masses
+
+    def _watched(self, start: State) -> Floats:
+        """Tolerance of every multiplier (nc,): loose, but not none, or Newton's iteration ends with any of them.
+
+        Then what it leaves keeps stiff contacts at order two and short steps. At index 2 their errors are errors of the
+        motion over the step, and they are left out.
+        """
+        e = self.scene.equations
+        found = np.full(e.system.nc, UNWATCHED)
+        if not self.rigid and e.active:
+            largest = float(max(np.abs(start.q).max(), np.abs(start.v).max()))
+            error = SHARE * (self.options.rtol * largest + self.options.tolerance)
+            noise, size = e.noise(start.t, start.q, start.v, self.scene.machine.fastest, error)
+            found[e.active] = (LOOSE * size + NOISY * noise)[e.active]
+        return found
 
     def _first_step(self) -> float:
         """0 to let IDA guess; at index 2 its guess is so short that it sees rounding over the step and nothing else."""

@@ -10,7 +10,7 @@ from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import gradient, touch
-from crossbody.reference.tree import forces, layout, sweeps
+from crossbody.reference.tree import forces, layout, loops, sweeps
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
 
@@ -70,15 +70,6 @@ def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
 
 
 @kernels.helper
-def _first_contact(p: Array, rows: int) -> int:
-    """Return the first row that is a contact of shapes; they stand behind all others."""
-    i, o = rows, int(p[layout.AT_ROW].real)
-    while i > 0 and int(p[o + layout.ROW * (i - 1)].real) == layout.CONTACT:
-        i -= 1
-    return i
-
-
-@kernels.helper
 def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
     """Return where the pair of row i stands in p, and gap, normal and place of its contact."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
@@ -88,16 +79,22 @@ def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
 
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
-    """Of every row; contacts of shapes need the poses of the bodies."""
-    first = _first_contact(p, len(h))
-    for i in range(first):
-        h[i], hd[i], _ = _row(q, v, p, i)
-    if first < len(h):
-        w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
+    """Of every row; where points or shapes of bodies are to meet their poses are computed first."""
+    size = 0
+    if p[layout.POSED].real > 0.0:
+        size = layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v)
+    w = np.empty(size, dtype=q.dtype)
+    if size > 0:
         sweeps.outwards(q, v, p, w)
-        for i in range(first, len(h)):
+    for i in range(len(h)):
+        kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real)
+        if kind == layout.CONNECT:
+            h[i], hd[i], _ = loops.connect(p, i, w)
+        elif kind == layout.CONTACT:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
+        else:
+            h[i], hd[i], _ = _row(q, v, p, i)
 
 
 @kernels.rows
@@ -105,7 +102,11 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
     """The active ones."""
     H[:na] = 0.0
     for j in range(na):
-        if int(p[int(p[layout.AT_ROW].real) + layout.ROW * idx[j]].real) == layout.CONTACT:
+        kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * idx[j]].real)
+        if kind == layout.CONNECT:
+            h[j], _, Hdv[j] = loops.connect(p, idx[j], w)
+            loops.connect_columns(p, idx[j], w, H[j])
+        elif kind == layout.CONTACT:
             at, (gap, n, place) = _contact(p, w, idx[j])
             h[j], Hdv[j] = gap[0], gap[2]
             gradient(p, w, at, n, place, H[j])

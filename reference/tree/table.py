@@ -203,6 +203,7 @@ class _Builder:
         )  # fmt: skip
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
         head[layout.RESTING] = self.resting
+        head[layout.POSED] = sum(row[layout.KIND] in (layout.CONNECT, layout.CONTACT) for row in rows)
         parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places)]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         where = [layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR]

@@ -156,7 +156,8 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     @cache_of_one
     def at(times: Floats) -> Trajectory:
         run = reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)).run()
-        return with_both_sides(run, first)
+        # A run that is asked for samples need not take the same steps: its events move by the tolerance.
+        return replace(with_both_sides(run, first), events=first.events, switches=first.switches)
 
     dense = at(sample_times(first, case.t_end))
     tier = Tier.D if other == "compiled" else Tier.C
@@ -219,27 +220,29 @@ def _growth(t: Floats, off: Floats) -> float:
 
 
 def with_both_sides(run: Trajectory, natural: Trajectory) -> Trajectory:
-    """A run sampled at given times, with the state after an event where an instant was asked for twice.
+    """A run sampled at given times, with the states at both sides of an event where an instant was asked for twice.
 
     Args:
-        run: sampled; an event's instant gives the state before it.
+        run: sampled; an event's instant gives the state before it, or after it where its own event came earlier.
         natural: the same run at its own steps, both sides of every event.
     """
     again = np.flatnonzero(run.t[1:] == run.t[:-1]) + 1
-    after = np.searchsorted(natural.t, run.t[again], side="right") - 1
-    known = natural.t[after] == run.t[again]
+    before, behind = (np.searchsorted(natural.t, run.t[again], side=side) for side in ("left", "right"))
+    twice = behind - before > 1
     rows: dict[str, Floats] = {}
+    at = np.concatenate([again[twice] - 1, again[twice]])
+    known = np.concatenate([before[twice], behind[twice] - 1])
     for name in ("q", "v", "gap", "lam", "energy", "mode"):
         rows[name] = getattr(run, name).copy()
-        rows[name][again[known]] = getattr(natural, name)[after[known]]
+        rows[name][at] = getattr(natural, name)[known]
     booked = run.ledger
     if booked is not None and natural.ledger is not None:
-        booked = _booked(booked, natural.ledger, again[known], after[known])
+        booked = _booked(booked, natural.ledger, at, known)
     return replace(run, ledger=booked, **rows)  # type: ignore[arg-type]
 
 
 def _booked(run: Ledger, natural: Ledger, at: NDArray[np.intp], after: NDArray[np.intp]) -> Ledger:
-    """The account behind an event: a collision in no time does its work at one instant."""
+    """The account on both sides of an event: a collision in no time does its work at one instant."""
     accounts = {name: getattr(run, name).copy() for name in ("contact", "input", "dissipated")}
     for name, account in accounts.items():
         account[at] = getattr(natural, name)[after]

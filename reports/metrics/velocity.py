@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import away
+from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -31,7 +32,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if not inside.any():
         return None
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
-    off = np.abs(run.v[inside] - exact.v)[smooth] / np.where(scale > 0.0, scale, 1.0)
+    off = np.abs(run.v[inside] - exact.v)[smooth] / scale
     return float(np.max(off, initial=0.0))
 
 
@@ -41,6 +42,7 @@ def _scale(exact: Trajectory, case: Case) -> Floats:
     units, of_q = (np.array([one.unit for one in named]) for named in (case.velocities, case.coordinates))
     sizes[list(case.quaternions)] = 1.0
     of_q[list(case.quaternions)] = "rad"
-    shared = np.array([own[units == unit].max() for unit in units])
+    shared = of_like(own, case.velocities)
     carrying = np.array([sizes[of_q == unit].max(initial=0.0) for unit in units]) / case.t_end
-    return np.where(shared > STILL * carrying, shared, carrying)
+    moving = np.where(shared > STILL * carrying, shared, carrying)
+    return np.maximum(moving, least(case.velocities, rates=True))
