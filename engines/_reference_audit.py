@@ -10,7 +10,6 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
 
-
 DEPENDENT = 1e6
 """Condition of H M^-1 H^T beyond which rounding of the rows alone parts two engines' multipliers by more than 1e-9."""
 

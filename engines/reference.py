@@ -62,9 +62,12 @@ def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
     from crossbody.cases.files.contacts import first_contact
     from crossbody.cases.files.reading import model_of
+    from crossbody.cases.scene_contacts import contacts
 
     model = model_of(Path(case.file), str(case.parameters.get("without", "")))
-    found = first_contact(model, run.t, run.q) if run.outcome.ok else ""
+    rows = contacts(case.scene) if case.scene is not None else ()
+    known = {frozenset((contact.first.name, contact.second.name)) for contact in rows}
+    found = first_contact(model, run.t, run.q, known) if run.outcome.ok else ""
     return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
 
