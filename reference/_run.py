@@ -16,6 +16,7 @@ from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
+from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
 from crossbody.reference.core._struct import table
@@ -97,8 +98,9 @@ class CompiledRun:
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
-            "loops": system.solve is None and not np.all(system.unilateral),
-            "keep_events": options.events, "has_control": system.control is not None,
+            "loops": system.solve is None and bool(np.any(system.held)),
+            "keep_events": options.events, "has_energy": system.energy is not _none.energy,
+            "has_control": system.control is not None,
             "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
             "tick": system.tick,
         }  # fmt: skip
@@ -140,7 +142,7 @@ class CompiledRun:
                     return Outcome.STEP_LIMIT
                 code = self.slice(min(budget, limit - steps))
                 if code == layout.DONE:
-                    return Outcome.FINISHED if self._finite_rows() == self.state["rows"][0] else Outcome.NOT_FINITE
+                    return Outcome.NOT_FINITE if self.state["spoilt"][0] else Outcome.FINISHED
                 if code < 0:
                     return self._ended(code)
                 self._grow(code)
@@ -192,7 +194,7 @@ class CompiledRun:
             self.buffers["modes"][0] = self._modes
         cuts = np.cumsum([1, nq, n, nc, nc, 2])
         t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
-        return Trajectory(
+        run = Trajectory(
             t=t[:, 0], q=self.system.normalised("run", q), v=v,
             gap=gap, lam=lam, energy=energy, mode=self.buffers["modes"][: len(rows)],
             events=self._event_list(), switches=self._switch_list(), outcome=outcome, message=self._message(outcome),
@@ -204,6 +206,7 @@ class CompiledRun:
             if self.nz
             else None,
         )  # fmt: skip
+        return watched(self.system, run)
 
     def _event_list(self) -> tuple[Event, ...]:
         count = int(self.state["events"][0]) if self.options.events else 0

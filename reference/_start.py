@@ -91,7 +91,9 @@ def _may_hold(system: System) -> NDArray[np.bool_]:
 
 
 def _held(system: System, modes: Bytes) -> Index:
-    return np.flatnonzero(_may_hold(system) & (modes == Mode.BILATERAL))
+    on = modes == Mode.BILATERAL
+    on[np.asarray(system.redundant)] = True  # held by the others, if they are held at the start
+    return np.flatnonzero(_may_hold(system) & on)
 
 
 def _placed(system: System, held: Index) -> NDArray[np.bool_]:

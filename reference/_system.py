@@ -8,13 +8,14 @@ from typing import Any
 
 import numba.core.config as numba_config
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import SceneError
 from crossbody.cases._arguments import flag, shown
 from crossbody.cases._arrays import frozen, full, is_number
 from crossbody.cases._entry_points import checked_arguments, finite
 from crossbody.reference import kernels as kernel_types
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
 
@@ -41,6 +42,8 @@ class System:
         a0, a1, a2 (nc,): slow constants of every row; a number serves all rows (spec 1.1).
         b0, b1, b2 (nc,): fast constants of COLLISION; b0 = 0 where a row has one set only.
         unilateral (nc,): False for a row that is always on.
+        redundant: indices of rows that are always on but follow from the others: they are held by these and stay off,
+            mode FREE with a multiplier of 0. A run in which their gaps open ends as inconsistent.
         follows (nc,): index of the row whose activity this one shares (a slip row follows its normal row); -1 none.
         mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
         inputs: nu, length of u.
@@ -78,6 +81,7 @@ class System:
     b1: ArrayLike = 0.0
     b2: ArrayLike = 0.0
     unilateral: ArrayLike = True
+    redundant: ArrayLike = ()
     follows: ArrayLike = -1
     nq: int = 0
     quaternions: ArrayLike = ()
@@ -113,6 +117,9 @@ class System:
             raise SceneError(f"System.unilateral is {shown(self.unilateral)}; valid: True, False.")
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
+        put(self, "redundant", different("System.redundant", np.asarray(self.redundant, dtype=np.int64).tolist(), nc))
+        if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
+            raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
         put(self, "discrete", frozen("System", "discrete", self.discrete, (None,)))
         state = np.concatenate([self.discrete, np.zeros(self.latched)])
@@ -129,6 +136,13 @@ class System:
     def nc(self) -> int:
         """Number of constraint rows."""
         return len(self.alpha)
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Which rows (nc,) are always on, without those that follow from them."""
+        held: NDArray[np.bool_] = np.asarray(self.unilateral) == 0
+        held[np.asarray(self.redundant)] = False
+        return held
 
     @property
     def quaternion_entries(self) -> Index:
@@ -341,5 +355,5 @@ class System:
 
 
 def initial_modes(system: System) -> Bytes:
-    """FREE for every unilateral row, BILATERAL for every other; settling does the rest."""
-    return np.where(np.asarray(system.unilateral, dtype=bool), 0, 5).astype(np.int8)
+    """BILATERAL for every row that holds the others, FREE for every other; settling does the rest."""
+    return np.where(system.held, 5, 0).astype(np.int8)

@@ -12,7 +12,10 @@ def main() -> None:
     signal.signal(signal.SIGINT, _leave)
     from crossbody.reports import cli
 
-    cli.main()
+    try:
+        cli.main()
+    finally:  # what is done is done; the interpreter goes back to the default at its end, which would say nothing
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _leave(_number: int, _frame: FrameType | None) -> None:

@@ -290,3 +290,48 @@ def test_a_reader_that_has_enough_is_no_fault(tmp_path: Path) -> None:
     with process.stderr as said:
         assert said.read() == ""
     assert process.wait(timeout=20) == 0
+
+
+LATE = """
+class Late:
+    def __del__(self, end=__import__("os").kill, own=__import__("os").getpid(), number=2):
+        end(own, number)
+
+late = Late()
+"""
+
+
+def test_an_interrupt_while_the_interpreter_ends_does_not_end_it_by_a_signal(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", LATE + ENTRY, "list"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60).returncode == 0
+
+
+@pytest.mark.parametrize(("ended", "wanted"), [(0, 0), (1, 1), (130, 130), (3, 130)])
+def test_a_command_that_was_at_its_end_was_not_interrupted(
+    ended: int, wanted: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it wrote stands: to say that nothing was replaced would be wrong."""
+    monkeypatch.setattr(watch._Watch, "wait", lambda _: (ended << 8, signal.SIGINT))
+    assert watch.watched(lambda: 0) == wanted
+
+
+@pytest.mark.slow
+def test_a_report_is_interrupted_in_a_sentence_at_any_instant(tmp_path: Path) -> None:
+    rng = random.Random(5)
+    code, said = finished(begun("run", "balls.py", "-e", "fake:exact", "--quiet", cwd=tmp_path))
+    assert code in (0, 1), said
+    command = [sys.executable, "-c", ENTRY, "report", "out"]
+    spent = time.monotonic()
+    subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=120)
+    spent = time.monotonic() - spent
+    before = content(tmp_path / "out")
+    for _ in range(20):
+        process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(spent * rng.choice((rng.random(), rng.uniform(0.9, 1.0))))
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=20)
+        assert process.returncode in (0, 130), said
+        assert (process.returncode == 0) == ("interrupted" not in said), said
+        assert content(tmp_path / "out").keys() == before.keys()

@@ -111,6 +111,14 @@ def test_dropped_samples_are_counted() -> None:
     assert finding.text.startswith("3 samples")
 
 
+@pytest.mark.parametrize(("step", "given", "told"), [(1e3, None, True), (50.0, None, False), (1e3, 1e3, False)])
+def test_steps_of_minutes_are_doubted_unless_the_map_says_so(step: float, given: float | None, told: bool) -> None:
+    """Microseconds whose map says seconds."""
+    clock = ClockCheck(given)
+    clock.see(np.arange(500), step * np.arange(500))
+    assert [f.check for f in clock.findings()] == ["sample_time"] * told
+
+
 @pytest.mark.parametrize("factor", [1e-3, 0.5, 2.0, 1e3])
 def test_a_wrong_unit_of_time_is_a_fault(factor: float) -> None:
     (finding,) = blocks(ClockCheck(STEP), [1], np.arange(300) * STEP * factor).findings()

@@ -195,6 +195,36 @@ def _swapped(seed: int, kind: str) -> None:
         assert [f.check for f in findings(motion, motion.q, v) if f.fault] == ["rates"]
 
 
+def _biased(seed: int, kind: str) -> None:
+    """A rate that is off by a constant, up to many times its own size."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 9])
+    if not judged(motion):
+        return
+    noise = np.std(np.diff(motion.q)) / motion.step / np.sqrt(len(motion.q))
+    bias = float(random.choice([-1.0, 1.0]) * np.exp(random.uniform(np.log(0.3), np.log(100.0))))
+    bias *= float(np.abs(motion.v).mean()) + noise
+    (found,) = findings(motion, motion.q, motion.v + bias)
+    if found.check == "gain":  # of a motion that goes one way, mostly
+        assert abs(motion.v.mean()) > 0.2 * np.abs(motion.v).mean()
+        return
+    assert found.check == "bias"
+    told, unsure = (float(found.text.split(part)[1].split(")")[0].split(" ")[0]) for part in ("by ", "+- "))
+    assert abs(told - bias) <= 2.0 * unsure + 0.03 * float(np.abs(motion.v).mean()) + 0.01 * abs(bias)
+
+
+def _differences(seed: int, kind: str) -> None:
+    """A rate by differences of an encoder, whose levels are few, is no channel at the end of its range."""
+    motion, random = draw(seed, kind), np.random.default_rng([seed, 10])
+    grid = 2.0 * np.pi / 2.0 ** random.integers(10, 17)
+    q = grid * np.rint(motion.q / grid)
+    v = np.diff(q, prepend=q[0]) / motion.step
+    v[0] = random.choice([0.0, motion.v[0], v[1]])
+    check = ValueCheck("velocities.q", "rad/s")
+    check.see(np.arange(len(v)), motion.t, np.array([float(f"{one:.12g}") for one in v]))
+    assert [f.check for f in check.findings()] == []
+    assert [f.check for f in findings(motion, q, v) if f.check not in ("stuck", "saturated")] == []
+
+
 def judged(motion: Motion) -> bool:
     check = RateCheck("q")
     check.see(np.arange(len(motion.q)), motion.t, motion.q, motion.v)
@@ -206,6 +236,7 @@ LAWS = {
     "slow-slips": (_slow_slips, KINDS), "long-slips": (_long_slips, MOVING), "spikes": (_spikes, KINDS),
     "degrees": (_degrees, (*MOVING, "spin")), "gains": (_gains, MOVING[:3]),
     "stuck": (_stuck, MOVING), "saturated": (_saturated, ("sines", "swing")), "swapped": (_swapped, MOVING[:3]),
+    "biased": (_biased, MOVING[:3]), "differences": (_differences, MOVING[:3]),
 }  # fmt: skip
 CASES = [(law, kind) for law, (_, kinds) in LAWS.items() for kind in kinds]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_walls import drawn, known
+from springs import drawn, known
 
 from crossbody.cases import Mode
 from crossbody.reference import simulate

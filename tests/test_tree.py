@@ -91,12 +91,47 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     rng, table, step = np.random.default_rng(seed), tabulate(scene), 1e-30
     q, v, _ = random_state(scene, rng)
     H, h, Hdv = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count)
-    mechanism.rows(0.0, q, v, table.p, np.zeros(table.scratch), np.arange(count), count, H, h, Hdv)
+    w = np.zeros(table.scratch)
+    still = np.zeros(len(scene.actuators))
+    mechanism.dynamics(0.0, q, v, still, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
+    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
     mechanism.gaps(0.0, q + 1j * step * rates(scene, q, v), v.astype(complex), table.p.astype(complex), *moved)
     assert close(moved[0].real, h)
     assert close(moved[0].imag / step, H @ v)
     assert close(moved[1].imag / step, Hdv)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_points_that_meet_are_those_of_mujoco(seed: int) -> None:
+    """Gaps, rows and their rates of `connect`; H'v by what MuJoCo's rows are at two instants of a motion."""
+    scene = random_scene(seed)
+    joined = [loop for loop in scene.loops if loop.type == "connect"]
+    if not joined:
+        return
+    scene = scene.replace(loops=tuple(joined))
+    model = build.compiled(build.spec_of(scene), scene)
+    data, table, rng = mujoco.MjData(model), tabulate(scene), np.random.default_rng(seed)
+
+    def look(q: Any, v: Any) -> tuple[Any, Any]:
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        return np.array(data.efc_pos[:3]), np.array(data.efc_J).reshape(-1, model.nv)[:3]
+
+    q, v, u = random_state(scene, rng)
+    h, J = look(q, v)
+    if not len(h):
+        return  # MuJoCo leaves out rows that nothing moves
+    H, mine, Hdv, w = np.zeros((3, scene.nv)), np.zeros(3), np.zeros(3), np.zeros(table.scratch)
+    mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
+    mechanism.rows(0.0, q, v, table.p, w, np.arange(3), 3, H, mine, Hdv)
+    assert close(mine, h)
+    assert close(H, J)
+    step, ends = 1e-6, [np.array(q), np.array(q)]
+    mujoco.mj_integratePos(model, ends[0], v, step)
+    mujoco.mj_integratePos(model, ends[1], v, -step)
+    moved = (look(ends[0], v)[1] - look(ends[1], v)[1]) @ v / (2.0 * step)
+    assert np.abs(moved - Hdv).max() <= 1e-7 * max(1.0, np.abs(Hdv).max())
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -14,6 +14,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
 from crossbody.cases._errors import SceneError, UnknownName
 from crossbody.cases._rotations import normalised
+from crossbody.cases.files.assemble import assembled
 from crossbody.cases.files.controls import read_controls
 from crossbody.cases.files.reading import findings_of, model_of, scene_of
 from crossbody.cases.scene import RowLaw, Scene
@@ -25,6 +26,7 @@ PARAMETERS = {
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
     "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
+    "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
 
@@ -56,6 +58,8 @@ class FileCase:
         """Return the case of one keyframe."""
         index = list(self.VARIANTS).index(variant) if self.model.nkey else -1
         q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
+        if p["assemble"]:
+            q0 = assembled(model_of(self.path, str(p["without"])), q0)
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))

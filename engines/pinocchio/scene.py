@@ -12,6 +12,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import _scene as parts
 from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio._joined import Joined, by_least_norm
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -33,7 +34,7 @@ def build(case: Case, algebra: str) -> Prepared:
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     forces = parts.Forces(scene)
-    rows = parts.Rows(scene, forces)
+    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if loop.type != "connect")), forces)
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
@@ -44,17 +45,38 @@ def build(case: Case, algebra: str) -> Prepared:
         ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
         tau[:] = to.back(q, ours) + lifted(scene, model, data, placed, q)
 
-    pinned = PinRows(
-        model, jacobian=lambda q: to.back(q, rows.jacobian(to.ours(q))), heights=lambda q: rows.heights(to.ours(q)),
-        drift=lambda q, v: rows.drift(to.ours(q), to.velocities(q, v)), law=case.law, algebra=algebra, forces=apply,
-    )  # fmt: skip
+    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type == "connect"))
+    order = _order(scene)
+
+    def heights(q: Floats) -> Floats:
+        return np.concatenate([rows.heights(to.ours(q)), joined.heights(q)])[order]
+
+    def jacobian(q: Floats) -> Floats:
+        return np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q)])[order]
+
+    def drift(q: Floats, v: Floats) -> Floats:
+        return np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v)])[order]
+
+    pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
+    if joined.ends:  # planar loops have rows that depend on each other
+        pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
     start = to.theirs(case.q0)
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, forces, rows, to), sizes=(np.ones(to.nq), np.ones(to.nv)),
+        rows=pinned, observe=_observe(scene, model, forces, heights, to), sizes=(np.ones(to.nq), np.ones(to.nv)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def _order(scene: Scene) -> list[int]:
+    """Return where each row of a scene stands where all of `connect` come last."""
+    wide = np.repeat([loop.type == "connect" for loop in scene.loops], [loop.width for loop in scene.loops])
+    bounds = np.isfinite([part.range for part in scene.bounded]).sum()
+    last = np.concatenate([wide, np.zeros(bounds)]).astype(bool)
+    stands = np.empty(len(last), dtype=int)
+    stands[np.concatenate([np.flatnonzero(~last), np.flatnonzero(last)])] = np.arange(len(last))
+    return list(stands.tolist())
 
 
 def tree(scene: Scene) -> tuple[Any, Placed]:
@@ -111,7 +133,7 @@ def lifted(scene: Scene, model: Any, data: Any, placed: Placed, q: Floats) -> Fl
     return total
 
 
-def _observe(scene: Scene, model: Any, forces: parts.Forces, rows: parts.Rows, to: Coordinates) -> Any:
+def _observe(scene: Scene, model: Any, forces: parts.Forces, heights: Any, to: Coordinates) -> Any:
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
     placed = tree(scene)[1]
@@ -129,7 +151,7 @@ def _observe(scene: Scene, model: Any, forces: parts.Forces, rows: parts.Rows, t
                     energy[i, 1] += body.weightless * body.mass * height
         at = to.ours(q)
         energy[:, 1] += forces.energy(at)
-        return np.array([rows.heights(one) for one in at]).reshape(len(q), -1), energy
+        return np.array([heights(one) for one in q]).reshape(len(q), -1), energy
 
     return observe
 

@@ -16,6 +16,7 @@ GAP = 1.5  # sample times: a longer step lacks samples
 UNIT_WRONG = 1.5  # ratio of median step to nominal step that no clock explains
 EARLY = 1000  # steps that tell the sample time
 JITTER = 0.1  # sample times
+NO_RIGS = 100.0  # s: a step in seconds; with `sample_time` in the map a log may be as slow as it likes
 
 
 @dataclass(slots=True)
@@ -149,6 +150,9 @@ class ClockCheck:
         return [f for f in told if f.fault] + wrong if wrong else told + self._about_drift()
 
     def _unit_is_wrong(self) -> list[Finding]:
+        if self.given is None and self.median >= NO_RIGS:
+            text = f"the step is {self.median:.6g} s, as no rig's; is the unit of time right?"
+            return [Finding(check="sample_time", fault=False, channel="time", row=0, t=self.start, count=1, text=text)]
         if self.given is None or not self._early:
             return []
         if 1.0 / UNIT_WRONG < self.median / self.given < UNIT_WRONG:

@@ -24,6 +24,7 @@ MOVING = 0.1  # of the change that few spans exceed
 USUAL = 0.95  # quantile of spans
 FAR = 4.0  # times what few spans disagree by
 SURE = 5.0  # standard errors
+MOST_ALIKE = 0.99  # correlation of what neighbouring spans are apart by
 UNRESOLVED = 2.0  # sample times that a change of the rate may be early or late by
 UNITS = {
     "degrees taken for radians": TURN / 360.0, "radians taken for degrees": 360.0 / TURN,
@@ -63,6 +64,8 @@ class RateCheck:
         self._n, self._left, self._loose = 0, 0.0, 0.0
         self._moved = np.zeros((2, 3))  # of all spans and usual ones: how many, squares of dq, products of two
         self._products = np.zeros((3, 3))  # of dq, the integral of v and the change of v
+        self._totals = np.zeros(4)  # of usual spans: dq, the integral of v, the size of dq, time
+        self._apart = np.zeros(2)  # squares of what the integral of v is more than dq, and its products with the next
         self._quantum, self._step = np.inf, np.nan
         self._tail: tuple[Rows, Floats, Floats, Floats] | None = None
         self._worst: tuple[float, float, int, float] | None = None
@@ -91,6 +94,9 @@ class RateCheck:
         usual = spans[:, _usual(spans)]
         self._n += usual.shape[1]
         self._products += np.einsum("ik,jk->ij", usual, usual)  # no BLAS: its threads cost more
+        apart, length = usual[1] - usual[0], float(times[-1] - times[0]) * usual.shape[1] / len(dq)
+        self._totals += usual[0].sum(), usual[1].sum(), np.abs(usual[0]).sum(), length
+        self._apart += (apart * apart).sum(), (apart[1:] * apart[:-1]).sum()
         for sums, change in zip(self._moved, (dq, usual[0]), strict=True):
             sums += len(change), (change * change).sum(), (change[1:] * change[:-1]).sum()
         self._remember(dq, spans[1], rows[at[:-1]], times[at[:-1]])
@@ -156,12 +162,14 @@ class RateCheck:
     def findings(self) -> list[Finding]:
         """Whether the two belong together; nothing if there is too little motion to tell."""
         if not self._moves():
-            return []
+            return self._about_bias(fault=False)  # slow as the motion may be, all of it together tells this
         (dq2, both, _), iv2 = self._products[0], self._products[1, 1]
         gain = both / iv2 if iv2 else np.inf
         alike = both / np.sqrt(dq2 * iv2) if iv2 else 0.0
         if GAIN[0] < gain < GAIN[1] and alike > ALIKE:
-            return self._about_line() or self._slips.findings()
+            return self._about_line() or self._about_bias(fault=False) or self._slips.findings()
+        if found := self._about_bias(fault=True):
+            return found
         if self._worst is None:
             return []
         dq, iv, row, t = self._worst
@@ -187,6 +195,35 @@ class RateCheck:
             text = f"the coordinate moves {far}: is a scale off?"
             return [self._told("gain", text, row, t)]
         return []
+
+    def _about_bias(self, fault: bool) -> list[Finding]:
+        """A rate that is off by a constant, and belongs to its coordinate without that.
+
+        The integral of the rate is more than the whole change of the coordinate by the bias times the time. A gain or
+        a delay that is within its limits leaves at most a part of the way; noise leaves the scatter of the spans,
+        which are taken for an autoregressive series of first order.
+        """
+        (dq, iv, way, length), n = self._totals, self._n
+        if n < FEWEST or not length > 0.0:
+            return []
+        bias, span = (iv - dq) / length, length / n
+        square, next_ = self._apart - n * (bias * span) ** 2
+        alike = min(max(next_ / square, 0.0), MOST_ALIKE) if square > 0.0 else 0.0
+        unsure = math.sqrt(max(square, 0.0) * (1.0 + alike) / (1.0 - alike)) / length
+        if not abs(bias) > max(OFF * way / length, SURE * unsure):
+            return []
+        (dq2, both, _), iv2 = self._products[0], self._products[1, 1]
+        iv2 += bias * span * (n * bias * span - 2.0 * iv)
+        both -= bias * span * dq
+        if not (iv2 > 0.0 and GAIN[0] < both / iv2 < GAIN[1] and both > ALIKE * math.sqrt(dq2 * iv2)):
+            return []
+        unit = "rad/s" if self._rotates else "m/s"
+        text = (
+            f"the velocity is biased by {bias:+.3g} (+- {2.0 * unsure:.2g}) {unit}: over {length:.3g} s it integrates "
+            f"to {iv:.3g} where the coordinate changes by {dq:.3g}."
+        )
+        row, t = (self._worst[2:]) if self._worst is not None else (0, np.nan)
+        return [self._told("bias", text, row, t, fault=fault)]
 
     def _told(self, check: str, text: str, row: int, t: float, fault: bool = False) -> Finding:
         channel = f"coordinates.{self._name}"

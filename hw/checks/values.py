@@ -16,6 +16,8 @@ NEAR, FAR = 10, 50  # samples before a run
 CUT = 0.15  # of the way of the last 50 samples, in the last 10: 0.04 where a motion comes to rest, 0.2 where it is cut
 STEPS = 6  # of the encoder's grid: where a slow parabola turns on a grid, the last 10 samples cover less
 HALF = 0.5  # of the largest step: a channel that froze while it moved goes on with a jump
+RARE = 0.02  # of the steps: the first of a difference, a value of its own
+ROUNDING = 1e-9  # of the largest value: differences of counts that were written with 10 digits
 MOST = 8  # runs of a block that are looked at
 
 
@@ -133,7 +135,7 @@ class Runs:
         starts = np.flatnonzero(steps != 0.0)  # NaN differs from everything
         moved = steps[starts]
         moved = moved[np.isfinite(moved)]
-        self._grid = min(self._grid, float(moved.min(initial=np.inf)))
+        self._look_for_grid(moved, float(np.abs(values).max()))
         self._largest = max(self._largest, float(moved.max(initial=0.0)))
         head = int(starts[0]) if len(starts) else len(values)
         self._open.count += head
@@ -153,6 +155,13 @@ class Runs:
                 self._open = run
             self._value = float(values[-1])
         self._tail = whole[-FAR:]
+
+    def _look_for_grid(self, moved: Floats, largest: float) -> None:
+        """The smallest step, but for rare ones and for the rounding of what was computed from counts."""
+        steps = moved[moved > ROUNDING * largest]
+        rare = int(RARE * len(steps))
+        if len(steps) and (rare or self._grid == np.inf):
+            self._grid = min(self._grid, float(np.partition(steps, rare)[rare]))
 
     @staticmethod
     def _entered(whole: Floats, at: int) -> Run:

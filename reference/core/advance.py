@@ -17,6 +17,7 @@ from crossbody.reference.core import (
     exact,
     folds,
     journal,
+    peaks,
     record,
     settle,
     stepping,
@@ -90,8 +91,9 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if code != 0:
         return int(code)
     s.unsettled = 0
+    peaks.forget(s, w, b.mode)
     s.method = EXPLICIT
-    s.stalled, s.hold, s.full_jacobian, s.have_slopes = 0, 0, 0, 0
+    s.stalled, s.hold, s.full_jacobian = 0, 0, 0
     s.h = s.h_active if s.na > 0 else s.h_free
     return ILL_POSED if s.loops and folds.begin(K, s, m, w) != 0 else 0
 
@@ -194,7 +196,9 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     fired = s.theta <= 1.0
     at_stop = s.t_old + s.hs >= s.stop - 4.0 * ULP * abs(s.stop)
     t = s.t_old + s.theta * s.hs if fired else (s.stop if at_stop else s.t_old + s.hs)
+    before_rows = s.rhs
     record.within_step(K, s, m, w, b.mode, b.samples, t, b.out, b.modes)
+    s.trial_rhs += s.rhs - before_rows  # what is written down is no work of the method, and chooses none
     if fired:
         _land(K, s, m, w)
         _remember_step(s, before)
@@ -238,6 +242,7 @@ def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         for i in range(s.nc):
             s.switching |= m.unilateral[i]
         s.history_t, s.collision_t = np.inf, np.inf
+        w.highest[:] = -np.inf
         lost = s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST
         _take_inputs(K, s, m, w, b)
         if s.audited:

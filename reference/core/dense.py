@@ -14,7 +14,8 @@ from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, Model, Wo
 CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one's residue vanish in rounding
 RESOLVED = 2.0  # |p| h of the rows' fastest pole p, above which a step tells a gap worse than its law does
 BEND_PART = 1e-3  # of the step, along which the slope of q' is taken
-ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's
+ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's: rounding,
+ARRIVED_PART = 0.1  # or this part of the relative tolerance
 
 
 @compiled
@@ -118,38 +119,42 @@ def _shift(K: Any, s: Any, m: Model, w: Work, t: float, q: Array) -> None:
 
 
 @compiled
-def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
+def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> bool:
     """Move out = (q, v), at the part theta of a step that is long for the rows, to where their law has their gaps.
 
     A gap under a linear law is known in closed form whatever the masses do. A long step knows it to the tolerance only,
     and the interpolant across curved rows no better: times a0 that drowns the multiplier of a stiff row, and its root
     is the rate of a row that is let go from rest and falls back. The correction is the least one in the metric of M.
     Rows with a cubic term that counts are left as they are.
+
+    Returns:
+        Whether the workspace holds the acceleration and the multipliers there, so that they need not be evaluated.
     """
-    if not long_for_rows(s) or s.na == 0 or not exact.is_linear(s, w):
-        return
+    if theta == 0.0 or not long_for_rows(s) or s.na == 0 or not exact.is_linear(s, w):
+        return False
     q, v = out[: s.nq], out[s.nq :]
     t = theta * s.hs
     for _ in range(CORRECTIONS):
         if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t_old + t, q, v, GENERAL) != 0:
-            return
+            return False
         missing = 0.0
         for j in range(s.na):
             i = w.idx[j]
             a0, a1 = w.law[i, 0], w.law[i, 1]
             h, hd = exact.linear_arc(a0, a1, w.gaps[0, i], w.rates[0, i], t)
             # A law without a0 has no memory of a position: its gap may be anything, and only its rate is the law's.
-            w.r[j], w.hda[j] = h - w.ha[j] if a0 > 0.0 else 0.0, hd - w.hda[j]
-            missing = max(missing, (a0 * abs(w.r[j]) + a1 * abs(w.hda[j])) / max(w.scale[j], 1e-300))
-        if missing <= ARRIVED:
-            return
+            w.r[j], w.rate[j] = h - w.ha[j] if a0 > 0.0 else 0.0, hd - w.hda[j]
+            missing = max(missing, (a0 * abs(w.r[j]) + a1 * abs(w.rate[j])) / max(w.scale[j], 1e-300))
+        if missing <= max(ARRIVED, ARRIVED_PART * s.rtol):
+            return not s.has_solve
         solve_schur(w.G, s.na, w.reach, w.r, w.la)
         if s.has_velocity:
             _shift(K, s, m, w, s.t_old + t, q)
         else:
             push_rows(m, w, s.na, w.la, 1.0, q)
-        solve_schur(w.G, s.na, w.reach, w.hda, w.la)
+        solve_schur(w.G, s.na, w.reach, w.rate, w.la)
         push_rows(m, w, s.na, w.la, 1.0, v)
+    return False
 
 
 @inlined

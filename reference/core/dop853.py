@@ -25,10 +25,16 @@ START, SECOND = np.arange(2)  # stages, as values
 @compiled
 def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> int:
     """k[stage] = (q', v'), and the powers of the ledger if it is kept."""
-    n, nq = s.n, s.nq
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[:nq], y[nq:], OWN) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], OWN) != 0:
         return 1
-    k, vd = w.k[stage], w.vd
+    keep(K, s, m, w, t, y, stage)
+    return 0
+
+
+@inlined
+def keep(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> None:
+    """k[stage] = (q', v') from the acceleration in the workspace, and the powers."""
+    n, nq, k, vd = s.n, s.nq, w.k[stage], w.vd
     if s.has_velocity:
         K.velocity(t, y[:nq], y[nq:], m.p, k[:nq])
     else:
@@ -38,7 +44,6 @@ def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int
         k[nq + i] = vd[i]
     if s.ledger:
         powers(K, s, m, w, t, y, stage)
-    return 0
 
 
 @inlined

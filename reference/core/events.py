@@ -104,13 +104,13 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     """Gaps and rates, and the multipliers if asked, at the inner nodes; at the end as well where the rows move it."""
     for node in range(1, NODES if s.method == EXPLICIT and dense.long_for_rows(s) else NODES - 1):
         dense.state(s, m, w, at_node(node), w.ys)
-        dense.put_on_rows(K, s, m, w, at_node(node), w.ys)
+        known = dense.put_on_rows(K, s, m, w, at_node(node), w.ys)
         t = s.t_old + at_node(node) * s.hs
         q, v = w.ys[: s.nq], w.ys[s.nq :]
         K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])
         s.guards += 1
         if multipliers:
-            if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
+            if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
                 return 1
             scatter(s, w, w.lams[node])
     return 0

@@ -27,6 +27,7 @@ STAGES_MOST = 12  # of any method, the start counted
 BETWEEN = 3  # stages at which gaps and guards are looked at
 WINDOW_LEVELS = 26  # times that a step is halved in search of an event, and once: a dip as narrow is rounding
 FUNCTIONS_MOST = 4  # that make up one guard
+HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
 STATE = np.dtype(
@@ -54,6 +55,7 @@ STATE = np.dtype(
         ("audited", "i8"),  # the energy account is judged
         ("loops", "i8"),  # rows that are always on, by the general algebra: they may lose rank on the way
         ("keep_events", "i8"),
+        ("has_energy", "i8"),
         ("has_control", "i8"),
         ("has_switch", "i8"),
         ("rtol", "f8"),
@@ -80,7 +82,6 @@ STATE = np.dtype(
         ("have_mass", "i8"),
         ("have_free", "i8"),
         ("have_laws", "i8"),
-        ("have_slopes", "i8"),  # of the multipliers, at the step's start
         ("longest_flight", "f8"),
         ("stalled", "i8"),
         ("hold", "i8"),
@@ -104,6 +105,7 @@ STATE = np.dtype(
         ("next_tick", "i8"),
         ("next_sample", "i8"),
         ("rows", "i8"),
+        ("spoilt", "i8"),  # a row holds what is not finite
         ("events", "i8"),
         ("switches", "i8"),
         ("energy_start", "f8"),
@@ -199,8 +201,8 @@ class Work:
     gaps: Floats2  # (5, nc) at the nodes of the step
     rates: Floats2
     lams: Floats2
-    peak: Floats  # (nc,) where in the step each multiplier is largest
-    rising: Floats  # (nc,) above 0 where it rises at the step's start
+    peak: Floats  # (nc,) where in the step each multiplier is largest; NEVER if at an end, or lower than before
+    highest: Floats  # (nc,) largest multiplier of the present contact that is written down
     hit: Floats  # (nc,) where in the step each contact switches
     J: Floats2  # (n, n)
     Jq: Floats2
@@ -221,6 +223,7 @@ class Work:
     ends: Index  # largest column past an active row and all before it
     struck: Index  # (nc,) how each row takes part in a frozen collision
     before: Bytes  # modes before a switch
+    settled: Bytes  # modes that rows left in the last pass
     kind: Index  # (nc,) which guard fired
     pivot: Index
     # Where q' is not v, and empty elsewhere:

@@ -64,11 +64,14 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     last = NODES - 1
     end = s.end
     t = s.t + s.hs
+    known = s.method == SHORT
+    # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
     if s.method == IMPLICIT:
         s.t_old = s.t
-        dense.put_on_rows(K, s, m, w, 1.0, w.y1)
-    # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
-    if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
+        known = dense.put_on_rows(K, s, m, w, 1.0, w.y1)
+        if known:
+            dop853.keep(K, s, m, w, t, w.y1, end)
+    if not known and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     scatter(s, w, w.lams[last])
     if s.nc > 0:

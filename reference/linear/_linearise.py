@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from crossbody.cases import SceneError, UnknownName
 from crossbody.cases._arrays import frozen
 from crossbody.cases._entry_points import checked_arguments
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._analytic import check_analytic
 from crossbody.reference.linear._derivatives import Derivatives, Point, check_coordinates, derivatives
-from crossbody.reference.linear._indices import different
 from crossbody.reference.linear._model import LinearModel
 
 OUTPUTS = ("q", "v", "gap", "lam")

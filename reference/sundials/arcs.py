@@ -306,7 +306,7 @@ class IdaArc(Arc):
 
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
         ny, nc, nz, e = self.ny, self.scene.equations.system.nc, self.scene.nz, self.scene.equations
-        bilateral = ~np.asarray(e.system.unilateral, dtype=bool)
+        bilateral = e.system.held
         self.rigid = np.flatnonzero(bilateral).tolist() if self.options.index == 3 else []
         nb = len(self.rigid)
         self.lam, self.mu = slice(ny, ny + nc), slice(ny + nc, ny + nc + nb)

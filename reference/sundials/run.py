@@ -18,6 +18,7 @@ from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajector
 from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
+from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
 from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
 from crossbody.reference.sundials.compiled.evaluation import entry, linear_arc
@@ -58,8 +59,7 @@ class SundialsRun:
         self.natural = options.samples is None
         entry(system)  # the kernels are built into the compiled equations before the clock runs
         self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
-        held = ~np.asarray(system.unilateral, dtype=bool)
-        self.rigid: list[int] = np.flatnonzero(held).tolist() if options.index == 3 else []
+        self.rigid: list[int] = np.flatnonzero(system.held).tolist() if options.index == 3 else []
         self._check_manifold()
 
     def _check_manifold(self) -> None:
@@ -309,7 +309,7 @@ class SundialsRun:
             np.array(c, dtype=np.float64).reshape(count, w) for c, w in zip(columns[1:], widths, strict=True)
         )
         modes = mode.astype(np.int8)
-        return Trajectory(
+        run = Trajectory(
             t=t, q=self.system.normalised("run", q), v=v, gap=gap, lam=lam, energy=energy, mode=modes,
             events=tuple(self.machine.events),
             switches=tuple(self.discrete.switches),
@@ -317,6 +317,7 @@ class SundialsRun:
             counts=MappingProxyType({"rhs": self.scene.evaluations}),
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
         )  # fmt: skip
+        return watched(self.system, run)
 
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:

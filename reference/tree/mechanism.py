@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
-from crossbody.reference.tree import forces, layout, sweeps
+from crossbody.reference.tree import forces, layout, loops, sweeps
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
 
@@ -69,9 +69,18 @@ def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
 
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
-    """Of every row."""
+    """Of every row; where points of bodies are to meet their poses are computed first."""
+    size = 0
+    if p[layout.JOINS].real > 0.0:
+        size = layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v)
+    w = np.empty(size, dtype=q.dtype)
+    if size > 0:
+        sweeps.outwards(q, v, p, w)
     for i in range(len(h)):
-        h[i], hd[i], _ = _row(q, v, p, i)
+        if int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real) == layout.CONNECT:
+            h[i], hd[i], _ = loops.connect(p, i, w)
+        else:
+            h[i], hd[i], _ = _row(q, v, p, i)
 
 
 @kernels.rows
@@ -79,8 +88,12 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
     """The active ones."""
     H[:na] = 0.0
     for j in range(na):
-        h[j], _, Hdv[j] = _row(q, v, p, idx[j])
-        _gradient(q, p, idx[j], H[j])
+        if int(p[int(p[layout.AT_ROW].real) + layout.ROW * idx[j]].real) == layout.CONNECT:
+            h[j], _, Hdv[j] = loops.connect(p, idx[j], w)
+            loops.connect_columns(p, idx[j], w, H[j])
+        else:
+            h[j], _, Hdv[j] = _row(q, v, p, idx[j])
+            _gradient(q, p, idx[j], H[j])
 
 
 @kernels.helper

@@ -196,6 +196,7 @@ class _Builder:
         )  # fmt: skip
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
         head[layout.RESTING] = self.resting
+        head[layout.JOINS] = sum(row[layout.KIND] == layout.CONNECT for row in rows)
         parts = [self.rows, self.dof_rows, actuators, tendons, rows]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW]] = starts[:5]

@@ -18,11 +18,12 @@ tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hu
 
 
 def of_like(largest: Floats, named: Sequence[Coordinate]) -> Floats:
-    """Largest value (n,) of all coordinates, or velocities, that share a unit, from that of each (n,)."""
-    units = np.array([one.unit for one in named])
+    """Largest value (n,) of all coordinates that share a unit, from that of each coordinate (n,)."""
+    units = np.array([coordinate.unit for coordinate in named])
     return np.array([largest[units == unit].max() for unit in units])
 
 
 def least(named: Sequence[Coordinate], rates: bool = False) -> Floats:
     """What coordinates, or their rates, are measured by at least (n,), SI."""
-    return np.maximum(of_like(np.array([one.rate if rates else one.size for one in named]), named), RESTS)
+    known = [coordinate.rate if rates else coordinate.size for coordinate in named]
+    return np.maximum(of_like(np.array(known), named), RESTS)

@@ -30,14 +30,13 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """
     if not len(run.t) or run.t[0] != 0.0 or run.q.shape[1] != len(case.q0):
         return None
-    moved = differences(run.q[:1], case.q0[None], case.quaternions)[0]
-    pairs = [(moved, truth.trajectory.q, case.coordinates, least(case.coordinates))]
+    off = differences(run.q[:1], case.q0[None], case.quaternions)[0]
+    pairs = [(off, truth.trajectory.q, case.coordinates, False)]
     if not any(event.impulse and event.t == 0.0 for event in run.events):  # else the first row may be behind it
-        named = case.velocities
-        pairs.append((np.abs(run.v[0] - case.v0), truth.trajectory.v, named, least(named, rates=True)))
+        pairs.append((np.abs(run.v[0] - case.v0), truth.trajectory.v, case.velocities, True))
     return max(_apart(*pair) for pair in pairs if pair[1].shape[1] == len(pair[2]))
 
 
-def _apart(off: Floats, motion: Floats, named: Sequence[Coordinate], smallest: Floats) -> float:
-    scale = np.maximum(of_like(np.max(np.abs(motion), axis=0, initial=0.0), named), smallest)
-    return float(np.max(off / scale, initial=0.0))
+def _apart(off: Floats, motion: Floats, named: Sequence[Coordinate], rates: bool) -> float:
+    largest = of_like(np.max(np.abs(motion), axis=0, initial=0.0), named)
+    return float(np.max(off / np.maximum(largest, least(named, rates)), initial=0.0))

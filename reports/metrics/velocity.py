@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import away
 from crossbody.reports.metrics._scale import least, of_like
@@ -27,10 +28,21 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     collisions that take no time are left out: several may share one, and a sample does not say behind which it stands.
     """
     inside, exact = aligned(truth, run)
+    scale = _scale(truth.trajectory, case)
     if not inside.any():
         return None
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
-    largest = of_like(np.max(np.abs(truth.trajectory.v), axis=0), case.velocities)
-    scale = np.maximum(largest, least(case.velocities, rates=True))
     off = np.abs(run.v[inside] - exact.v)[smooth] / scale
     return float(np.max(off, initial=0.0))
+
+
+def _scale(exact: Trajectory, case: Case) -> Floats:
+    """Largest |v_truth| of all that share a unit (nv,); where they all rest, what carries them by their size."""
+    own, sizes = np.max(np.abs(exact.v), axis=0), np.max(np.abs(exact.q), axis=0)
+    units, of_q = (np.array([one.unit for one in named]) for named in (case.velocities, case.coordinates))
+    sizes[list(case.quaternions)] = 1.0
+    of_q[list(case.quaternions)] = "rad"
+    shared = of_like(own, case.velocities)
+    carrying = np.array([sizes[of_q == unit].max(initial=0.0) for unit in units]) / case.t_end
+    moving = np.where(shared > STILL * carrying, shared, carrying)
+    return np.maximum(moving, least(case.velocities, rates=True))

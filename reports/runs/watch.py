@@ -27,6 +27,8 @@ LIMIT = 3660.0
 """Time that one engine may take for one scene, s: what the reference allows itself, and a minute."""
 TICK = 0.2
 _ROOM = 1 << 16
+ENDED = (0, 1, 2)
+"""Exit codes of a command that had come to its end before the interrupt reached it."""
 _PARENT_DEATH = 1  # PR_SET_PDEATHSIG
 
 
@@ -97,7 +99,7 @@ def watched(command: Callable[[], int]) -> int:
     _lost.clear()
     while True:
         status, signalled = _Watch(command, _diary).wait()
-        if signalled:
+        if signalled and not (os.WIFEXITED(status) and os.WEXITSTATUS(status) in ENDED):
             return _say_stopped(signalled, _diary.read())
         if os.WIFEXITED(status):
             return max(os.WEXITSTATUS(status), 1 if _lost else 0)
