@@ -12,6 +12,8 @@ from crossbody.cases._errors import InvalidValue
 from crossbody.cases._errors import shown as shown  # a name of this module too
 
 _Kind = TypeVar("_Kind")
+LONGEST_NAME, LONGEST_PATH = 255, 4095
+"""Bytes that file systems take of a name, and of a whole path."""
 
 
 def instance(where: str, value: object, kind: type[_Kind] | tuple[type[_Kind], ...], wanted: str) -> _Kind:
@@ -34,9 +36,13 @@ def path(where: str, value: object) -> str:
     if not isinstance(value, (str, os.PathLike)) or "\0" in (text := str(value)) or not text:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a path.")
     try:
-        os.fsencode(text)
+        raw = os.fsencode(text)
     except UnicodeError:
         raise InvalidValue(f"{where} is {shown(value)}; no file system can have such a path.") from None
+    if len(raw) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in raw.split(os.fsencode(os.sep))):
+        raise InvalidValue(
+            f"{where} is {shown(value)}; a name has at most {LONGEST_NAME} bytes, a path {LONGEST_PATH}."
+        )
     return text
 
 

@@ -85,10 +85,18 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coordinate:
-    """Name and unit of one generalised coordinate; its velocity has the unit per second."""
+    """Name and unit of one generalised coordinate; its velocity has the unit per second.
+
+    Attributes:
+        name, unit: what it is called, and in which SI unit it counts.
+        size, rate: what it and its rate are at least when they do something, in that unit; a motion that stays below is
+            judged by these. 0 where the scene knows none.
+    """
 
     name: str
     unit: str
+    size: float = 0.0
+    rate: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -234,7 +242,9 @@ class Case:
         parameters: every parameter of the case, resolved, SI.
         coordinates: names and units of q.
         contacts: names of the constraint rows.
-        q0, v0 (n,): start.
+        q0 (nq,), v0 (nv,): start.
+        velocities: names and units of v, as of positions; those of q where v = q'.
+        quaternions: index in q of the first of the four entries of every quaternion, w first.
         t_end: horizon, s.
         law: constants of every row.
         fsm: machine that switches the rows: "level", "edge" or "memoryless".
@@ -275,15 +285,17 @@ class Case:
     chaos: Chaos | None = None
     consistent: bool = True
     scene: Scene | None = None
+    velocities: tuple[Coordinate, ...] = ()
+    quaternions: tuple[int, ...] = ()
     file: str = ""
     findings: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:
         """Check shapes against each other and freeze the mappings."""
-        n = len(self.coordinates)
-        for name in ("q0", "v0"):
-            object.__setattr__(self, name, frozen(f"Case {self.name}", name, getattr(self, name), (n,)))
+        object.__setattr__(self, "velocities", self.velocities or self.coordinates)
+        for name, of in (("q0", self.coordinates), ("v0", self.velocities)):
+            object.__setattr__(self, name, frozen(f"Case {self.name}", name, getattr(self, name), (len(of),)))
         if len(self.law.a0) != len(self.contacts):
             raise SceneError(
                 f"Case {self.name} names {len(self.contacts)} contacts but its law has {len(self.law.a0)} rows."

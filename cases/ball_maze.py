@@ -22,7 +22,7 @@ import numpy as np
 
 from crossbody.cases._case import Case, Coordinate, Law, Parameter, Value
 from crossbody.cases._maze import geometry
-from crossbody.cases._maze.claims import claims
+from crossbody.cases._maze.claims import claims, fallen
 from crossbody.cases._maze.limits import limits
 
 
@@ -101,6 +101,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     maze = geometry.maze_of(p)
     x, y = geometry.start(maze, p)
     slip = 2 if p["rolling"] else 0
+    claimed = claims(variant, p, maze)
     rows = NORMAL + slip
     return Case(
         name="ball_maze",
@@ -119,8 +120,8 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
             a2=np.zeros(rows),
             unilateral=np.arange(rows) < NORMAL,
         ),
-        claims=claims(variant, p, maze),
-        limits=limits(variant),
+        claims=claimed,
+        limits=limits(variant, claimed, fallen(p, maze)),
         discrete=DISCRETE,
         tight=TIGHT,
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},

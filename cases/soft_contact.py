@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crossbody.cases._case import Case, Coordinate, Parameter, Value
+from crossbody.cases._case import Case, Parameter, Value
 from crossbody.cases._errors import InvalidValue
 from crossbody.cases._soft import robot
 from crossbody.cases._soft import scene as soft
@@ -50,7 +50,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         title=_TITLES[variant],
         mechanism="soft_delta" if whole else "soft_contact",
         parameters=parameters,
-        coordinates=tuple(Coordinate(name=name, unit=unit) for name, unit in _COORDINATES[variant]),
+        coordinates=tuple(soft.coordinate(p, name, unit) for name, unit in _COORDINATES[variant]),
         contacts=robot.CONTACTS if whole else ("left", "right"),
         q0=q0,
         v0=np.zeros(len(q0)),
@@ -59,7 +59,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         collisions="resolved",
         tight=1e-11 if whole else 1e-12,
         claims=claimed,
-        limits=limits(variant, claimed, p["kstar"]),
+        limits=limits(variant, claimed, p),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from crossbody.cases import EngineUnavailable, _registry
 from crossbody.cases._entry_points import checked_arguments
-from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden
+from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden, interpreted
 
-__all__ = ["QUANTITIES", "Engine", "Run", "hidden", "load", "names", "summary"]
+__all__ = ["QUANTITIES", "Engine", "Run", "hidden", "interpreted", "load", "names", "summary"]
 
 
 def names() -> tuple[str, ...]:

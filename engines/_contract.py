@@ -22,6 +22,12 @@ def hidden(engine: Engine, profile: str) -> Mapping[str, str]:
     return {**told.get("*", {}), **told.get(profile, {})}
 
 
+def interpreted(engine: Engine, profile: str) -> str:
+    """What of an engine's timed runs is Python; empty for nothing."""
+    told: Mapping[str, str] = getattr(engine, "interpreted", {})
+    return told.get(profile, told.get("*", ""))
+
+
 class Run(Protocol):
     """One prepared run: the model is built, what the scene does not need is left out.
 
@@ -64,6 +70,9 @@ class Engine(Protocol):
 
     An engine may have `orders`, profile -> promised order of the error in its step `dt` or its tolerance `rtol`; the
     benchmark holds the observed one against it.
+
+    An engine may have `interpreted`, profile ("*" for all) -> what of its timed runs is Python, which the benchmark
+    says beside its times; and its runs `native()`, the time in which its own loop makes the same steps without that, s.
 
     An engine may have `linearise(case, spot) -> tuple[Tangent, ...]` (`crossbody.engines._linear`): its derivatives of
     the accelerations at an equilibrium of the case, by each way that it has.

@@ -118,7 +118,9 @@ class LevelMachine:
     def _look(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> View:
         vd, lam = self.rows.accelerate(q, v, modes)
         press, noise = self.rows.pressure(q, v, vd)
-        return View(h, hd, lam, noise / np.diag(self.rows.delassus(q)), press > noise)
+        G = np.diag(self.rows.delassus(q))
+        allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
+        return View(h, hd, lam, allowed, press > noise)
 
     def _wanted(self, view: View, modes: Modes) -> list[int]:
         """Where every row belongs by the guards that hold now."""

@@ -38,10 +38,10 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
         a0, a1, a2 = law.T
         inverse = np.linalg.solve(mass, np.column_stack([rows.T, f]))
         push = rows @ inverse[:, -1] + Hdv + a1 * (rows @ v) + a0 * h + a2 * h**3
-        try:
-            return np.asarray(np.linalg.solve(rows @ inverse[:, :-1], -push))
-        except np.linalg.LinAlgError:
+        G = rows @ inverse[:, :-1]
+        if np.linalg.matrix_rank(G) < system.nc:  # up to rounding: both bounds of one joint are never exactly dependent
             return np.full(system.nc, np.nan)
+        return np.asarray(np.linalg.solve(G, -push))
 
     constants = dict(zip(("a0", "a1", "a2"), law.T, strict=True))
     return {"constants": constants, "q0": q0, "v0": v0, "M": M, "bias": bias, "H": H, "lam": lam, "gap": gap}

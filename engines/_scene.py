@@ -1,7 +1,8 @@
 """What a scene adds to an engine's own rigid bodies: springs, dampers, actuators and rows, in NumPy.
 
 Written from the scene's definitions, not from the reference's kernels, so that an engine that uses it is a witness.
-Coordinates are the scene's; slides and hinges alone.
+States are the scene's: x (nv,) is the coordinate of every slide and hinge in the place of its velocity, and 0 in those
+of free and ball joints, whose springs act along the rotation from where they rest.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import numpy as np
 
 from crossbody.cases import CaseUnsupported
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Joint, Loop, Scene, Tendon, Vector
+from crossbody.cases._rotations import turned
+from crossbody.cases.scene import WIDTHS, Joint, Loop, Scene, Tendon, Vector
 
 
 def polynomial(constants: Vector, x: Any) -> Any:
@@ -40,13 +42,22 @@ def stored(constants: Vector, x: Floats) -> Floats:
     return total
 
 
+def places(scene: Scene) -> tuple[dict[str, int], dict[str, int]]:
+    """Return joint -> first position, and joint -> first velocity."""
+    widths = np.array([WIDTHS[joint.type] for joint in scene.joints]).reshape(-1, 2)
+    firsts = np.cumsum(widths, axis=0) - widths
+    names = [joint.name for joint in scene.joints]
+    q, v = (dict(zip(names, column.tolist(), strict=True)) for column in firsts.T)
+    return q, v
+
+
 def tendons(scene: Scene) -> Floats:
-    """Return dl/dq (nt, nv) of the tendons."""
+    """Return dl/dx (nt, nv) of the tendons."""
     T = np.zeros((len(scene.tendons), scene.nv))
-    places = {joint.name: i for i, joint in enumerate(scene.joints)}
+    places_v = places(scene)[1]
     for row, tendon in zip(T, scene.tendons, strict=True):
         for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
-            row[places[name]] += c
+            row[places_v[name]] += c
     return T
 
 
@@ -56,12 +67,18 @@ class Forces:
 
     Attributes:
         scene: whose.
+        at: joint -> its first position.
+        place: joint -> its first velocity.
+        single (2, ns): positions and velocities of slides and hinges.
         u (nu,): controls in force.
-        T (nt, nv): dl/dq of the tendons.
-        A (nu, nv): dl/dq of the actuators, gear included.
+        T (nt, nv): dl/dx of the tendons.
+        A (nu, nv): dl/dx of the actuators, gear included.
     """
 
     scene: Scene
+    at: dict[str, int] = field(init=False)
+    place: dict[str, int] = field(init=False)
+    single: Any = field(init=False)
     u: Floats = field(init=False)
     T: Floats = field(init=False)
     A: Floats = field(init=False)
@@ -69,25 +86,46 @@ class Forces:
     def __post_init__(self) -> None:
         """Lay out which joint each part moves."""
         scene, n = self.scene, self.scene.nv
-        if scene.nq != n:
-            raise CaseUnsupported("Free and ball joints are not built here.")
-        place = {joint.name: i for i, joint in enumerate(scene.joints)}
+        self.at, self.place = places(scene)
+        single = [joint.name for joint in scene.joints if joint.type in ("slide", "hinge")]
+        self.single = np.array([(self.at[name], self.place[name]) for name in single], dtype=int).reshape(-1, 2).T
         self.u, self.T = np.zeros(len(scene.actuators)), tendons(scene)
         named = {tendon.name: row for tendon, row in zip(scene.tendons, self.T, strict=True)}
-        rows = [
-            actuator.gear[0] * (named[actuator.tendon] if actuator.tendon else np.eye(n)[place[actuator.joint]])
-            for actuator in scene.actuators
-        ]
-        self.A = np.array(rows).reshape(len(rows), n)
+        self.A = np.zeros((len(scene.actuators), n))
+        for row, actuator in zip(self.A, scene.actuators, strict=True):
+            if actuator.tendon:
+                row[:] = actuator.gear[0] * named[actuator.tendon]
+            else:
+                moved = self.moved(next(joint for joint in scene.joints if joint.name == actuator.joint))
+                row[moved] = actuator.gear[: moved.stop - moved.start]
+
+    def x(self, q: Floats) -> Floats:
+        """Return x (..., nv) of positions (..., nq)."""
+        x: Floats = np.zeros((*np.shape(q)[:-1], self.scene.nv))
+        x[..., self.single[1]] = q[..., self.single[0]]
+        return x
+
+    def moved(self, joint: Joint) -> slice:
+        """Velocities of a joint."""
+        first = self.place[joint.name]
+        return slice(first, first + WIDTHS[joint.type][1])
 
     @property
     def armature(self) -> Floats:
         """What joints and actuators add to the diagonal of M (nv,)."""
-        own = np.array([joint.armature for joint in self.scene.joints])
-        for actuator in self.scene.actuators:
-            for i, joint in enumerate(self.scene.joints):
-                own[i] += actuator.gear[0] ** 2 * actuator.armature * (joint.name == actuator.joint)
+        own: Floats = np.zeros(self.scene.nv)
+        for joint in self.scene.joints:
+            own[self.moved(joint)] += joint.armature
+        for row, actuator in zip(self.A, self.scene.actuators, strict=True):
+            if actuator.joint:
+                own += row**2 * actuator.armature
         return own
+
+    def turned(self, joint: Joint, q: Floats) -> Floats:
+        """Rotation (..., 3), rad, of a free or ball joint from where its spring rests."""
+        first = self.at[joint.name] + (3 if joint.type == "free" else 0)
+        rest = np.array(joint.rest if len(joint.rest) == 4 else (1.0, 0.0, 0.0, 0.0))
+        return turned(q[..., first : first + 4], rest)
 
     def change(self, values: Floats) -> None:
         """Put controls (nu,) in force."""
@@ -96,12 +134,20 @@ class Forces:
     def __call__(self, q: Floats, v: Floats) -> Floats:
         """Return the generalised forces (nv,) at a state."""
         total: Floats = np.zeros(len(v))
-        for i, joint in enumerate(self.scene.joints):
-            total[i] -= polynomial(joint.stiffness, q[i] - joint.rest[0]) + drag(joint.damping, v[i])
+        x = self.x(q)
+        for joint in self.scene.joints:
+            moved = self.moved(joint)
+            total[moved] -= drag(joint.damping, v[moved])
+            if joint.type in ("slide", "hinge"):
+                total[moved] -= polynomial(joint.stiffness, x[moved] - joint.rest[0])
+            elif any(joint.stiffness):
+                turn = self.turned(joint, q)
+                angle = float(np.linalg.norm(turn)) or 1.0
+                total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
         for row, tendon in zip(self.T, self.scene.tendons, strict=True):
-            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, row @ q))
+            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, row @ x))
             total -= row * (spring + drag(tendon.damping, row @ v))
-        return total + self.actuated(q, v)
+        return total + self.actuated(x, v)
 
     @staticmethod
     def outside(rest: Vector, length: Floats) -> Floats:
@@ -109,25 +155,31 @@ class Forces:
         out: Floats = length - clamped(length, rest)
         return out
 
-    def actuated(self, q: Floats, v: Floats) -> Floats:
+    def actuated(self, x: Floats, v: Floats) -> Floats:
         """Return what the actuators do (nv,), each within its bounds and their sum within the joint's."""
         total: Floats = np.zeros(len(v))
         for row, actuator, given in zip(self.A, self.scene.actuators, self.u, strict=True):
-            terms = np.array([1.0, row @ q, row @ v])
+            terms = np.array([1.0, row @ x, row @ v])
             force = np.dot(actuator.gain, terms) * clamped(given, actuator.control_range) + np.dot(actuator.bias, terms)
             total += row * clamped(force, actuator.force_range)
             if actuator.joint:
                 total -= row**2 * actuator.damping * v
-        bounds = np.array([joint.force_range for joint in self.scene.joints])
-        return np.clip(total, bounds[:, 0], bounds[:, 1])
+        for joint in self.scene.joints:
+            moved = self.moved(joint)
+            total[moved] = clamped(total[moved], joint.force_range)
+        return total
 
     def energy(self, q: Floats) -> Floats:
         """Return what the springs hold (n,), J, at states q (n, nq)."""
         total: Floats = np.zeros(len(q))
-        for i, joint in enumerate(self.scene.joints):
-            total += stored(joint.stiffness, q[:, i] - joint.rest[0])
+        x = self.x(q)
+        for joint in self.scene.joints:
+            if joint.type in ("slide", "hinge"):
+                total += stored(joint.stiffness, x[:, self.place[joint.name]] - joint.rest[0])
+            elif any(joint.stiffness):
+                total += stored(joint.stiffness, np.linalg.norm(self.turned(joint, q), axis=-1))
         for row, tendon in zip(self.T, self.scene.tendons, strict=True):
-            total += stored(tendon.stiffness, self.outside(tendon.rest, q @ row))
+            total += stored(tendon.stiffness, self.outside(tendon.rest, x @ row))
         return total
 
 
@@ -146,40 +198,43 @@ class Rows:
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""
-        h = [self._loop(loop, q)[0] for loop in self.scene.loops]
-        for part, x in self._bounded(q):
-            low, high = part.range
-            h += [x - low - part.margin] if np.isfinite(low) else []
-            h += [high - x - part.margin] if np.isfinite(high) else []
+        x = self.forces.x(q)
+        h = [self._loop(loop, x)[0] for loop in self.scene.loops]
+        for part, row in self._bounded():
+            (low, high), length = part.range, float(row @ x)
+            h += [length - low - part.margin] if np.isfinite(low) else []
+            h += [high - length - part.margin] if np.isfinite(high) else []
         return np.array(h)
 
     def jacobian(self, q: Floats) -> Floats:
         """Return H (nc, nv)."""
-        H = [self._loop(loop, q)[1] for loop in self.scene.loops]
-        for (part, _), row in zip(self._bounded(q), (*np.eye(len(q)), *self.forces.T), strict=True):
+        x = self.forces.x(q)
+        H = [self._loop(loop, x)[1] for loop in self.scene.loops]
+        for part, row in self._bounded():
             H += [sign * row for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
-        return np.array(H).reshape(-1, len(q))
+        return np.array(H).reshape(-1, len(x))
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (nc,)."""
+        x = self.forces.x(q)
         drift = np.zeros(len(self.heights(q)))
         for i, loop in enumerate(self.scene.loops):
-            drift[i] = -self._loop(loop, q)[2] * (v[self._place(loop.second)] ** 2 if loop.second else 0.0)
+            drift[i] = -self._loop(loop, x)[2] * (v[self.forces.place[loop.second]] ** 2 if loop.second else 0.0)
         return drift
 
-    def _bounded(self, q: Floats) -> list[tuple[Joint | Tendon, float]]:
-        return list(zip(self.scene.bounded, [*q, *(self.forces.T @ q)], strict=True))
+    def _bounded(self) -> list[tuple[Joint | Tendon, Floats]]:
+        """What may have bounds, with the derivative (nv,) of its coordinate or length."""
+        unit, place = np.eye(self.scene.nv), self.forces.place
+        rows = [*(unit[place[joint.name]] for joint in self.scene.joints), *self.forces.T]
+        return list(zip(self.scene.bounded, rows, strict=True))
 
-    def _place(self, joint: str) -> int:
-        return next(i for i, one in enumerate(self.scene.joints) if one.name == joint)
-
-    def _loop(self, loop: Loop, q: Floats) -> tuple[float, Floats, float]:
+    def _loop(self, loop: Loop, x: Floats) -> tuple[float, Floats, float]:
         """Return h, H and the second derivative of the polynomial."""
-        first = self._place(loop.first)
-        y = q[self._place(loop.second)] - self.scene.joints[self._place(loop.second)].reference if loop.second else 0.0
+        place, reference = self.forces.place, {joint.name: joint.reference for joint in self.scene.joints}
+        y = x[place[loop.second]] - reference[loop.second] if loop.second else 0.0
         P = np.polynomial.Polynomial(loop.polynomial)
-        H = np.zeros(len(q))
-        H[first] = 1.0
+        H = np.zeros(len(x))
+        H[place[loop.first]] = 1.0
         if loop.second:
-            H[self._place(loop.second)] -= P.deriv()(y)
-        return q[first] - self.scene.joints[first].reference - P(y), H, P.deriv(2)(y)
+            H[place[loop.second]] -= P.deriv()(y)
+        return x[place[loop.first]] - reference[loop.first] - P(y), H, P.deriv(2)(y)

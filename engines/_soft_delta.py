@@ -18,11 +18,10 @@ from crossbody.cases._soft.scene import numbers
 from crossbody.engines import _soft_contact as soft
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces, table
-from crossbody.engines._delta.scene import closures
+from crossbody.engines._delta.torque import gaps_and_energy, motor_torque, turns
+from crossbody.engines._delta.torque import numbers as torque_numbers
 from crossbody.engines._linear import Chart
 from crossbody.reference.delta import Robot, scene
-from crossbody.reference.delta.kinematics import MOTORS, rotations
-from crossbody.reference.systems import _delta_kinematics as kinematics
 
 SLIDERS = {
     "left pad": 1, "right pad": 1, "difference": 1, "block": 3, "integral 1": 1, "integral 2": 1, "integral 3": 1,
@@ -31,6 +30,7 @@ SLIDERS = {
 """Bodies that slide along so many axes: x, then y and z."""
 AXES = np.eye(3)
 HINGES, CLOCK, NV = 9, 18, 19
+MOTORS = slice(0, HINGES, 3)
 LEFT, RIGHT, FELT, BLOCK, INTEGRALS = 9, 10, 11, slice(12, 15), slice(15, 18)
 LOOPS = 6
 
@@ -42,7 +42,7 @@ class SoftDelta:
     Attributes:
         p: parameters, SI.
         robot: geometry, masses, gravity, friction.
-        numbers: of the robot, as compiled kinematics read them.
+        numbers: of the robot, as `engines._delta.torque` reads them.
         turns: cosine and sine by which the frame of each arm is turned.
         table: numbers of `engines._delta.forces.forces`.
         masses (10,): of the coordinates of `SLIDERS`, kg; 1 for those that carry the controller, the sensors, the time.
@@ -69,7 +69,8 @@ class SoftDelta:
         error = np.array([p["k"] * felt, 0.0, depth]) - zd
         asked = p["gain_i"] * q[INTEGRALS] + p["gain_p"] * v[INTEGRALS] + p["gain_d"] * error
         asked[2] += depth_rate
-        given = np.array([*self._torque(q[MOTORS], x, asked), -left - right, 0.0, 0.0])
+        given = np.array([0.0, 0.0, 0.0, -left - right, 0.0, 0.0])
+        motor_torque(np.ascontiguousarray(q[MOTORS]), x, asked, self.numbers, given[:3])
         forces(t, q[:HINGES], v[:HINGES], given, self.table, tau[:HINGES])
         tau[LEFT], tau[RIGHT], tau[FELT] = left, right, -p["ks"] * (left + right + felt)
         tau[BLOCK] = -p["bt"] * v[12], -p["bt"] * v[13], 0.0
@@ -98,14 +99,6 @@ class SoftDelta:
         tip = l2 * x, robot.offset + lc + l2 * y, ls + l2 * z
         return angles, tip, (l2 * xd, l2 * yd - ls * qd, l2 * zd + lc * qd)
 
-    def _torque(self, y: Floats, x: Floats, asked: Floats) -> Floats:
-        """The controller's motor torques (3,), N m, for an acceleration of the flange: My Jy^-1 a + tau_g."""
-        z, Jy, X, hold, My = np.empty(3), np.empty((3, 3)), np.empty((6, 3)), np.empty(3), np.empty((3, 3))
-        kinematics.jacobians(self.numbers, y, x, z, Jy, X, hold)
-        kinematics.task_mass(self.numbers, y, x, True, My)
-        torque: Floats = My @ np.linalg.solve(Jy, asked) + hold
-        return torque
-
     def _path(self, t: float) -> tuple[float, float]:
         """Rate and acceleration of the reference of the flange's depth."""
         p = self.p
@@ -129,7 +122,7 @@ class SoftDelta:
 
     def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Gaps (n, 9), m, and energies (n, 2), J, of many states of the case (n, 18)."""
-        gaps, energy = closures(self.robot, q[:, :HINGES], v[:, :HINGES])
+        gaps, energy = gaps_and_energy(self.robot, q[:, :HINGES], v[:, :HINGES])
         p = self.p
         own = [self.heights(np.append(state, 0.0)) for state in q]
         energy[:, 0] += 0.5 * p["block_mass"] * (v[:, BLOCK] ** 2).sum(axis=1)
@@ -173,7 +166,7 @@ def soft_delta(case: Case) -> SoftDelta:
     masses = np.array([p["pad_mass"], p["pad_mass"], 1.0, *(p["block_mass"],) * 3, 1.0, 1.0, 1.0, 1.0])
     parts = {name: getattr(case.law, name)[LOOPS:] for name in ("a0", "a1", "a2", "b0", "b1", "unilateral")}
     return SoftDelta(
-        p=p, robot=robot, numbers=robot.array(), turns=tuple((R[0][0], R[0][1]) for R in rotations(robot).tolist()),
+        p=p, robot=robot, numbers=torque_numbers(robot), turns=turns(robot),
         table=table(robot, None), masses=masses, H=H, law=Law(**parts),
     )  # fmt: skip
 

@@ -130,21 +130,29 @@ def _integrator(case: Case, scene: Line, model: Model, used: Mapping[str, Any]) 
     settings, solver = _simulation(case, used)
     mbs, limit = model.mbs, int(used["max_steps"])
 
-    def integrate() -> Trajectory:
-        begun = [0]
+    begun = [0]
 
-        def count(_mbs: Any, _t: float) -> bool:
-            begun[0] += 1
-            return begun[0] < limit  # the step is made all the same
+    def count(_mbs: Any, _t: float) -> bool:
+        begun[0] += 1
+        return begun[0] < limit  # the step is made all the same
 
-        mbs.SetPreStepUserFunction(count)
+    def solve() -> tuple[bool, float]:
         exu.config.printToConsole = False  # what it warns of is in the outcome
         try:
             start = perf_counter()
-            done = bool(mbs.SolveDynamic(settings, solverType=solver, storeSolver=False))
-            wall = perf_counter() - start
+            return bool(mbs.SolveDynamic(settings, solverType=solver, storeSolver=False)), perf_counter() - start
         finally:
             exu.config.printToConsole = True
+
+    def integrate() -> Trajectory:
+        if not 0 < begun[0] < limit:  # counted once, off the clock: Exudyn calls Python for it in every step
+            begun[0] = 0
+            mbs.SetPreStepUserFunction(count)
+            done, wall = solve()
+            if begun[0] < limit:
+                mbs.SetPreStepUserFunction(0)
+        if begun[0] < limit:
+            done, wall = solve()
         return _trajectory(case, scene, model, done, begun[0], limit, wall)
 
     return integrate

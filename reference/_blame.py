@@ -25,7 +25,7 @@ def not_finite(system: System, t: float, y: Floats, u: Floats, p: Floats, active
     Args:
         system: the mechanism.
         t: time of the last state, s.
-        y: q and v there (2 n,).
+        y: q and v there (nq + n,).
         u: inputs in force (nu,).
         p: parameters with the discrete state in force.
         active: rows in force.
@@ -35,7 +35,7 @@ def not_finite(system: System, t: float, y: Floats, u: Floats, p: Floats, active
         return f"Kernel control gave {entry('u', ~np.isfinite(u))} = {u[~np.isfinite(u)][0]} by "
     if not np.all(np.isfinite(y)):
         return ""
-    q, v = np.split(y, 2)
+    q, v = np.split(y, [system.nq])
     with np.errstate(all="ignore"):
         for step, there, speed in _along(system, t, q, v, u, p, ahead):
             for name, key, value in _values(system, t + step, there, speed, u, p, active):
@@ -58,7 +58,7 @@ def _along(
         block = slice(b, b + system.mass_block)
         a[block] = np.linalg.lstsq(M[block], f[block], rcond=None)[0] if np.all(np.isfinite(M[block])) else 0.0
     for step in (ahead * 0.5 ** np.arange(LOOKS)[::-1]).tolist():
-        there, speed = q + step * (v + 0.5 * step * a), v + step * a
+        there, speed = q + step * system.rates(q, v + 0.5 * step * a, t, p), v + step * a
         if not (np.all(np.isfinite(there)) and np.all(np.isfinite(speed))):
             return  # no kernel is to blame for what it gives beyond all numbers
         yield step, there, speed
@@ -78,6 +78,7 @@ def _values(
         "gaps": {"h": np.zeros(nc), "hd": np.zeros(nc)},
         "rows": {"H": np.zeros((nc, n)), "h": np.zeros(nc), "Hdv": np.zeros(nc)},
         "energy": {"e": np.zeros(2)}, "power": {"e": np.zeros(2)}, "watch": {"g": np.zeros(system.guards)},
+        "velocity": {"qd": np.zeros(system.nq)},
     }  # fmt: skip
     for name, outputs in filled.items():
         kernel = system.kernels[name]
@@ -94,7 +95,7 @@ def dependence(system: System, active: Index, q: Floats, v: Floats) -> str:
     Args:
         system: the mechanism.
         active: rows in force.
-        q: positions (n,).
+        q: positions (nq,).
         v: velocities (n,).
     """
     M, H = system.mass_matrix(q, v), system.constraint(q, v)[0][active]

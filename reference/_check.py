@@ -1,7 +1,8 @@
 """Whether kernels are what they say: one look at a state, by differences and between guard cells.
 
-    gaps      h' = H v, no h of t nor of v;   rows   H = dh/dq, the same h, H'v = (d/dt H) v
+    gaps      h' = H v, no h of t nor of v;   rows   H = dh/dq N, the same h, H'v = (d/dt H) v
     dynamics  M symmetric and positive definite, no M of v, as constant and as local as the system declares
+    velocity  q' = N v + r: affine in v, and no gap changes along r
     solve     M v' = f + H^T lam, and the law
 
 Slip rows (`follows`) have no position: their H is no gradient.
@@ -38,6 +39,7 @@ ARGUMENTS = {
     "energy": ("q", "v", "p", "e"),
     "power": ("t", "q", "v", "u", "p", "e"),
     "watch": ("t", "q", "v", "p", "g"),
+    "velocity": ("t", "q", "v", "p", "qd"),
 }
 
 
@@ -48,7 +50,7 @@ def check_kernels(
 
     Args:
         system: with its kernels.
-        q0: positions (n,).
+        q0: positions (nq,).
         v0: velocities (n,).
         t_end: times of the random states lie in [0, t_end], s.
         states: number of random states.
@@ -65,6 +67,8 @@ def check_kernels(
     for _ in range(states):
         seen += [near for width in NEAR if (near := _near(first, v0, width, horizon, draw)).finite()][:1]
     _check_time(first, [horizon, *(horizon * draw.uniform(size=TIMES)), *(state.t for state in seen[1:])])
+    for state in seen if system.velocity is not None else ():
+        _check_rates(state, draw)
     for state in seen:
         _check_symmetric(state)
         if system.nc:
@@ -100,6 +104,7 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
         "gaps": {"h": np.full(s.nc, nan), "hd": np.full(s.nc, nan)},
         "rows": {"H": np.zeros((s.nc, s.n)), "h": np.full(s.nc, nan), "Hdv": np.full(s.nc, nan)},
         "energy": {"e": np.full(2, nan)}, "power": {"e": np.full(2, nan)}, "watch": {"g": np.full(s.guards, nan)},
+        "velocity": {"qd": np.full(s.nq, nan)},
     }  # fmt: skip
     for name, outputs in rooms.items():
         kernel = s.kernels[name]
@@ -117,8 +122,8 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
 
 
 def _near(first: State, v0: Floats, width: float, horizon: float, draw: Any) -> State:
-    system, size = first.system, 1.0 + np.abs(first.q)
-    q = first.q + width * size * draw.standard_normal(system.n)
+    system, size = first.system, 1.0 + first.sizes()
+    q = first.q + system.displacement(first.q, width * size * draw.standard_normal(system.n), first.p)
     v = v0 + (1.0 + np.abs(v0)) * draw.standard_normal(system.n)
     return State(system, horizon * draw.uniform(), q, v, first.p)
 
@@ -154,8 +159,8 @@ def _check_rows(at: State, draw: Any) -> None:
     reach, H = at.reach(), np.abs(at.H)
     _compare(at, "rows", "h", at.h, "gaps' h", at.gap, np.where(there, EXACT * (np.abs(at.gap) + reach), np.inf))
     held = (np.asarray(s.follows) < 0) & there
-    d = (1.0 + np.abs(q)) * draw.standard_normal(s.n)
-    wrong = held & differs(lambda x: at.gaps(x, v)[0], q, d, at.H @ d, H @ np.abs(d), reach)
+    d = (1.0 + at.sizes()) * draw.standard_normal(s.n)
+    wrong = held & differs(lambda x: at.gaps(x, v)[0], q, s.displacement(q, d, at.p), at.H @ d, H @ np.abs(d), reach)
     if np.any(wrong):
         _name_gradient(at, int(np.flatnonzero(wrong)[0]))
     bound = np.where(there, EXACT * (H @ np.abs(v) + np.abs(at.rate)), np.inf)
@@ -164,21 +169,24 @@ def _check_rows(at: State, draw: Any) -> None:
     def turned(x: Floats) -> Floats:
         return at.rows(x, v)[0] @ v
 
-    wrong = there & differs(turned, q, v, at.Hdv, np.abs(at.Hdv), reach)
+    rates = s.rates(q, v, at.t, at.p)
+    wrong = there & differs(turned, q, rates, at.Hdv, np.abs(at.Hdv), reach)
     if np.any(wrong):
         i = int(np.flatnonzero(wrong)[0])
-        slope = closest(turned, q, v, at.Hdv)[i]
+        slope = closest(turned, q, rates, at.Hdv)[i]
         _refuse(at, "rows", f"Hdv[{i}]", at.Hdv[i], "(d/dt H) v by differences", slope)
 
 
 def _name_gradient(at: State, i: int) -> None:
     """Raise for the entry of row i of H that is furthest from its difference."""
     slopes = np.array([
-        closest(lambda x: at.gaps(x, at.v)[0][i : i + 1], at.q, unit, at.H[i : i + 1, c])[0]
+        closest(lambda x: at.gaps(x, at.v)[0][i : i + 1], at.q, at.system.displacement(at.q, unit, at.p),
+                at.H[i : i + 1, c])[0]
         for c, unit in enumerate(np.eye(at.system.n))
     ])  # fmt: skip
     c = int(np.argmax(np.abs(slopes - at.H[i])))
-    _refuse(at, "rows", f"H[{i}, {c}]", at.H[i, c], "dh/dq of gaps by differences", slopes[c])
+    by = "dh/dq of gaps" if at.system.velocity is None else f"the rate of gaps along velocity {c}"
+    _refuse(at, "rows", f"H[{i}, {c}]", at.H[i, c], f"{by} by differences", slopes[c])
 
 
 def _check_velocity(at: State, draw: Any) -> None:
@@ -194,6 +202,26 @@ def _check_velocity(at: State, draw: Any) -> None:
     _compare(at, "gaps", "h", at.gap, text, at.gaps(at.q, v)[0], bound)
     whole = np.where(there[:, None], EXACT * np.abs(at.H).max(axis=1, keepdims=True), np.inf) + np.zeros_like(at.H)
     _compare(at, "rows", "H", at.H, text, at.rows(at.q, v)[0], whole)
+
+
+def _check_rates(at: State, draw: Any) -> None:
+    """The rates of positions are affine in v, and what is left of them at rest changes no gap."""
+    s, q = at.system, at.q
+    one, other = (draw.standard_normal(s.n) for _ in range(2))
+    rest, both = s.rates(q, np.zeros(s.n), at.t, at.p), s.rates(q, one + other, at.t, at.p)
+    parts = s.rates(q, one, at.t, at.p) + s.rates(q, other, at.t, at.p) - rest
+    text = "the sum of those of two velocities less that at rest, and q' must be N(q) v + r(q): it"
+    _compare(at, "velocity", "qd", both, text, parts, EXACT * (np.abs(both) + np.abs(parts) + np.abs(rest).max()))
+    size = float(np.abs(rest).max())
+    if s.nc and size > 0.0:
+        there, reach = at.evaluated() & (np.asarray(s.follows) < 0), at.reach()
+        moved = there & differs(lambda x: at.gaps(x, at.v)[0], q, rest / size, np.zeros(s.nc), reach, reach)
+        if np.any(moved):
+            i = int(np.flatnonzero(moved)[0])
+            raise SceneError(
+                f"Kernel velocity gives q' = {rest.tolist()} at v = 0, along which gap {i} changes; gaps must stand "
+                f"still there, h' = H v{at.where()}."
+            )
 
 
 def _check_subsets(at: State, draw: Any) -> None:

@@ -38,7 +38,7 @@ class Ensemble:
 
     Attributes:
         t (N,): time reached, s: the horizon, unless a run failed.
-        q, v (N, n): state there.
+        q (N, nq), v (N, n): state there.
         outcome (N,): how each ended, as `Outcome`.
         steps, events (N,): counts.
         wall_s: time of all runs together, s.
@@ -69,7 +69,7 @@ def ensemble(
 
     Args:
         system: the mechanism; what is not given below is its own.
-        q0: positions at the start (N, n); N is the number of runs.
+        q0: positions at the start (N, nq); N is the number of runs.
         v0: velocities at the start (N, n).
         t_end: horizon, s.
         parameters: name -> (N,) values of the system's named parameters.
@@ -88,7 +88,7 @@ def ensemble(
     count = len(os.sched_getaffinity(0)) if threads is None else threads
     if not 1 <= count <= 1024:
         raise InvalidValue(f"threads is {threads}; valid: 1 to 1024.")
-    check_once(system, job.starts[0, : system.n], job.starts[0, system.n :], t_end)
+    check_once(system, job.starts[0, : system.nq], job.starts[0, system.nq :], t_end)
     check_starts(system, job.starts, job.p, settings)
     spaces: SimpleQueue[CompiledRun] = SimpleQueue()
     for _ in range(count):
@@ -103,7 +103,7 @@ def ensemble(
 
 
 def _space(system: System, job: _Job, settings: Options) -> CompiledRun:
-    run = CompiledRun(system, job.starts[0, : system.n], job.starts[0, system.n :], settings)
+    run = CompiledRun(system, job.starts[0, : system.nq], job.starts[0, system.nq :], settings)
     run.start()
     return run
 
@@ -114,15 +114,15 @@ class _Job:
     def __init__(
         self, system: System, q0: ArrayLike, v0: ArrayLike, given: Mapping[str, ArrayLike], law: Mapping[str, ArrayLike]
     ) -> None:
-        self.system, n = system, system.n
-        q = frozen("ensemble", "q0", q0, (None, n))
+        self.system, n, nq = system, system.n, system.nq
+        q = frozen("ensemble", "q0", q0, (None, nq))
         self.size = len(q)
         if not self.size:
             raise SceneError("ensemble.q0 has no line; give one start a run.")
         v = frozen("ensemble", "v0", v0, (self.size, n))
-        self.starts = np.ascontiguousarray(np.hstack([q, v]))
-        if not np.all(np.isfinite(self.starts)):
+        if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
             raise SceneError("ensemble.q0 and v0 must be finite.")
+        self.starts = np.ascontiguousarray(np.hstack([system.normalised("ensemble.q0", q), v]))
         self.p = np.tile(np.asarray(system.p), (self.size, 1))
         names = list(system.parameters) if isinstance(system.parameters, Mapping) else []
         for name, values in given.items():
@@ -132,7 +132,7 @@ class _Job:
         self.laws = np.tile(np.stack([system.alpha, system.beta]), (self.size, 1, 1, 1))
         for name, values in law.items():
             self._put_constant(name, values)
-        self.out = np.zeros((self.size, 1 + 2 * n))
+        self.out = np.zeros((self.size, 1 + nq + n))
         self.counts = np.zeros((self.size, 3), np.int64)
 
     def _column(self, name: str, values: ArrayLike) -> Floats:
@@ -164,9 +164,9 @@ class _Job:
 
     def result(self, wall_s: float) -> Ensemble:
         """What was written."""
-        n = self.system.n
+        at = 1 + self.system.nq
         return Ensemble(
-            t=self.out[:, 0], q=self.out[:, 1 : 1 + n], v=self.out[:, 1 + n :],
+            t=self.out[:, 0], q=self.system.normalised("ensemble", self.out[:, 1:at]), v=self.out[:, at:],
             outcome=np.array([OUTCOMES[int(code)] for code in self.counts[:, 0]], dtype=object),
             steps=self.counts[:, 1], events=self.counts[:, 2], wall_s=wall_s,
         )  # fmt: skip
@@ -176,7 +176,7 @@ class _Job:
 def _loop(functions: tuple[Any, ...]) -> Any:
     """The program over a range of runs, without the interpreter's lock."""
     advance = address()
-    dynamics, gaps, rows, energy, power, solve, control, watch, switch = functions
+    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = functions
 
     def runs(first, last, template, state, model, work, buffers, p, laws, starts, modes, out, counts, limit):  # type: ignore[no-untyped-def]  # fmt: skip
         m, w, b = open_model(model), open_work(work), open_buffers(buffers)
@@ -197,7 +197,7 @@ def _loop(functions: tuple[Any, ...]) -> Any:
             code = MORE
             while code == MORE and s.steps < limit:
                 code = advance(
-                    dynamics, gaps, rows, energy, power, solve, control, watch, switch,
+                    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch,
                     state, model, work, buffers, min(SLICE, limit - s.steps),
                 )  # fmt: skip
             out[r, 0] = s.t

@@ -105,6 +105,16 @@ class Options:
         """The absolute tolerance in force."""
         return ATOL_PART * self.rtol if self.atol is None else self.atol
 
+    def absolute(self, system: System) -> Floats:
+        """Absolute tolerances of q and v (nq + n,).
+
+        A quaternion's entries are measured by its length, 1, however small they are; half of it, since an angle is
+        twice their change.
+        """
+        found: Floats = np.full(system.nq + system.n, self.tolerance)
+        found[system.quaternion_entries] += 0.5 * self.rtol
+        return found
+
     def grid(self) -> Floats:
         """The sample times, checked: increasing, inside [0, t_end]."""
         times: Floats = frozen("simulate", "samples", () if self.samples is None else self.samples, (None,))

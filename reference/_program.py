@@ -94,15 +94,16 @@ def _permanent(function: Any) -> bool:
 def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """The program with one system's kernels built in.
 
-    Handing nine functions over from Python costs more than a short run; an entry names them as constants.
+    Handing ten functions over from Python costs more than a short run; an entry names them as constants.
     """
     advance = address()
-    dynamics, gaps, rows, energy, power, solve, control, watch, switch = functions
+    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = functions
 
     def call(state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
         return advance(
-            dynamics, gaps, rows, energy, power, solve, control, watch, switch, state, model, work, buffers, budget
-        )
+            dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch,
+            state, model, work, buffers, budget,
+        )  # fmt: skip
 
     found: Callable[..., int] = embedding(call, types.int64(_state(), TABLE, TABLE, TABLE, types.int64))
     return found

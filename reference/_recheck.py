@@ -77,14 +77,14 @@ def recheck(
         collisions: the rule for rows with fast constants, as in `Options`.
 
     Returns:
-        The worst place of each row, mode and reason. Where a controller acts or `switch` keeps numbers that a motion
-        does not record, only the motion's own rows are looked at.
+        The worst place of each row, mode and reason. Where a controller acts, `switch` keeps numbers that a motion
+        does not record, or q' is not v, only the motion's own rows are looked at.
     """
     rtol = _arguments.real("rtol", rtol)
     rows = np.flatnonzero(np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
     if not rows or not len(run.t) or (run.mode < 0).any():
         return ()
-    known = system.control is None and system.latched == 0
+    known = system.control is None and system.latched == 0 and system.velocity is None
     found = _Recheck(system, run, rows, rtol, inputs, collisions).between() if known else _recorded(run, rows, rtol)
     worst: dict[tuple[int, Mode, str], Violation] = {}
     for one in found:

@@ -16,6 +16,7 @@ from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
+from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
 from crossbody.reference.core._struct import table
@@ -60,18 +61,20 @@ class CompiledRun:
         self.system, self.options = system, options
         self.start_state = np.concatenate([q0, v0])
         samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)
-        n, nc = system.n, system.nc
+        n, nq, nc = system.n, system.nq, system.nc
         self.nz = nc + 2 if options.ledger else 0
         self.work = layout.workspace(
-            n, nc, system.inputs, system.mass_block, self.nz, system.memory, system.scratch, system.guards,
+            n, nq, system.velocity is not None, nc, system.inputs,
+            system.mass_block, self.nz, system.memory, system.scratch, system.guards,
             len(np.atleast_1d(system.discrete)),
         )  # fmt: skip
+        self.work["atol"][:] = options.absolute(system)
         natural = options.samples is None
         rows, events = (ROWS + len(inputs_t) if natural else len(samples) + 1), EVENTS + 16 * nc  # steps end at inputs
         self.buffers: dict[str, NDArray[Any]] = {
             "inputs_t": np.array(inputs_t), "inputs_u": np.array(inputs_u), "samples": np.array(samples),
             "mode": np.zeros(nc, np.int8), "history": np.zeros((max(HISTORY, 4 * nc) + 1, nc), np.int8),
-            "out": np.zeros((rows, 1 + 2 * n + 2 * nc + 2 + self.nz)), "modes": np.zeros((rows, nc), np.int8),
+            "out": np.zeros((rows, 1 + nq + n + 2 * nc + 2 + self.nz)), "modes": np.zeros((rows, nc), np.int8),
             "events_t": np.zeros(events), "events": np.zeros((events, 3), np.int64),
             "impulses": np.zeros(events), "switches_t": np.zeros(EVENTS), "switches": np.zeros((EVENTS, 3), np.int64),
         }  # fmt: skip
@@ -87,15 +90,17 @@ class CompiledRun:
         system, options = self.system, self.options
         state = np.zeros(1, layout.STATE)
         values = {
-            "n": system.n, "nc": system.nc, "nu": system.inputs, "k": system.mass_block, "nz": self.nz,
+            "n": system.n, "nq": system.nq, "has_velocity": system.velocity is not None,
+            "nc": system.nc, "nu": system.inputs, "k": system.mass_block, "nz": self.nz,
             "fsm": FSMS.index(options.fsm), "rule": COLLISIONS.index(options.collisions),
             "frozen": options.freezes(system), "has_switch": system.switch is not None,
             "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
-            "loops": system.solve is None and not np.all(system.unilateral),
-            "keep_events": options.events, "has_control": system.control is not None,
+            "loops": system.solve is None and bool(np.any(system.held)),
+            "keep_events": options.events, "has_energy": system.energy is not _none.energy,
+            "has_control": system.control is not None,
             "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
             "tick": system.tick,
         }  # fmt: skip
@@ -137,7 +142,7 @@ class CompiledRun:
                     return Outcome.STEP_LIMIT
                 code = self.slice(min(budget, limit - steps))
                 if code == layout.DONE:
-                    return Outcome.FINISHED if self._finite_rows() == self.state["rows"][0] else Outcome.NOT_FINITE
+                    return Outcome.NOT_FINITE if self.state["spoilt"][0] else Outcome.FINISHED
                 if code < 0:
                     return self._ended(code)
                 self._grow(code)
@@ -156,7 +161,7 @@ class CompiledRun:
         spoilt = code == layout.INCONSISTENT and not np.isfinite(self.state["energy_open"][0])
         if code == layout.ILL_POSED:
             step = float(self.state["h"][0]) + RESOLUTION * float(self.options.t_end)
-            q, v = np.split(self.work["y"], 2)
+            q, v = np.split(self.work["y"], [self.system.nq])
             spoilt = self._blamed(q, v, step) != ""
         return Outcome.NOT_FINITE if spoilt else OUTCOMES[code]
 
@@ -165,7 +170,7 @@ class CompiledRun:
         rows = self.buffers["out"][: int(self.state["rows"][0])]
         known = np.ones(rows.shape[1], dtype=bool)
         if self.system.energy is _none.energy:
-            start = 1 + 2 * self.system.n + 2 * self.system.nc
+            start = 1 + self.system.nq + self.system.n + 2 * self.system.nc
             known[start : start + 2] = False
         good = np.isfinite(rows[:, known]).all(axis=1)
         return len(rows) if good.all() else int(np.argmin(good))
@@ -180,17 +185,18 @@ class CompiledRun:
 
     def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
         """What was recorded, as a Trajectory."""
-        n, nc = self.system.n, self.system.nc
+        n, nq, nc = self.system.n, self.system.nq, self.system.nc
         state = self.state[0]
         broken = outcome is Outcome.NOT_FINITE
         rows = self.buffers["out"][: self._finite_rows() if broken else int(state["rows"])]
         if not len(rows):  # it ended before its first row, or none was asked for: the start is known at least
-            rows = np.concatenate([start_row(self.system, *np.split(self.start_state, 2)), np.zeros(self.nz)])[None]
+            rows = np.concatenate([start_row(self.system, *np.split(self.start_state, [nq])), np.zeros(self.nz)])[None]
             self.buffers["modes"][0] = self._modes
-        cuts = np.cumsum([1, n, n, nc, nc, 2])
+        cuts = np.cumsum([1, nq, n, nc, nc, 2])
         t, q, v, gap, lam, energy, ledger = np.split(rows, cuts, axis=1)
-        return Trajectory(
-            t=t[:, 0], q=q, v=v, gap=gap, lam=lam, energy=energy, mode=self.buffers["modes"][: len(rows)],
+        run = Trajectory(
+            t=t[:, 0], q=self.system.normalised("run", q), v=v,
+            gap=gap, lam=lam, energy=energy, mode=self.buffers["modes"][: len(rows)],
             events=self._event_list(), switches=self._switch_list(), outcome=outcome, message=self._message(outcome),
             steps=int(state["steps"]), wall_s=wall_s,
             counts=MappingProxyType(
@@ -200,6 +206,7 @@ class CompiledRun:
             if self.nz
             else None,
         )  # fmt: skip
+        return watched(self.system, run)
 
     def _event_list(self) -> tuple[Event, ...]:
         count = int(self.state["events"][0]) if self.options.events else 0
@@ -220,7 +227,7 @@ class CompiledRun:
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
             return ""
-        q, v = np.split(self.work["y"], 2)
+        q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
         return f"{outcome.advice} {self._cause(outcome, q, v)}{where}."
 
@@ -244,10 +251,10 @@ class CompiledRun:
 
     def _blamed(self, q: Floats, v: Floats, within: float = np.inf) -> str:
         """The kernel that gave what is not finite, at the first bad row or else `within` s of the motion's end."""
-        n, state, t = self.system.n, self.state[0], float(self.state["t"][0])
-        row = self._finite_rows()
-        if row < state["rows"] and np.all(np.isfinite(self.buffers["out"][row, : 1 + 2 * n])):
-            t, (q, v) = self.buffers["out"][row, 0], np.split(self.buffers["out"][row, 1 : 1 + 2 * n], 2)
+        nq, state, t = self.system.nq, self.state[0], float(self.state["t"][0])
+        row, end = self._finite_rows(), 1 + nq + self.system.n
+        if row < state["rows"] and np.all(np.isfinite(self.buffers["out"][row, :end])):
+            t, (q, v) = self.buffers["out"][row, 0], np.split(self.buffers["out"][row, 1:end], [nq])
         active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
         ahead = min(max(float(self.options.t_end) - t, 0.0), within)
         return not_finite(self.system, t, np.concatenate([q, v]), self.work["u"], self.model[0], active, ahead)

@@ -20,7 +20,7 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
 
     Args:
         system: the mechanism.
-        q0: positions at the start (n,), finite.
+        q0: positions at the start (nq,), finite.
         v0: velocities at the start (n,), finite.
         t_end: horizon, s, above 0.
         options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples, consistent, ledger, ...

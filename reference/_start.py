@@ -32,7 +32,7 @@ def check_start(
 
     Args:
         system: the mechanism.
-        q: positions (n,).
+        q: positions (nq,).
         v: velocities (n,).
         options: its tolerances say what counts as off; `consistent=False` admits any start.
         parameters: those of this run; the system's own if not given.
@@ -57,15 +57,15 @@ def check_start(
 
 
 def check_starts(system: System, starts: Floats, parameters: Floats, options: Options) -> None:
-    """Check the starts (N, 2 n) of many runs, each with its line of parameters, as `check_start` does."""
-    may_hold, n = _may_hold(system), system.n
+    """Check the starts (N, nq + n) of many runs, each with its line of parameters, as `check_start` does."""
+    may_hold, nq = _may_hold(system), system.nq
     if not options.consistent or not np.any(may_hold):
         return
     h, rate = np.zeros(system.nc), np.zeros(system.nc)
     for r, (start, p) in enumerate(zip(starts, parameters, strict=True)):
-        system.gaps(0.0, start[:n], start[n:], p, h, rate)
+        system.gaps(0.0, start[:nq], start[nq:], p, h, rate)
         if max(np.abs(h[may_hold]).max(), np.abs(rate[may_hold]).max()) > ROUNDING:  # most starts hold: look no further
-            check_start(system, start[:n], start[n:], options, parameters=p, run=f" of run {r}")
+            check_start(system, start[:nq], start[nq:], options, parameters=p, run=f" of run {r}")
 
 
 def project(system: System, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -91,7 +91,9 @@ def _may_hold(system: System) -> NDArray[np.bool_]:
 
 
 def _held(system: System, modes: Bytes) -> Index:
-    return np.flatnonzero(_may_hold(system) & (modes == Mode.BILATERAL))
+    on = modes == Mode.BILATERAL
+    on[np.asarray(system.redundant)] = True  # held by the others, if they are held at the start
+    return np.flatnonzero(_may_hold(system) & on)
 
 
 def _placed(system: System, held: Index) -> NDArray[np.bool_]:
@@ -106,7 +108,7 @@ def _off(state: State, held: Index, part: float, absolute: float) -> NDArray[np.
 
     An error of q turns the rows: along v they turn by H' v.
     """
-    H, q, v = np.abs(state.H[held]), np.abs(state.q), np.abs(state.v)
+    H, q, v = np.abs(state.H[held]), state.sizes(), np.abs(state.v)
     here = np.abs(state.h[held]) > H @ (part * q + absolute + ROUNDING * (1.0 + q))
     turned = np.abs(state.Hdv[held]) * (part * q.max() + absolute) / max(float(v.max()), np.finfo(float).tiny)
     moving = np.abs(state.H[held] @ state.v) > H @ (part * v + absolute + ROUNDING * v) + turned
@@ -121,14 +123,15 @@ def _projected(state: State, held: Index) -> tuple[Floats, Floats] | None:
     try:
         for _ in range(ROUNDS):
             step = _least(state, placed, state.h[placed])
-            state = State(system, 0.0, state.q - step, v, p)
-            if np.all(np.abs(step) <= ROUNDING * (1.0 + np.abs(state.q))):
+            size = state.sizes()
+            state = State(system, 0.0, state.q - system.displacement(state.q, step, p), v, p)
+            if np.all(np.abs(step) <= ROUNDING * (1.0 + size)):
                 break
         state = State(system, 0.0, state.q, v - _least(state, held, state.H[held] @ v), p)
     except np.linalg.LinAlgError:  # no metric: M is singular on the way, or something is not finite
         return None
     good = state.finite() and not np.any(_off(state, held, ROUNDING, ROUNDING))
-    return (state.q, state.v) if good else None
+    return (system.normalised("project", state.q), state.v) if good else None
 
 
 def _least(state: State, rows: Index, error: Floats) -> Floats:

@@ -69,9 +69,14 @@ class State:
         there: NDArray[np.bool_] = (self.gap <= 0.0) | (self.rate != 0.0) | (self.system.switch is None)
         return there
 
+    def sizes(self) -> Floats:
+        """Sizes of the positions (n,) that the columns of H belong to: of all of them where q' is not v."""
+        size: Floats = np.abs(self.q)
+        return size if self.system.velocity is None else np.full(self.system.n, size.max())
+
     def reach(self) -> Floats:
         """The size of the terms that a gap (nc,) is made of, as far as its derivatives tell."""
-        size: Floats = np.abs(self.H) @ (1.0 + np.abs(self.q))
+        size: Floats = np.abs(self.H) @ (1.0 + self.sizes())
         return size
 
     def where(self) -> str:

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from crossbody.cases._regular import open_regular
+
 try:
     import fcntl
 except ImportError:  # not a POSIX system: every process compiles for itself
@@ -113,18 +115,14 @@ class Store:
         """Return what was written under a name; None if it is not there, or was not whole and is dropped."""
         path = self.folder / (name + CODE)
         try:
-            descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0))
+            file = open_regular(path, getattr(os, "O_NOFOLLOW", 0))
         except FileNotFoundError:
             return None
         except OSError as error:
             self.drop(name, f"cannot be read ({error.strerror})")
             return None
-        found = os.fstat(descriptor)
-        if not stat.S_ISREG(found.st_mode):
-            os.close(descriptor)  # a folder, which Python would not even open
-            self.drop(name, "is no file")
-            return None
-        with open(descriptor, "rb") as file:
+        with file:
+            found = os.fstat(file.fileno())
             if not _trusted(found.st_uid) or found.st_mode & 0o022:
                 self.drop(name, "may have been written by another user")
                 return None

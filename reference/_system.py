@@ -8,13 +8,14 @@ from typing import Any
 
 import numba.core.config as numba_config
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import SceneError
 from crossbody.cases._arguments import flag, shown
 from crossbody.cases._arrays import frozen, full, is_number
 from crossbody.cases._entry_points import checked_arguments, finite
 from crossbody.reference import kernels as kernel_types
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
 
@@ -31,12 +32,18 @@ class System:
     are made, give one set of kernels other parameters.
 
     Attributes:
-        n: number of coordinates.
-        dynamics, gaps, rows, energy, power, solve, control, watch, switch: kernels as in `crossbody.reference.kernels`.
+        n: number of velocities, and of positions unless nq says otherwise.
+        nq: number of positions, at least n; more than n only with the kernel `velocity`.
+        dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch: kernels as in
+            `crossbody.reference.kernels`.
+        quaternions: index in q of the first of the four entries, w first, of every quaternion. Its length is 1 in all
+            that is handed over; inside a step it may differ by the tolerance, which kernels must bear.
         parameters: p of the kernels: an array, or names with values in the kernels' order.
         a0, a1, a2 (nc,): slow constants of every row; a number serves all rows (spec 1.1).
         b0, b1, b2 (nc,): fast constants of COLLISION; b0 = 0 where a row has one set only.
         unilateral (nc,): False for a row that is always on.
+        redundant: indices of rows that are always on but follow from the others: they are held by these and stay off,
+            mode FREE with a multiplier of 0. A run in which their gaps open ends as inconsistent.
         follows (nc,): index of the row whose activity this one shares (a slip row follows its normal row); -1 none.
         mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
         inputs: nu, length of u.
@@ -61,6 +68,7 @@ class System:
     rows: Any = _none.rows
     energy: Any = _none.energy
     power: Any = _none.power
+    velocity: Any = None
     solve: Any = None
     control: Any = None
     watch: Any = None
@@ -73,7 +81,10 @@ class System:
     b1: ArrayLike = 0.0
     b2: ArrayLike = 0.0
     unilateral: ArrayLike = True
+    redundant: ArrayLike = ()
     follows: ArrayLike = -1
+    nq: int = 0
+    quaternions: ArrayLike = ()
     mass_block: int = 0
     inputs: int = 0
     scratch: int = 0
@@ -106,12 +117,16 @@ class System:
             raise SceneError(f"System.unilateral is {shown(self.unilateral)}; valid: True, False.")
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
+        put(self, "redundant", different("System.redundant", np.asarray(self.redundant, dtype=np.int64).tolist(), nc))
+        if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
+            raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
         put(self, "discrete", frozen("System", "discrete", self.discrete, (None,)))
         state = np.concatenate([self.discrete, np.zeros(self.latched)])
         constants = frozen("System", "parameters", values, (None,))
         put(self, "p", frozen("System", "p", np.concatenate([constants, state]), (None,)))
         put(self, "mass_block", self.mass_block or self.n)
+        self._check_positions()
         put(self, "span", self._spans(nc))
         put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
         put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
@@ -123,8 +138,21 @@ class System:
         return len(self.alpha)
 
     @property
+    def held(self) -> NDArray[np.bool_]:
+        """Which rows (nc,) are always on, without those that follow from them."""
+        held: NDArray[np.bool_] = np.asarray(self.unilateral) == 0
+        held[np.asarray(self.redundant)] = False
+        return held
+
+    @property
+    def quaternion_entries(self) -> Index:
+        """Indices in q (m, 4), of the quaternions' entries."""
+        found: Index = np.asarray(self.quaternions, dtype=np.int64).reshape(-1, 1) + np.arange(4)
+        return found
+
+    @property
     def kernels(self) -> dict[str, Any]:
-        """The nine functions in the order of `kernels.NAMES`; what is absent is a stand-in."""
+        """The ten functions in the order of `kernels.NAMES`; what is absent is a stand-in."""
         given = {name: getattr(self, name) for name in kernel_types.NAMES}
         return {name: getattr(_none, name, None) if kernel is None else kernel for name, kernel in given.items()}
 
@@ -143,7 +171,10 @@ class System:
         return whole_blocks
 
     def _check_sizes(self) -> None:
-        counts = (("n", 1), *((name, 0) for name in ("mass_block", "inputs", "scratch", "memory", "guards", "latched")))
+        counts = (
+            ("n", 1),
+            *((name, 0) for name in ("nq", "mass_block", "inputs", "scratch", "memory", "guards", "latched")),
+        )
         for name, low in counts:
             value = getattr(self, name)
             whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
@@ -151,6 +182,27 @@ class System:
                 raise SceneError(f"System.{name} is {shown(value)}; it must be a whole number from {low} to {LARGEST}.")
         if self.mass_block and self.n % self.mass_block:
             raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")
+
+    def _check_positions(self) -> None:
+        """Check nq, and what the kernel `velocity` asks for."""
+        put, n = object.__setattr__, self.n
+        put(self, "nq", self.nq or n)
+        if self.nq < n or (self.nq > n and self.velocity is None):
+            raise SceneError(
+                f"System.nq is {self.nq} and System.n is {n}; valid: as many positions as velocities, or more with the "
+                "kernel velocity, q' = N(q) v."
+            )
+        if self.affine and self.velocity is not None:
+            raise SceneError("System.affine is true, but with a kernel velocity q' is not v: no arc has a closed form.")
+        put(self, "quaternions", frozen("System", "quaternions", self.quaternions, (None,), np.int64))
+        entries = self.quaternion_entries.ravel()
+        if len(entries) and self.velocity is None:
+            raise SceneError("System.quaternions are given without the kernel velocity, which turns them.")
+        if len(entries) and (entries.min() < 0 or entries.max() >= self.nq or len(np.unique(entries)) < len(entries)):
+            raise SceneError(
+                f"System.quaternions is {np.asarray(self.quaternions).tolist()}; each is the first of four entries of "
+                f"its own, below nq = {self.nq}."
+            )
 
     def _check_values(self) -> None:
         for name in ("alpha", "beta", "p"):
@@ -216,7 +268,7 @@ class System:
         Every run does so at two states near its start when it is prepared for the first time.
 
         Args:
-            q: positions (n,).
+            q: positions (nq,).
             v: velocities (n,); zeros if not given.
             states: number of random states.
             t_end: the random states lie at times in [0, t_end], s; gaps are looked at there, and at t_end.
@@ -230,6 +282,39 @@ class System:
 
         check_kernels(self, *self._state(q, v), t_end=t_end, states=states)
 
+    def rates(self, q: Floats, v: Floats, t: float = 0.0, p: Floats | None = None) -> Floats:
+        """Q' (nq,) at positions q (nq,) and velocities v (n,): v itself unless there is a kernel `velocity`."""
+        if self.velocity is None:
+            return v
+        qd = np.zeros(self.nq)
+        self.velocity(t, q, v, np.array(self.p) if p is None else p, qd)
+        return qd
+
+    def displacement(self, q: Floats, d: Floats, p: Floats | None = None) -> Floats:
+        """N(q) d (nq,): how positions change where velocities d (n,) act for a unit of time."""
+        if self.velocity is None:
+            return d
+        found: Floats = self.rates(q, d, 0.0, p) - self.rates(q, np.zeros(self.n), 0.0, p)
+        return found
+
+    def normalised(self, name: str, q: Floats) -> Floats:
+        """Return positions (nq,) or (m, nq) with every quaternion of length 1.
+
+        Raises:
+            SceneError: naming `name` and the quaternion, if one is zero.
+        """
+        entries = self.quaternion_entries
+        if not len(entries):
+            return q
+        found = np.array(q)
+        turned = found[..., entries]
+        length = np.linalg.norm(turned, axis=-1, keepdims=True)
+        if np.any(length == 0.0):
+            first = int(entries[int(np.argwhere(length == 0.0)[0][-2]), 0])
+            raise SceneError(f"{name}: the quaternion at entries {first} to {first + 3} is zero; it has no direction.")
+        found[..., entries] = turned / length
+        return found
+
     def project(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats]:
         """Put a state onto the rows that are always on, by the least change in the metric of M.
 
@@ -237,11 +322,11 @@ class System:
         v - M^-1 H^T (H M^-1 H^T)^-1 H v. Rows may depend on each other; one whose law has a1 alone holds no position.
 
         Args:
-            q: positions (n,).
+            q: positions (nq,).
             v: velocities (n,); zeros if not given.
 
         Returns:
-            Positions (n,) and velocities (n,).
+            Positions (nq,) and velocities (n,).
 
         Raises:
             SceneError: if no state on the rows is found from there.
@@ -255,12 +340,13 @@ class System:
         """A copy of q0 or v0.
 
         Raises:
-            SceneError: if it has another shape than (n,) or is not finite.
+            SceneError: if it has another shape than (nq,) or (n,), is not finite, or holds a quaternion that is zero.
         """
-        array: Floats = np.array(frozen("simulate", name, value, (self.n,)))
+        at = name.startswith("q")
+        array: Floats = np.array(frozen("simulate", name, value, (self.nq if at else self.n,)))
         if not np.all(np.isfinite(array)):
             raise SceneError(f"simulate.{name} is {array.tolist()}; it must be finite.")
-        return array
+        return self.normalised(f"simulate.{name}", array) if at else array
 
     def _state(self, q: ArrayLike, v: ArrayLike | None) -> tuple[Floats, Floats]:
         return self.checked_state("q", q), self.checked_state("v", np.zeros(self.n) if v is None else v)
@@ -270,5 +356,5 @@ class System:
 
 
 def initial_modes(system: System) -> Bytes:
-    """FREE for every unilateral row, BILATERAL for every other; settling does the rest."""
-    return np.where(np.asarray(system.unilateral, dtype=bool), 0, 5).astype(np.int8)
+    """BILATERAL for every row that holds the others, FREE for every other; settling does the rest."""
+    return np.where(system.held, 5, 0).astype(np.int8)

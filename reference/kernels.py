@@ -1,14 +1,16 @@
 """The functions that make up a mechanism, each with one fixed signature.
 
-n coordinates, nc constraint rows, nu inputs, k the size of the blocks on the mass matrix's diagonal
-(n dense, 1 diagonal), na active rows. Every array is filled by the kernel (H is zero where it writes nothing), none is
-allocated. A run checks this, and that rows, gaps and mass matrix belong together, before it starts (`System.check`).
+nq positions, n velocities (nq = n and q' = v unless there is `velocity`), nc constraint rows, nu inputs, k the size
+of the blocks on the mass matrix's diagonal (n dense, 1 diagonal), na active rows. Every array is filled by
+the kernel (H is zero where it writes nothing), none is allocated. A run checks this, and that rows, gaps and mass
+matrix belong together, before it starts (`System.check`).
 
     dynamics(t, q, v, u, p, M, f, w)     M (n, k) mass blocks: row i holds row i of its own block
                                          f (n,) = B u + tau_ext - c - d - g;  w scratch that `rows` may read
     gaps(t, q, v, p, h, hd)              h, hd (nc,): gap and rate of EVERY row
     rows(t, q, v, p, w, idx, na, H, h, Hdv)
-                                         for j < na and i = idx[j]: H[j] = dh_i/dq (n,), h[j], Hdv[j] = H_i' v
+                                         for j < na and i = idx[j]: H[j] (n,) with h_i' = H_i v, which is dh_i/dq
+                                         where q' = v; h[j], Hdv[j] = H_i' v
     energy(q, v, p, e)                   e (2,) = kinetic, potential
     power(t, q, v, u, p, e)              e (2,) = power of the inputs, power dissipated (optional)
     solve(t, q, v, u, p, w, law, idx, na, vd, lam, hd)
@@ -16,6 +18,8 @@ allocated. A run checks this, and that rows, gaps and mass matrix belong togethe
                                          lam[j] and rates hd[j]; law (nc, 3) = a0, a1, a2; returns 0, or 1 if ill posed;
                                          w is its own scratch: dynamics is not called before it
     control(t, q, v, u, s, p)            optional, called at sampling instants: fills u (nu,), may keep its state in s
+    velocity(t, q, v, p, qd)             optional: qd (nq,) = q' = N(q) v + r(q), where velocities are no derivatives of
+                                         positions. No gap may change along r: it is 0, or keeps a quaternion's length
     watch(t, q, v, p, g)                 optional: g (ng,), each positive until it fires by falling to zero
     switch(t, q, v, p, mode, fired)      optional: writes the discrete variables at the end of p, and may move the mode
                                          of a row to another; fired is the index in g, START at t = 0, or TOUCHED after
@@ -63,6 +67,7 @@ def _signatures(scalar: Any) -> dict[str, Any]:
         "rows": types.void(_T, a, a, a, a, _IDX, types.int64, m, a, a),
         "energy": types.void(a, a, a, a),
         "power": types.void(_T, a, a, a, a, a),
+        "velocity": types.void(_T, a, a, a, a),
     }
 
 
@@ -97,6 +102,7 @@ gaps = _declare("gaps")
 rows = _declare("rows")
 energy = _declare("energy")
 power = _declare("power")
+velocity = _declare("velocity")
 solve = _declare("solve")
 control = _declare("control")
 watch = _declare("watch")

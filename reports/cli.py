@@ -146,6 +146,7 @@ def run(
 @_shared
 @click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
 @click.option("--full", is_flag=True, help="Every case, every rung of every ladder; without it some minutes.")
+@click.option("--minutes", type=click.FloatRange(0.1), help="About how long; ladders end earlier for it.")
 @click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier benchmark.")
 @click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
 @click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
@@ -153,7 +154,7 @@ def run(
 @speaks
 def bench(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    repeats: int | None, full: bool, against: Path | None, what: str | None, limit: float,
+    repeats: int | None, full: bool, minutes: float | None, against: Path | None, what: str | None, limit: float,
 ) -> int:  # fmt: skip
     """Time engines against their error over ladders of tolerances and steps.
 
@@ -162,8 +163,9 @@ def bench(
     from crossbody.reports.bench import command as work
 
     if what is not None:
-        return work.alone(what, (names, wanted, variant, pairs, full, against), repeats, out, _command())
-    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command(), limit)
+        return work.alone(what, (names, wanted, variant, pairs, full, minutes, against), repeats, out, _command())
+    bound = float("inf") if minutes is None else minutes
+    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command(), limit, bound)
 
 
 @cli.command()
@@ -373,9 +375,10 @@ def _obey(arguments: list[str] | None) -> int:
 
 REFUSED = (
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE,
-    errno.ENFILE, errno.ENOMEM,
+    errno.ENFILE, errno.ENOMEM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR,
+    errno.EBUSY, errno.ETXTBSY,
 )  # fmt: skip
-"""What the system may refuse whatever a program does."""
+"""What the system may refuse whatever a program does, paths that a user gave among it."""
 
 
 def _enough() -> int:

@@ -134,6 +134,10 @@ def _hdf_many_chunks(file: object) -> None:
         item.id.write_direct_chunk((i * rows,), raw)
 
 
+def _hdf_tiny_chunks(file: object) -> None:
+    file.create_dataset("t", data=np.arange(200_000.0), chunks=(1,))  # type: ignore[attr-defined]
+
+
 def _hdf_deep(file: object) -> None:
     for _ in range(5000):
         file = file.create_group("g")  # type: ignore[attr-defined]
@@ -287,11 +291,14 @@ def chunk(whole: bytes | int, declared: int | None = None, compression: str = "z
     return record(6, struct.pack("<QQQI", 0, 0, size, 0) + text(compression) + struct.pack("<Q", len(raw)) + raw)
 
 
+MAGIC = b"\x89MCAP0\r\n"
+FOOTER = 29  # bytes of the record
+
+
 def mcap(folder: Path, *records: bytes) -> Path:
     """An MCAP file of these records."""
-    magic = b"\x89MCAP0\r\n"
     end = record(15, struct.pack("<I", 0)) + record(2, struct.pack("<QQI", 0, 0, 0))
-    (folder / "log.mcap").write_bytes(magic + record(1, text("ros2") + text("")) + b"".join(records) + end + magic)
+    (folder / "log.mcap").write_bytes(MAGIC + record(1, text("ros2") + text("")) + b"".join(records) + end + MAGIC)
     return folder / "log.mcap"
 
 
@@ -367,6 +374,37 @@ def _mcap_json(folder: Path) -> Path:
     return mcap(folder, schema(1, ""), channel(1, "/rig", "json"), message(1, nested))
 
 
+def mcap_summary(content: Callable[[], bytes], folder: Path) -> Path:
+    """What a summary has no use for, where a reader looks that wants to know how many messages there are."""
+    path = mcap(folder, DEFINED, message(1, CDR + bytes(8)), message(1, CDR + bytes(8)))
+    raw = path.read_bytes()
+    end = len(raw) - len(MAGIC) - FOOTER
+    footer = record(2, struct.pack("<QQI", end, 0, 0))
+    path.write_bytes(raw[:end] + content() + footer + MAGIC)
+    return path
+
+
+def _summary_chunk(compression: str) -> bytes:
+    return chunk(800 << 20, compression=compression)
+
+
+def _summary_chunks(compression: str) -> bytes:
+    return chunk(record(0x90, bytes(400 << 20)), compression=compression) * 30
+
+
+def _summary_messages() -> bytes:
+    return chunk(message(1, b"") * 10_000_000)
+
+
+def _mcap_empty_chunks(folder: Path) -> Path:
+    return mcap(folder, DEFINED, chunk(b"") * 200_000, message(1, CDR + bytes(8)))
+
+
+def _mcap_schema(folder: Path) -> Path:
+    definition = "".join(f"float64 x{i}\n" for i in range(200_000))
+    return mcap(folder, schema(1, definition), channel(1, "/rig"), message(1, CDR + bytes(1_000_000)))
+
+
 # Bags.
 
 
@@ -394,6 +432,23 @@ INSERT INTO messages(id, topic_id, timestamp) SELECT id, topic_id, timestamp FRO
 def _yaml(path: Path, file: Path) -> None:
     laughs = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]\n" for i in range(1, 60))
     (path / "metadata.yaml").write_text(laughs + (path / "metadata.yaml").read_text())
+
+
+def _yaml_quoted(path: Path, file: Path) -> None:
+    """Laughs behind quoted keys, which a fault of the format of the bag would spell out."""
+    laughs = '"a0": &a0 ["x", "x"]\n' + "".join(f'"a{i}": &a{i} [*a{i - 1}, *a{i - 1}]\n' for i in range(1, 40))
+    told = (path / "metadata.yaml").read_text()
+    told = told.replace("compression_format: ''", '"compression_format": *a39')
+    (path / "metadata.yaml").write_text(laughs + told.replace("compression_mode: ''", "compression_mode: 'FILE'"))
+
+
+def _yaml_deep(path: Path, file: Path) -> None:
+    (path / "metadata.yaml").write_text("a: " + "[" * 400_000)
+
+
+TOPICS = """WITH RECURSIVE n(i) AS (SELECT 100 UNION ALL SELECT i + 1 FROM n LIMIT 60000)
+INSERT INTO topics(id, name, type, serialization_format, offered_qos_profiles, type_description_hash)
+SELECT i, '/t' || i, 'std_msgs/msg/Float64', 'cdr', '', '' FROM n;"""
 
 
 def _zstd_file(path: Path, file: Path) -> None:
@@ -584,13 +639,21 @@ def bombs() -> Iterator[Bomb]:
             **{f"mcap-many-{kind}": partial(_mcap_many, kind) for kind in ("zstd", "lz4")},
             **{f"mcap-exact-{kind}": partial(_mcap_exact, kind) for kind in ("zstd", "lz4")},
             "mcap-objects": _mcap_objects, "mcap-nested": _mcap_nested, "mcap-array": _mcap_array,
+            "mcap-summary-zstd": partial(mcap_summary, partial(_summary_chunk, "zstd")),
+            "mcap-summary-lz4": partial(mcap_summary, partial(_summary_chunk, "lz4")),
+            "mcap-summary-many": partial(mcap_summary, partial(_summary_chunks, "zstd")),
+            "mcap-summary-messages": partial(mcap_summary, _summary_messages),
+            "mcap-empty-chunks": _mcap_empty_chunks, "mcap-schema": _mcap_schema,
             "mcap-itself": _mcap_itself, "mcap-topics": _mcap_topics, "mcap-json": _mcap_json,
         },
         "rosbags": {
             "ros2-view": partial(_ros2, partial(_sql, VIEW)),
             "ros2-generated": partial(_ros2, partial(_sql, GENERATED)),
-            "ros2-yaml": partial(_ros2, _yaml), "ros2-zstd": partial(_ros2, _zstd_file), "ros2-mcap": _ros2_mcap,
-            "ros1-bz2": _bag_bz2, "ros1-nested": _bag_nested, "ros1-empties": _bag_empties, "ros1-array": _bag_array,
+            "ros2-yaml": partial(_ros2, _yaml), "ros2-yaml-quoted": partial(_ros2, _yaml_quoted),
+            "ros2-yaml-deep": partial(_ros2, _yaml_deep), "ros2-topics": partial(_ros2, partial(_sql, TOPICS)),
+            "ros2-zstd": partial(_ros2, _zstd_file), "ros2-mcap": _ros2_mcap,
+            "ros1-bz2": _bag_bz2,
+            "ros1-nested": _bag_nested, "ros1-empties": _bag_empties, "ros1-array": _bag_array,
         },
         "asammdf": {
             **{f"mdf-circle-{what.decode()}": partial(_mdf_circle, what) for what in (b"DG", b"CG", b"CN", b"FH")},
@@ -608,5 +671,6 @@ def bombs() -> Iterator[Bomb]:
 
 HDF: dict[str, Callable[[object], None]] = {
     "big-chunk": _hdf_big_chunk, "small-chunk-unfolds": _hdf_small_chunk_unfolds, "many-chunks": _hdf_many_chunks,
-    "deep": _hdf_deep, "many": _hdf_many, "cycle": _hdf_cycle, "attribute": _hdf_attribute,
+    "deep": _hdf_deep, "many": _hdf_many, "tiny-chunks": _hdf_tiny_chunks,
+    "cycle": _hdf_cycle, "attribute": _hdf_attribute,
 }  # fmt: skip

@@ -29,7 +29,7 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
     single = [joint for joint in joints if joint.type in SINGLE]
     return Scene(
         bodies=tuple(made), joints=tuple(joints), tendons=_tendons(rng, single), actuators=_actuators(rng, joints),
-        loops=_loops(rng, single), gravity=tuple(rng.normal(size=3) * 5.0),
+        loops=(*_loops(rng, single), *_joined(rng, made)), gravity=tuple(rng.normal(size=3) * 5.0),
     )  # fmt: skip
 
 
@@ -110,6 +110,15 @@ def _loops(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Loop, ...
         return ()
     return (Loop(name="coupling", type="joint", first=single[1].name, second=single[2].name,
                  polynomial=(0.1, 0.8, 0.05, -0.02, 0.01)),)  # fmt: skip
+
+
+def _joined(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Loop, ...]:
+    """Points of two bodies, or of one and the world, that are to meet."""
+    if rng.random() < 0.5:
+        return ()
+    ends = (made[-1].name, str(rng.choice(["", *(body.name for body in made[:-1])])))
+    return (Loop(name="joined", type="connect", first=ends[0], second=ends[1], first_position=tuple(rng.normal(size=3)),
+                 second_position=tuple(rng.normal(size=3))),)  # fmt: skip
 
 
 def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actuator, ...]:

@@ -67,3 +67,31 @@ def mirrored(seed: int) -> tuple[Any, float, float]:
     deep, a0 = 10.0 ** rng.uniform(-4.0, -1.0, 2), 10.0 ** rng.uniform(2.0, 5.0)
     x = module(CASE).Numbers(block(), 5.0 * block(), g, H, -np.r_[deep, deep] - H @ q0, q0, v0)
     return x, a0, 2.0 * rng.uniform(0.0, 1.0) * np.sqrt(a0)
+
+
+def known() -> tuple[Any, list[float], list[float]]:
+    """A wall that is left below its surface, and catches again for a moment between the nodes of a step; its start."""
+    x = module(CASE).Numbers(
+        M=np.array([[2.4391139709528056, -0.004530601845406151], [-0.004530601845406151, 2.2658772052392204]]),
+        K=np.array([[5.136513058901176, -4.760670286514174], [-4.760670286514174, 20.084126160464503]]),
+        g=np.array([21.20470166161674, -9.417156246292292]), H=np.array([[0.7088735823598663, -0.39017693281020477]]),
+        c=np.array([0.2688827215161717]), q0=np.array([-0.057749456753125546, 0.20910899512972803]),
+        v0=np.array([-1.9686455140418901, 0.6577546379401609]),
+    )  # fmt: skip
+    return beside(x, 9326.338848429898, 19.31459432494496, [0]), x.q0.tolist(), x.v0.tolist()
+
+
+def drawn(seed: int) -> tuple[Any, list[float], list[float]]:
+    """A random system and a start outside of its walls: up to three coordinates and as many walls."""
+    rng = np.random.default_rng([14, seed])
+    n = int(rng.integers(1, 4))
+    nc = int(rng.integers(1, n + 1))  # no more than coordinates: all of them may press at once
+    root, spring = rng.normal(size=(n, n)), rng.normal(size=(n, n))
+    M, K = root @ root.T + np.eye(n), 10.0 ** rng.uniform(0.0, 2.0) * (spring @ spring.T / n + 0.1 * np.eye(n))
+    g, H, c = 10.0 * rng.normal(size=n), rng.normal(size=(nc, n)), rng.uniform(0.02, 0.5, nc)
+    a0 = 10.0 ** rng.uniform(2.0, 5.0)
+    a1 = 10.0 ** rng.uniform(-2.0, 0.3) * a0**0.5
+    q0, v0 = 0.2 * rng.normal(size=n), 2.0 * rng.normal(size=n)
+    while (H @ q0 + c <= 0.0).any():
+        q0 *= 0.5
+    return beside(module(CASE).Numbers(M, K, g, H, c, q0, v0), a0, a1, slice(None)), q0.tolist(), v0.tolist()

@@ -16,6 +16,7 @@ from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, OutputError, Tier, Trajectory
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import scenes
+from crossbody.reports.bench.errors import hermite
 from crossbody.reports.bench.headline import REFERENCE, headline
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.measure import COLUMNS, bench, joined
@@ -125,6 +126,45 @@ def table(*rungs: tuple[str, float, float, float]) -> pd.DataFrame:
         case="c", profile=profile, tier="A", against="the case", knob="rtol", call_ms=2.0 * frame["median_ms"],
         outcome="finished", known_to=0.0, touches=0.0,
     )  # fmt: skip
+
+
+def test_between_steps_all_are_measured_on_one_grid() -> None:
+    """A parabola is met exactly by cubics through places and rates, however few the steps; not by a chord."""
+    case = cases.load("bouncing_ball", "linear", t_end=0.3)
+    truth = truth_of(case)
+    grid = np.linspace(0.0, case.t_end, 7)
+    few = hermite(truth.at(np.array([0.0, 0.1, 0.3])), grid)
+    np.testing.assert_allclose(few.q, truth.at(grid).q, rtol=1e-14)
+    off = truth.at(np.array([0.0, 0.3]))
+    assert np.abs(hermite(replace(off, v=0.0 * off.v), grid).q - truth.at(grid).q).max() > 0.01
+
+
+def test_an_instant_that_stands_twice_divides_cubics() -> None:
+    t, q = np.array([0.0, 1.0, 1.0, 2.0]), np.array([[1.0], [0.0], [0.0], [1.0]])
+    v = np.array([[-1.0], [-1.0], [1.0], [1.0]])
+    both = replace(
+        truth_of(cases.load("bouncing_ball", "linear")).trajectory, t=t, q=q, v=v, gap=q, lam=0.0 * q,
+        energy=np.zeros((4, 2)), mode=np.zeros((4, 1), dtype=np.int8), ledger=None,
+    )  # fmt: skip
+    np.testing.assert_allclose(hermite(both, np.linspace(0.0, 2.0, 9)).q[:, 0], np.abs(1.0 - np.linspace(0.0, 2.0, 9)))
+
+
+def test_what_is_python_is_said_and_the_native_loop_stands_beside_it() -> None:
+    case = cases.load("bouncing_ball", "listing", t_end=0.5)
+    wanted = [Pick(engine="reference", profile="compiled"), Pick(engine="mujoco", profile="matched")]
+    rows = bench(case, wanted, Effort(repeats=1, every=3, longest=0.3)).set_index("engine")
+    assert (rows.loc[["reference"], "interpreted"] == "").all()
+    assert rows.loc[["reference"], "native_ms"].isna().all()
+    assert rows.loc[["mujoco"], "interpreted"].str.contains("Python|loop over steps").all()
+    assert (rows.loc[["mujoco"], "native_ms"] > 0.02 * rows.loc[["mujoco"], "median_ms"]).all(), "all of its steps"
+    assert (rows.loc[["mujoco"], "native_ms"] < rows.loc[["mujoco"], "median_ms"]).all()
+
+
+@pytest.mark.parametrize(("each", "climb"), [(1.0, 0.5), (1e9, scenes.FULL_EFFORT.climb)])
+def test_a_bound_on_the_whole_shortens_every_ladder(each: float, climb: float) -> None:
+    found = scenes.effort(full=True, every_rung=False, repeats=None, each=each)
+    assert found.climb == climb
+    assert found.longest <= found.climb
 
 
 def test_headline_takes_the_cheapest_run_that_is_as_accurate() -> None:

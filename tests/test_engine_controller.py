@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from crossbody import cases
+from crossbody.engines._delta import torque
 from crossbody.engines._delta.controller import controller
 from crossbody.reference.delta import control, scene
 from crossbody.reference.delta.kinematics import inverse
+from crossbody.reference.systems import _delta_kinematics as kinematics
+from crossbody.reference.systems import delta as kernels
 
 VARIANTS = [("circle", "exact"), ("circle", "approximate"), ("pd", "exact")]
 
@@ -118,3 +121,34 @@ def test_the_integral_of_the_error_is_bounded(maker):
     grown = np.abs(wide - tight).max(axis=1)
     assert grown[:3].max() < 1e-12 * np.abs(wide).max(), "the bound is not reached in the first samples"
     assert grown[-1] > 1e-3
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_torques_gaps_and_energies_of_the_engines_are_those_of_the_reference(seed, sign):
+    """In any pose, closed or not: the kernels that the reference runs, and what the engines work out for themselves."""
+    rng = np.random.default_rng(seed)
+    case = cases.load("soft_contact", "delta", sign=sign)
+    robot = scene.robot_of(case.parameters)
+    p, own = robot.array(), torque.numbers(robot)
+    for q, v in zip(case.q0[:9] + 0.3 * rng.standard_normal((20, 9)), rng.standard_normal((20, 9)), strict=True):
+        y, x, asked = np.ascontiguousarray(q[::3]), q.reshape(3, 3)[:, 1:].ravel(), rng.standard_normal(3)
+        z, hold, found = np.empty((3, 3))
+        Jy, My, X = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 3))
+        kinematics.jacobians(p, y, x, z, Jy, X, hold)
+        kinematics.task_mass(p, y, x, True, My)
+        torque.motor_torque(y, x, asked, own, found)
+        np.testing.assert_allclose(found, My @ np.linalg.solve(Jy, asked) + hold, rtol=1e-11)
+        gap, rate, energy = np.empty(6), np.empty(6), np.empty(2)
+        kernels.gaps(0.0, q, v, p, gap, rate)
+        kernels.energy(q, v, p, energy)
+        gaps, energies = torque.gaps_and_energy(robot, q[None], v[None])
+        np.testing.assert_allclose(gaps[0], gap, atol=1e-14)
+        np.testing.assert_allclose(energies[0], energy, rtol=1e-13, atol=1e-14)
+
+
+def test_a_pose_without_a_direction_has_no_torque():
+    robot = scene.robot_of(cases.load("soft_contact", "delta").parameters)
+    found = np.zeros(3)
+    torque.motor_torque(np.zeros(3), np.zeros(6), np.ones(3), torque.numbers(robot), found)
+    assert np.isnan(found).all()

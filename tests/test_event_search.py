@@ -10,30 +10,20 @@ from many_contacts import constant
 from numpy.polynomial.chebyshev import chebvander
 from rippled_walls import rippled
 from scipy.optimize import linprog
-from springs import CASE, beside, outside, parameters_outside, system_of
+from springs import CASE, known, outside, parameters_outside, system_of
 from test_machines import gusty
 
+from crossbody import cases, engines
 from crossbody.cases import Law, Mode
 from crossbody.cases._load import module
 from crossbody.reference import System, ensemble, kernels, simulate
-from crossbody.reference.core import dop853_table, esdirk, filters
-
-
-def _missed() -> Any:
-    """A wall that is left below its surface, and catches again for a moment between the nodes of a step."""
-    return module(CASE).Numbers(
-        M=np.array([[2.4391139709528056, -0.004530601845406151], [-0.004530601845406151, 2.2658772052392204]]),
-        K=np.array([[5.136513058901176, -4.760670286514174], [-4.760670286514174, 20.084126160464503]]),
-        g=np.array([21.20470166161674, -9.417156246292292]), H=np.array([[0.7088735823598663, -0.39017693281020477]]),
-        c=np.array([0.2688827215161717]), q0=np.array([-0.057749456753125546, 0.20910899512972803]),
-        v0=np.array([-1.9686455140418901, 0.6577546379401609]),
-    )  # fmt: skip
+from crossbody.reference.core import dop853_table, enclosure, esdirk, exact, filters
+from crossbody.reference.core.layout import NODES
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10, 1e-11, 1e-12])
 def test_a_catch_between_the_nodes_of_a_step(rtol):
-    x = _missed()
-    run = simulate(beside(x, 9326.338848429898, 19.31459432494496, [0]), x.q0, x.v0, 1.0, rtol=rtol)
+    run = simulate(*known(), 1.0, rtol=rtol)
     caught = [e for e in run.events if e.before is Mode.BALLISTIC and e.after is Mode.CONTACT]
     assert [round(e.t, 4) for e in caught] == [0.1655]
     assert run.q[-1, 0] == pytest.approx(2.238691, abs=1e-5 if rtol > 1e-7 else 1e-6)
@@ -273,3 +263,36 @@ def test_what_the_stages_say_holds_for_every_polynomial_of_the_methods_degree():
     for places in (dop853_table.C[[4, 8, 10]], esdirk.C[[2, 3, 4]]):
         lagrange = np.vander(x, 3) @ np.linalg.inv(np.vander(places, 3))
         assert 2.0 * float(((x * (1.0 - x)) ** 2 * np.abs(lagrange).sum(axis=1)).max()) <= filters.GAPS_OFF
+
+
+def test_a_rate_that_a_band_was_added_to_agrees_with_its_gap():
+    """The bound on a rate measures what is not a polynomial in it; the band, which its gap knows nothing of, is one."""
+    rng, places = np.random.default_rng(23), np.linspace(0.0, 1.0, NODES)
+    row = np.zeros(2 * NODES)
+    for _ in range(200):
+        rate, width, band = np.polynomial.Polynomial(rng.normal(size=NODES)), rng.uniform(0.01, 1.0), rng.normal()
+        ripple = 1e-3 * rng.normal() * np.polynomial.Polynomial.fromroots(places)
+        row[NODES:] = rate(places) + band
+        for part, bound in ((rate, 0.0), (rate + ripple, abs(ripple.coef[-1]))):
+            row[:NODES] = width * part.integ()(places)
+            g = enclosure.from_gaps.py_func(row, NODES, 0, width, band)
+            assert g == pytest.approx(enclosure.SAFETY * bound, rel=1e-6, abs=1e-8)
+
+
+def test_what_moves_a_colliding_gap_is_bounded_by_its_end():
+    """h'^2 + b0 h^2 only falls under a linear law: the elastic part of a multiplier is least at the end of a step."""
+    rng = np.random.default_rng(29)
+    for _ in range(200):
+        b0, b1 = 10.0 ** rng.uniform(0.0, 8.0), 10.0 ** rng.uniform(-3.0, 5.0)
+        h, hd = rng.normal() / np.sqrt(b0), rng.normal()
+        arc = exact.linear_arc.py_func
+        path = np.array([arc(b0, b1, h, hd, t) for t in np.linspace(0.0, rng.uniform(0.1, 3.0) / np.sqrt(b0), 60)])
+        elastic = max(b1, np.sqrt(b0)) * np.abs(path[:, 1]) + b0 * np.abs(path[:, 0])
+        assert elastic.min() >= np.sqrt(b0 * (path[-1, 1] ** 2 + b0 * path[-1, 0] ** 2)) * (1.0 - 1e-9)
+
+
+def test_rows_at_rest_beside_each_other_are_not_searched():
+    """Balls that touch and hang still are told apart from balls that close in by bounds of the nodes alone."""
+    case = cases.load("newtons_cradle", variant="pendulums")
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-6).run()
+    assert run.counts["guards"] < 20 * run.steps

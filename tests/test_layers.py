@@ -43,6 +43,17 @@ def test_imports_go_one_way(layer: str) -> None:
         assert imported(path) <= BELOW[layer], f"{path.relative_to(ROOT)} imports from above"
 
 
+def test_only_the_reference_runs_the_kernels_of_the_reference() -> None:
+    """An engine that borrows a kernel of what it is compared with agrees whatever that kernel says."""
+    own = {"reference.py", "_equations.py", "_reference_audit.py"}
+    for path in (ROOT / "engines").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        borrowed = [name for name in ("reference.systems", "reference.core", "delta.kinematics") if name in text]
+        # Pinocchio's model takes the placements of its arms, which are data.
+        allowed = path.name in own or (path.name == "_delta_model.py" and borrowed == ["delta.kinematics"])
+        assert not borrowed or allowed, f"{path.relative_to(ROOT)} takes {borrowed}"
+
+
 @pytest.mark.parametrize("arguments", [["--help"], ["list"], ["run", "--help"]])
 def test_listing_imports_nothing_heavy(arguments: list[str]) -> None:
     code = (

@@ -270,6 +270,25 @@ def test_a_manifest_cannot_name_what_is_not_in_its_folder(tmp_path: Path, name: 
         manifest.read(tmp_path / "out")
 
 
+@pytest.mark.parametrize("digest", [None, "", "0" * 32])
+def test_a_stranger_cannot_make_my_files_those_of_crossbody(tmp_path: Path, digest: str | None) -> None:
+    """A manifest listed files that were not there yet; the user made them, and the next study removed them."""
+    out, mine = (
+        tmp_path / "out",
+        ["notes.md", "thesis.csv", "thesis.json", "thesis.parquet", "thesis.html", "sub/x.txt"],
+    )
+    put(out, "old")
+    told = json.loads((out / MARKER).read_text())
+    names = {**told["studies"]["run"], **dict.fromkeys(mine, digest)}
+    told["studies"]["run"] = names if digest is not None else list(names)
+    (out / MARKER).write_text(json.dumps(told))
+    (out / "sub").mkdir()
+    for name in mine:
+        (out / name).write_text("mine")
+    put(out, "new")
+    assert {name: (out / name).read_text() for name in mine} == dict.fromkeys(mine, "mine")
+
+
 def test_no_link_in_a_folder_is_followed_on_writing(tmp_path: Path) -> None:
     outside = tmp_path / "outside"
     outside.mkdir()

@@ -7,6 +7,7 @@ import pytest
 from mechanisms import ball, flyby, oscillator, sliders
 from scipy.integrate import solve_ivp
 
+from crossbody import cases, engines
 from crossbody.cases import Mode
 from crossbody.reference import simulate
 
@@ -40,6 +41,46 @@ def test_the_largest_multiplier_written_is_the_largest_of_the_motion(name, short
     assert (np.diff(run.t) >= 0.0).all()
     grid = 1e4 * (t_end / 2e4) ** 2  # the grid itself misses a0 (dt / 2)^2 / 2 of a peak
     assert run.lam.max(axis=0) == pytest.approx(largest(name), rel=30.0 * rtol + grid)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+@pytest.mark.parametrize("name", ["cubic", "without damping", "three in a row"])
+def test_every_contact_has_its_own_peak(name, rtol):
+    system, q0, v0, t_end = SCENES[name]
+    fine = simulate(system, q0, v0, t_end, rtol=1e-11, samples=np.linspace(0.0, t_end, 10_001))
+    run = simulate(system, q0, v0, t_end, rtol=rtol)
+    touched, contacts = {}, 0
+    for event in run.events:
+        if event.after is Mode.CONTACT:
+            touched[event.contact] = event.t
+        elif event.before is Mode.CONTACT:
+            ends = touched.pop(event.contact), event.t
+            if ends[0] == ends[1]:
+                continue  # touched without pressing
+            here, there = (r.lam[(r.t >= ends[0]) & (r.t <= ends[1]), event.contact] for r in (run, fine))
+            assert here.max() == pytest.approx(there.max(), rel=30.0 * rtol + 1e-3)
+            assert here.max() >= there.max() * (1.0 - 30.0 * rtol)
+            contacts += 1
+    assert contacts
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_a_vibration_that_decays_has_one_peak(rtol):
+    """lam = 9.81 + 9 cos 100 t, and less from period to period: only the first peak is the largest of its contact."""
+    system = ball(a0=1e4, a1=2.0, a2=0.0)
+    run = simulate(system, [-0.0009], [-0.02], 1.0, rtol=rtol, shortcuts=False)
+    assert not [event for event in run.events if event.before is Mode.CONTACT]
+    assert len(run.t) == run.steps + 1 + 1
+
+
+@pytest.mark.parametrize(("variant", "rtol"), [("inside", 1e-6), ("balanced", 1e-9)])
+def test_what_is_written_down_does_not_choose_the_method(variant, rtol):
+    """Rows at peaks cost right-hand sides, which do not count where two methods are compared."""
+    case, reference = cases.load("ball_maze", variant=variant), engines.load("reference")
+    natural, ends = (reference.prepare(case, "compiled", rtol=rtol, **more).run() for more in ({}, {"samples": 2}))
+    assert natural.counts["implicit_steps"] == ends.counts["implicit_steps"] > 0
+    assert natural.steps == ends.steps
+    assert natural.q[-1] == pytest.approx(ends.q[-1], rel=1e-12, abs=1e-15)
 
 
 def sliding_off(angle, rate):

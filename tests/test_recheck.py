@@ -7,20 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from random_walls import drawn, known, springs
+from springs import CASE, drawn, known
 
-from crossbody.cases import Mode
+from crossbody.cases import Law, Mode
+from crossbody.cases._load import module
 from crossbody.reference import recheck, simulate
 
 
 def far(system: Any, row: int) -> Any:
     """The same springs with one wall out of reach."""
-    n, nc = system.n, system.nc
     p = np.array(system.p)
-    M, K, g = p[: n * n].reshape(n, n), p[n * n : 2 * n * n].reshape(n, n), p[2 * n * n : 2 * n * n + n]
-    H, c = p[2 * n * n + n : -nc].reshape(nc, n), p[-nc:].copy()
-    c[row] += 1e3
-    return springs(M, K, g, H, c, system.a0[0], system.a1[0])
+    p[2 * system.n**2 + system.n + row] += 1e3
+    law = Law(a0=system.a0, a1=system.a1, a2=system.a2, unilateral=np.ones(system.nc, dtype=bool))
+    return module(CASE).from_numbers(p, system.n, law)
 
 
 @pytest.mark.parametrize("samples", [None, np.linspace(0.0, 1.0, 501)], ids=["own steps", "samples"])

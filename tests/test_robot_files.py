@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from crossbody.cases import InvalidValue, Outcome, SceneError, UnknownName
 from crossbody.cases.files.mjcf import compiled, scene_of
 from crossbody.cases.files.reading import model_of
 from crossbody.cases.files.reading import scene_of as scene_of_file
+from crossbody.reference import System, simulate
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
@@ -66,6 +68,199 @@ def test_published_robots_have_the_dynamics_of_mujoco(robot: str) -> None:
         theirs = data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias
         assert np.abs(M - full).max() <= SAME * np.abs(full).max()
         assert np.abs(f - theirs).max() <= SAME * np.abs(theirs).max()
+
+
+FLOATING = """
+<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="base" pos="0 0 1"><freejoint/>
+<geom type="box" size=".2 .15 .05" mass="3"/>
+<body name="leg" pos=".2 0 0"><joint name="hip" type="ball" {ball}/>
+<geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="1"/>
+<body name="shank" pos="0 0 -.4"><joint name="knee" axis="0 1 0" stiffness="4" springref=".5"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".6"/></body></body>
+<body name="tail" pos="-.2 0 0"><joint name="tail" axis="0 1 1"/>
+<geom type="capsule" fromto="0 0 0 -.3 0 .1" size=".02" mass=".4"/>
+</body></body></worldbody><contact><exclude body1="base" body2="leg"/><exclude body1="base" body2="tail"/>
+<exclude body1="base" body2="shank"/><exclude body1="leg" body2="shank"/><exclude body1="leg" body2="tail"/>
+<exclude body1="shank" body2="tail"/></contact>
+<keyframe><key name="thrown" qpos="0 0 1 .9 .3 .2 -.1 .8 .1 -.4 .2 .3 -.2"
+qvel=".5 -.3 4 1.5 -2.5 1 .5 2 -1 3 -2"/></keyframe>
+</mujoco>
+"""
+
+
+def floating(folder: Path, **fields: str) -> str:
+    path = folder / "floating.xml"
+    path.write_text(FLOATING.format(**{"ball": "", **fields}), encoding="utf-8")
+    return str(path)
+
+
+def turned(q: Any) -> Any:
+    """Rotations of the base and of the hip."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(np.concatenate([q[:, 3:7], q[:, 7:11]]), scalar_first=True).as_matrix()
+
+
+def test_a_floating_robot_moves_alike_in_three_engines(tmp_path: Path) -> None:
+    case = cases.load(floating(tmp_path, ball='damping=".05" stiffness="3"'), t_end=1.0)
+    assert case.quaternions == (3, 7)
+    assert (len(case.coordinates), len(case.velocities)) == (13, 11)
+    ours = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
+    others = [
+        engines.load("reference").prepare(case, "cvode", rtol=1e-12).run(),
+        engines.load("reference").prepare(case, "ida", rtol=1e-12).run(),
+        engines.load("pinocchio").prepare(case, "law", rtol=1e-12).run(),
+        engines.load("mujoco").prepare(case, "matched", dt=2e-4).run(),
+    ]
+    for run in others:
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(turned(run.q[-1:]) - turned(ours.q[-1:])).max() <= 1e-8
+        assert np.abs(run.q[-1, [0, 1, 2, 11, 12]] - ours.q[-1, [0, 1, 2, 11, 12]]).max() <= 1e-8
+        assert np.abs(run.v[-1] - ours.v[-1]).max() <= 1e-7
+        assert np.abs(run.energy[-1].sum() - ours.energy[-1].sum()) <= 1e-7
+
+
+def momenta(model: Any, q: Any, v: Any) -> Any:
+    """Linear momentum and angular momentum about the centre, by MuJoCo, at every row."""
+    data, found = mujoco.MjData(model), []
+    for one, rate in zip(q, v, strict=True):
+        data.qpos[:], data.qvel[:] = one, rate
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        found.append([*data.subtree_linvel[0] * model.body_subtreemass[0], *data.subtree_angmom[0]])
+    return np.array(found)
+
+
+def test_a_floating_robot_keeps_energy_and_momenta(tmp_path: Path) -> None:
+    """Over 5 s at rtol 1e-11 nothing drifts by more than 1e-10 of its size."""
+    path = floating(tmp_path)
+    case = cases.load(path, t_end=5.0)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-11, samples=101).run()
+    assert run.outcome is Outcome.FINISHED
+    energy = run.energy.sum(axis=1)
+    size = np.abs(run.energy).max()
+    assert np.abs(energy - energy[0]).max() <= 1e-10 * size
+    momentum = momenta(mujoco.MjModel.from_xml_path(path), run.q, run.v)
+    momentum[:, 2] += 5.0 * 9.81 * run.t
+    assert np.abs(momentum - momentum[0])[:, :3].max() <= 1e-10 * np.abs(momentum[:, :3]).max()
+    assert np.abs(momentum - momentum[0])[:, 3:].max() <= 1e-10 * np.abs(momentum[:, 3:]).max()
+
+
+def robot(name: str, **parameters: Any) -> cases.Case:
+    path = ROBOTS / f"{name}.xml"
+    if not path.is_file():
+        pytest.skip(f"The robot's file {path} is not here.")
+    return cases.load(str(path), without="friction,contacts", **parameters)
+
+
+@pytest.mark.parametrize(("name", "rows"), [("agility_cassie/cassie", 12), ("robotiq_2f85/2f85", 6)])
+def test_planar_loops_closed_in_space_leave_out_what_follows(name: str, rows: int) -> None:
+    """Rank 10 of 12 and 4 of 6; the loops stay closed, and what was left out has no multiplier."""
+    case = robot(name, assemble=True)
+    joined = [i for i, loop in enumerate(case.contacts) if loop.startswith("loop") and loop[-2:] in (" x", " y", " z")]
+    assert len(joined) == rows
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-10).run()
+    assert run.outcome is Outcome.FINISHED
+    assert np.abs(run.gap[:, joined]).max() < 1e-9
+    assert np.isnan(run.lam[-1, joined]).sum() == 2
+    assert run.counts["redundant"] == 2
+
+
+def test_loops_of_a_robot_move_alike_in_another_solver() -> None:
+    case = robot("agility_cassie/cassie", assemble=True, t_end=0.03)
+    runs = [engines.load("reference").prepare(case, profile, rtol=1e-9).run() for profile in ("compiled", "cvode")]
+    assert all(run.outcome is Outcome.FINISHED for run in runs)
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() < 1e-8
+
+
+def test_a_start_that_does_not_assemble_is_refused_with_the_nearest() -> None:
+    case = robot("agility_cassie/cassie")
+    with pytest.raises(SceneError, match=r"off row 0, which is always on.*The nearest on all such rows is q0"):
+        engines.load("reference").prepare(case, "compiled")
+
+
+def test_bounds_and_a_coupling_that_depend_on_each_other_do_not_end_a_run() -> None:
+    """Both fingers of a gripper stand at their bounds and follow each other: one bound holds them both."""
+    run = engines.load("reference").prepare(robot("franka_emika_panda/panda", t_end=0.2), "compiled").run()
+    assert run.outcome is Outcome.FINISHED
+
+
+FOUR_BAR = """
+<mujoco><worldbody><body><joint name="crank" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 .3" size=".02" mass="1"/>
+<body pos="0 0 .3"><joint name="coupler" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .6 0 0" size=".02" mass="2"/>
+<body name="last" pos=".6 0 0"><joint name="rocker" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.4" size=".02" mass="1"/>
+</body></body></body></worldbody><equality>{loops}</equality>
+<contact/><keyframe><key name="turning" qpos=".2 .1 -.3" qvel="0 0 0"/></keyframe></mujoco>
+"""
+
+
+def test_a_loop_given_twice_moves_as_once(tmp_path: Path) -> None:
+    """Rows that follow from others change nothing: one loop has rank 2 of 3, two of them at one place 2 of 6."""
+    loop = '<connect name="{}" body1="last" anchor="0 0 -.4" solref="-1 -2"/>'
+    ends = []
+    for count in (1, 2):
+        path = tmp_path / "bar.xml"
+        text = FOUR_BAR.format(loops="".join(loop.format(f"loop {k}") for k in range(count)))
+        path.write_text(text, encoding="utf-8")
+        case = cases.load(str(path), t_end=1.0, without="contacts", assemble=True)
+        run = engines.load("reference").prepare(case, "compiled", rtol=1e-11).run()
+        assert run.outcome is Outcome.FINISHED
+        assert run.counts["redundant"] == 3 * count - 2
+        assert np.abs(run.gap).max() < 1e-9
+        ends.append(np.concatenate([run.q[-1], run.v[-1]]))
+    assert np.abs(ends[0]).max() > 0.5
+    assert np.abs(ends[0] - ends[1]).max() < 1e-9
+
+
+def test_loops_move_alike_in_three_engines(tmp_path: Path) -> None:
+    """A four-bar in MuJoCo and in Pinocchio, whose rows are its own; and a robot with redundant loops in both."""
+    path = tmp_path / "bar.xml"
+    loop = '<connect name="loop" body1="last" anchor="0 0 -.4" solref="-1 -2"/>'
+    path.write_text(FOUR_BAR.format(loops=loop), encoding="utf-8")
+    bar = cases.load(str(path), t_end=0.3, without="contacts", assemble=True)
+    for case in (bar, robot("agility_cassie/cassie", assemble=True, t_end=0.004)):
+        runs = [
+            engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
+            engines.load("mujoco").prepare(case, "matched", dt=2e-4).run(),
+            engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
+        ]
+        for run in runs:
+            assert run.outcome is Outcome.FINISHED
+            assert np.abs(run.q[-1] - runs[0].q[-1]).max() < 1e-8
+
+
+def test_a_row_that_was_left_out_and_does_not_follow_ends_the_run() -> None:
+    """Dropping a row that holds by itself is seen: its gap opens."""
+    from mechanisms import ball
+
+    system = replace_rows(ball(), unilateral=False, redundant=[0])
+    run = simulate(system, [0.0], [1.0], 1.0, consistent=False)
+    assert run.outcome is Outcome.INCONSISTENT
+    assert "Row 0 followed from the others at the start and was left out" in run.message
+
+
+def replace_rows(system: System, **changes: Any) -> System:
+    """The system with other rows."""
+    names = [field.name for field in dataclasses.fields(System) if field.init]
+    return System(**({name: getattr(system, name) for name in names} | changes))
+
+
+def test_an_unnamed_floating_box_runs_in_every_engine(tmp_path: Path) -> None:
+    path = write(tmp_path, more='<body name="box" pos="3 0 2"><freejoint/><geom size=".1"/></body>')
+    text = Path(path).read_text(encoding="utf-8")
+    Path(path).write_text(text[: text.index("<keyframe>")] + "</mujoco>", encoding="utf-8")
+    case = cases.load(path, t_end=0.2)
+    for engine, profile in (
+        ("reference", "compiled"),
+        ("mujoco", "matched"),
+        ("mujoco", "default"),
+        ("pinocchio", "law"),
+    ):
+        run = engines.load(engine).prepare(case, profile).run()
+        assert run.outcome is Outcome.FINISHED
+        assert run.q[-1, 4] == pytest.approx(2.0 - 0.5 * 9.81 * 0.2**2, abs=1e-2 if profile == "default" else 1e-9)
 
 
 def test_an_arm_moves_alike_in_three_engines(tmp_path: Path) -> None:
@@ -148,7 +343,6 @@ def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
     ("fields", "said"),
     [
         ({"shoulder": 'frictionloss=".1"'}, "shoulder.*friction"),
-        ({"more": '<body name="box"><freejoint/><geom size=".1"/></body>'}, "free"),
         ({"shoulder": 'actuatorgravcomp="true" actuatorfrclimited="true" actuatorfrcrange="-1 1"'}, "shoulder"),
         ({"integrator": 'RK4" wind="1 0 0'}, "wind"),
         ({"integrator": 'RK4" density="1'}, "medium"),

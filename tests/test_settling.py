@@ -59,9 +59,9 @@ DAMPED = [
 ]
 
 
-def _swings(zeta, n, rtol):
+def _swings(zeta, n, rtol, solver="compiled"):
     case = cases.load("newtons_cradle", variant="pendulums", zeta=zeta, n=n)
-    run = engines.load("reference").prepare(case, "compiled", rtol=rtol).run()
+    run = engines.load("reference").prepare(case, solver, rtol=rtol).run()
     assert run.outcome.ok, f"zeta {zeta}, n {n}, rtol {rtol}: {run.message}"
 
 
@@ -70,7 +70,13 @@ def test_pendulums_that_swing_together_do_not_cycle(zeta, n, rtol):
     _swings(zeta, n, rtol)
 
 
+@pytest.mark.parametrize("solver", ["cvode", "ida"])
+def test_pendulums_that_collapse_do_not_cycle_in_the_other_solvers(solver):
+    _swings(1.0, 7, 1e-6, solver)
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
 @pytest.mark.parametrize(("zeta", "n", "rtol"), DAMPED)
-def test_no_damped_cradle_cycles(zeta, n, rtol):
-    _swings(zeta, n, rtol)
+def test_no_damped_cradle_cycles(zeta, n, rtol, solver):
+    _swings(zeta, n, rtol, solver)

@@ -157,10 +157,10 @@ def test_how_far_the_loop_is_from_its_right_hand_sides():
 
 
 def _evaluations(
-    dynamics, gaps, rows, energy, power, solve, control, watch, switch, state, model, work, buffers, count
+    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch, state, model, work, buffers, count
 ):  # fmt: skip
     s = state[0]
-    K = Kernels(dynamics, gaps, rows, energy, power, solve, control, watch, switch)
+    K = Kernels(dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch)
     m, w, b = open_model(model), open_work(work), open_buffers(buffers)
     b.mode[0] = CONTACT
     activate(s, m, w, b.mode)

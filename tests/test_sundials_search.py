@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_walls import drawn, known
+from springs import drawn, known
 
+from crossbody.cases import Mode
 from crossbody.reference import simulate
 from crossbody.reference.sundials import roots
 
@@ -20,6 +21,15 @@ def test_a_window_between_two_nodes_is_found(rtol: float, solver: str) -> None:
     run = simulate(system, q0, v0, 1.0, rtol=rtol, solver=solver, samples=[1.0])
     assert run.outcome.ok, run.message
     assert run.q[-1, 0] == pytest.approx(2.2386906796, abs=1e-8 + 10.0 * rtol)
+
+
+@pytest.mark.parametrize("rtol", [9.07e-12, 9.98e-12, 1e-9])
+def test_a_touch_that_does_not_press_does_not_flicker(rtol: float) -> None:
+    """A spring pulls the body off while it closes: at its touch it is let go, and rounding does not open it."""
+    system, q0, v0 = drawn(5380)
+    run = simulate(system, q0, v0, 0.02, rtol=rtol, solver="ida")
+    assert run.outcome.ok, run.message
+    assert [event.after for event in run.events] == [Mode.CONTACT, Mode.BALLISTIC]
 
 
 def compared(seed: int, solver: str) -> float:

@@ -6,14 +6,16 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
-from random_scenes import SINGLE, random_scene, random_state
+from random_scenes import random_scene, random_state
 
-from crossbody.cases import CaseUnsupported
+from crossbody.cases import CaseUnsupported, Mode, SceneError
 from crossbody.cases.files.case import case_of, rows_of
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import Actuator, Body, Joint, Scene
 from crossbody.engines import load
 from crossbody.engines.mujoco import _build as build
+from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 
@@ -35,6 +37,12 @@ def ours(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
     mechanism.dynamics(0.0, q, v, u, table.p, M, f, np.full(table.scratch, np.nan))
     mechanism.energy(q, v, table.p, e)
     return M, f, e
+
+
+def rates(scene: Scene, q: Any, v: Any) -> Any:
+    qd = np.full(scene.nq, np.nan)
+    mechanism.velocity(0.0, q, v, tabulate(scene).p, qd)
+    return qd
 
 
 def close(mine: Any, theirs: Any) -> bool:
@@ -62,12 +70,12 @@ def test_mass_matrix_forces_and_energy_are_those_of_mujoco(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forces_do_the_work_that_the_energy_says(seed: int) -> None:
     """dT/dt + dV/dt = P_in - P_dissipated along v' = M^-1 f, by complex steps of the kernels."""
-    scene = random_scene(seed, types=SINGLE)
+    scene = random_scene(seed)
     rng, table = np.random.default_rng(seed), tabulate(scene)
     q, v, u = random_state(scene, rng)
     M, f, _ = ours(scene, q, v, u)
     vd, step, e = np.linalg.solve(M, f), 1e-30, np.zeros(2, dtype=complex)
-    mechanism.energy(q + 1j * step * v, v + 1j * step * vd, table.p.astype(complex), e)
+    mechanism.energy(q + 1j * step * rates(scene, q, v), v + 1j * step * vd, table.p.astype(complex), e)
     power = np.zeros(2)
     mechanism.power(0.0, q, v, u, table.p, power)
     assert close(e.imag.sum() / step, power[0] - power[1])
@@ -76,26 +84,61 @@ def test_forces_do_the_work_that_the_energy_says(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rows_belong_to_their_gaps(seed: int) -> None:
     """H v is the rate of h, and H' v the rate of H v at v' = 0, by complex steps."""
-    scene = random_scene(seed, types=SINGLE)
+    scene = random_scene(seed)
     count = len(rows_of(scene)[0])
     if not count:
         return
     rng, table, step = np.random.default_rng(seed), tabulate(scene), 1e-30
     q, v, _ = random_state(scene, rng)
     H, h, Hdv = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count)
-    mechanism.rows(0.0, q, v, table.p, np.zeros(table.scratch), np.arange(count), count, H, h, Hdv)
+    w = np.zeros(table.scratch)
+    still = np.zeros(len(scene.actuators))
+    mechanism.dynamics(0.0, q, v, still, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
+    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
-    mechanism.gaps(0.0, q + 1j * step * v, v.astype(complex), table.p.astype(complex), *moved)
+    mechanism.gaps(0.0, q + 1j * step * rates(scene, q, v), v.astype(complex), table.p.astype(complex), *moved)
     assert close(moved[0].real, h)
     assert close(moved[0].imag / step, H @ v)
     assert close(moved[1].imag / step, Hdv)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_points_that_meet_are_those_of_mujoco(seed: int) -> None:
+    """Gaps, rows and their rates of `connect`; H'v by what MuJoCo's rows are at two instants of a motion."""
+    scene = random_scene(seed)
+    joined = [loop for loop in scene.loops if loop.type == "connect"]
+    if not joined:
+        return
+    scene = scene.replace(loops=tuple(joined))
+    model = build.compiled(build.spec_of(scene), scene)
+    data, table, rng = mujoco.MjData(model), tabulate(scene), np.random.default_rng(seed)
+
+    def look(q: Any, v: Any) -> tuple[Any, Any]:
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        return np.array(data.efc_pos[:3]), np.array(data.efc_J).reshape(-1, model.nv)[:3]
+
+    q, v, u = random_state(scene, rng)
+    h, J = look(q, v)
+    if not len(h):
+        return  # MuJoCo leaves out rows that nothing moves
+    H, mine, Hdv, w = np.zeros((3, scene.nv)), np.zeros(3), np.zeros(3), np.zeros(table.scratch)
+    mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
+    mechanism.rows(0.0, q, v, table.p, w, np.arange(3), 3, H, mine, Hdv)
+    assert close(mine, h)
+    assert close(H, J)
+    step, ends = 1e-6, [np.array(q), np.array(q)]
+    mujoco.mj_integratePos(model, ends[0], v, step)
+    mujoco.mj_integratePos(model, ends[1], v, -step)
+    moved = (look(ends[0], v)[1] - look(ends[1], v)[1]) @ v / (2.0 * step)
+    assert np.abs(moved - Hdv).max() <= 1e-7 * max(1.0, np.abs(Hdv).max())
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_every_engine_says_the_same_physics(seed: int) -> None:
     from crossbody.reports.judging.audit import audit
 
-    scene = random_scene(seed, types=SINGLE)
+    scene = random_scene(seed)
     case = case_of(scene.replace(loops=()))  # a loop that the start is not on is refused
     theirs = load("reference").prepare(case, "compiled").audit()
     for engine, profile in (("mujoco", "matched"), ("pinocchio", "law")):
@@ -105,3 +148,57 @@ def test_every_engine_says_the_same_physics(seed: int) -> None:
             pytest.fail(str(error))
         for row in audit(mine, theirs, case):
             assert row.ok, (engine, row)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rates_of_positions_are_those_of_mujoco(seed: int) -> None:
+    """q' against the difference of positions that MuJoCo integrates; quaternions keep their length to first order."""
+    scene = random_scene(seed)
+    model, step = compiled(scene), 1e-6
+    q, v, _ = random_state(scene, np.random.default_rng(seed))
+    ahead, behind = np.array(q), np.array(q)
+    mujoco.mj_integratePos(model, ahead, v, step)
+    mujoco.mj_integratePos(model, behind, v, -step)
+    assert np.abs(rates(scene, q, v) - (ahead - behind) / (2.0 * step)).max() <= 1e-8 * np.abs(v).max()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_coordinates_of_pinocchio_lead_there_and_back(seed: int) -> None:
+    """There and back is the identity, power is the same, and v' of aba is that of our equations through the map."""
+    scene = random_scene(seed)
+    scene = scene.replace(loops=(), tendons=(), actuators=tuple(a for a in scene.actuators if a.joint))
+    case, rng = case_of(scene), np.random.default_rng(seed)
+    rows = load("pinocchio").prepare(case, "law").scene.rows
+    to = Coordinates(scene)
+    q, v, _ = random_state(scene, rng)
+    r = to.theirs(q)
+    u, tau = to.back(r, v), rng.normal(size=scene.nv)
+    assert close(to.ours(r), q)
+    assert close(to.velocities(r, u), v)
+    assert close(to.back(r, tau) @ u, tau @ v)
+    free = tuple(int(Mode.FREE) for _ in range(rows.nc))
+    vd = to.velocities(r, rows.accelerate(r, u, free)[0]) + to.bend(r, u)
+    M, f, _ = ours(scene, q, v, np.zeros(len(scene.actuators)))
+    assert np.abs(vd - np.linalg.solve(M, f)).max() <= 1e-10 * np.abs(vd).max()
+    ahead, behind, step = r.copy(), r.copy(), 1e-6
+    for place, sign in ((ahead, 1.0), (behind, -1.0)):
+        place[:] = pin.integrate(rows.model, r, sign * step * u)
+    assert np.abs(to.rates(r, u) - (ahead - behind) / (2.0 * step)).max() <= 1e-8 * np.abs(u).max()
+
+
+@pytest.mark.parametrize(
+    ("joint", "actuator", "said"),
+    [
+        ({"type": "free", "stiffness": (1.0, 0.0, 0.0)}, {}, "springs of a free joint"),
+        ({"type": "ball"}, {"bias": (0.0, -3.0, 0.0)}, "length"),
+        ({"type": "ball", "range": (0.0, 1.0)}, {}, "bounds of a ball joint"),
+    ],
+)
+def test_what_turns_and_is_not_done_is_refused(joint: dict[str, Any], actuator: dict[str, Any], said: str) -> None:
+    body = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    scene = Scene(
+        bodies=(body,), joints=(Joint(name="j", body="b", **joint),),
+        actuators=(Actuator(name="a", joint="j", gear=(1.0, 0.0, 0.0), **actuator),) if actuator else (),
+    )  # fmt: skip
+    with pytest.raises(SceneError, match=said):
+        tabulate(scene)

@@ -245,6 +245,31 @@ def test_what_was_stored_of_other_parameters_or_settings_is_not_taken(change: di
     assert deviations(other, replace(entry, settings=settings)) == {}
 
 
+@pytest.mark.parametrize(("default", "scale", "told"), [(True, 1.0, 0), (True, 2.0, 1), (False, 2.0, 0)])
+def test_an_engine_whose_own_settings_have_changed_is_outside(default: bool, scale: float, told: int) -> None:
+    shipped = load("bouncing_ball", "linear")
+    run = engines.load("reference").prepare(shipped, "compiled")
+    settings = {**run.settings, "rtol": scale * run.settings["rtol"]}
+    entry = Entry(engine="reference", profile="compiled", run=run.run(), settings=settings, default=default)
+    rows = [row for row in judged(shipped, [entry], truth_of(shipped), "") if row.metric == "settings"]
+    assert [row.verdict for row in rows] == told * [Word.OUTSIDE]
+    assert all("rtol=2e-09" in row.why for row in rows)
+
+
+@pytest.mark.parametrize("claimed", [False, True])
+def test_events_that_a_run_does_not_have_are_outside_and_no_known_property_covers_them(
+    claimed: bool, case: Case, motion: Trajectory
+) -> None:
+    claims = (Claim(metric="event_times", expected=0.0, tier=Tier.A, source="the truth"),) if claimed else ()
+    known = replace(case, limits=(Limit(metric="*", known="it is known to do that"),), claims=claims)
+    silent = replace(motion, events=(), mode=np.zeros_like(motion.mode))
+    rows = {
+        row.metric: row for row in judged(known, [Entry(engine="fake", profile="", run=silent)], truth_of(case), "")
+    }
+    assert math.isnan(rows["event_times"].value)
+    assert rows["event_times"].verdict == Word.OUTSIDE
+
+
 def test_a_number_that_is_missing_is_expected_only_where_it_was_missing_before(case: Case, motion: Trajectory) -> None:
     silent = replace(motion, ledger=None)
     known = replace(case, limits=(Limit(metric="*", known="it is known to do that"),))

@@ -16,6 +16,21 @@ def claims(variant: str, p: Mapping[str, Value], maze: Maze) -> tuple[Claim, ...
     return tuple(made[variant](p, maze)) if variant in made else ()
 
 
+def fallen(p: Mapping[str, Value], maze: Maze) -> float:
+    """Height through which the ball has moved on its face at most, over its circle's radius, from small motions.
+
+    On top of a face its angle grows as cosh, inside it swings as cos; infinite where a controller moves the maze.
+    """
+    angle, outer = abs(float(p["angle"])), p["side"] == "outer"
+    if p["controller"] != "off" or not angle:
+        return math.inf
+    ring = maze.rings[int(p["ring"])]
+    R, rho = (ring.outer, ring.outer + maze.ball) if outer else (ring.inner, ring.inner - maze.ball)
+    turned = cf.pole(tilted_gravity(p), rho, _effective_mass(p, R)) * float(p["t_end"])
+    grown = math.cosh(min(turned, 100.0)) if outer else math.cos(min(turned, 0.5 * math.pi))
+    return abs(math.cos(min(angle * grown, math.pi)) - math.cos(angle))
+
+
 def _effective_mass(p: Mapping[str, Value], R: float) -> float:
     return cf.effective_mass(float(p["ball_mass"]), R, float(p["maze_inertia"]), bool(p["rolling"]))
 

@@ -151,6 +151,17 @@ class Fall:
         return bounce * self.blow / (1.0 / self.p["mass"] + self.p["half_width"] ** 2 / self.inertia)
 
     @property
+    def aloft(self) -> float:
+        """Time behind that blow for which no lower corner can strike again, s.
+
+        Turning draws what hangs below the centre up, so that a corner falls no faster than freely.
+        """
+        p, a, b = self.p, self.p["half_width"], self.p["half_height"]
+        up = cf.restitution(p["zeta4"]) * self.blow, self.struck * (1.0 / p["mass"] - a * a / self.inertia)
+        spin = self.turning(0.0) + self.struck * a / self.inertia
+        return min(2.0 * min(up) / p["gravity"], math.atan2(b, a) / abs(spin))
+
+    @property
     def settling(self) -> float:
         """Time from the first touch until the left corner hands over to CONTACT, s; infinite if later than level."""
         p = self.p

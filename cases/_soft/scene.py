@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases._case import Law, Parameter, Value
+from crossbody.cases._case import Coordinate, Law, Parameter, Value
 from crossbody.cases._errors import InvalidValue, SceneError
 
 FINGERS = {
@@ -46,6 +46,19 @@ COORDINATES = (
     ("flange", "m"), ("left pad", "m"), ("right pad", "m"), ("block", "m"), ("integral of the error", "m s"),
     ("left sensor", "N s"), ("right sensor", "N s"), ("shift of the fingers", "m s"),
 )  # fmt: skip
+
+
+_FELT = 0.05
+"""Part of the force of the squeeze from which on a sensor feels something: errors of 1e-12 m in a pad are 2e-8 N."""
+
+
+def coordinate(p: Mapping[str, float], name: str, unit: str) -> Coordinate:
+    """A coordinate of either variant: sensors carry momenta, whose rates are forces; the jaws set the pace."""
+    if unit == "N s":
+        force = _FELT * p["kp"] * p["squeeze"]
+        return Coordinate(name=name, unit=unit, size=force / p["ks"], rate=force)
+    closing = (p["jaw"] + p["squeeze"]) / (p["close_end"] - p["close_start"]) if unit == "m" else 0.0
+    return Coordinate(name=name, unit=unit, rate=closing)
 
 
 def numbers(parameters: Mapping[str, Value]) -> dict[str, float]:

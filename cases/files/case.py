@@ -13,6 +13,8 @@ import numpy as np
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
 from crossbody.cases._errors import SceneError, UnknownName
+from crossbody.cases._rotations import normalised
+from crossbody.cases.files.assemble import assembled
 from crossbody.cases.files.controls import read_controls
 from crossbody.cases.files.reading import findings_of, model_of, scene_of
 from crossbody.cases.scene import RowLaw, Scene
@@ -24,6 +26,7 @@ PARAMETERS = {
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
     "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
+    "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
 
@@ -55,6 +58,8 @@ class FileCase:
         """Return the case of one keyframe."""
         index = list(self.VARIANTS).index(variant) if self.model.nkey else -1
         q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
+        if p["assemble"]:
+            q0 = assembled(model_of(self.path, str(p["without"])), q0)
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
@@ -124,6 +129,7 @@ def case_of(
         SceneError: for a scene that no engine here can run, naming what stands against it.
     """
     check_runnable(scene)
+    start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
     names, laws, unilateral = rows_of(scene)
     law = Law(
         a0=np.array([one.a0 for one in laws]), a1=np.array([one.a1 for one in laws]),
@@ -131,8 +137,9 @@ def case_of(
     )  # fmt: skip
     return Case(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
-        mechanism="scene", parameters=dict(parameters or {"t_end": t_end}), coordinates=coordinates(scene),
-        contacts=tuple(names), q0=reference_pose(scene) if q0 is None else q0,
+        mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
+        coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
+        contacts=tuple(names), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
         file=file, findings=findings,
     )  # fmt: skip
@@ -144,22 +151,47 @@ def check_runnable(scene: Scene) -> None:
     Raises:
         SceneError: naming the part.
     """
-    for joint in scene.joints:
-        if joint.type in ("free", "ball"):
-            raise SceneError(f"Joint {joint.name!r} is of type {joint.type}: only slides and hinges can be run.")
     for part in scene.bounded:
         if part.friction_loss:
             raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
 
 
-def coordinates(scene: Scene) -> tuple[Coordinate, ...]:
-    """Return names and units of q."""
-    return tuple(Coordinate(name=joint.name, unit="m" if joint.type == "slide" else "rad") for joint in scene.joints)
+ENTRIES = {
+    "free": ((*"xyz", "qw", "qx", "qy", "qz"), ("m",) * 3 + ("1",) * 4),
+    "ball": (("qw", "qx", "qy", "qz"), ("1",) * 4),
+    "slide": (("",), ("m",)),
+    "hinge": (("",), ("rad",)),
+}
+RATES = ENTRIES | {
+    "free": ((*"xyz", "rx", "ry", "rz"), ("m",) * 3 + ("rad",) * 3),
+    "ball": (("rx", "ry", "rz"), ("rad",) * 3),
+}
+"""Names and units of the positions and of the velocities of each kind of joint."""
+
+
+def coordinates(scene: Scene, entries: Any = ENTRIES) -> tuple[Coordinate, ...]:
+    """Return names and units of q, or of v by `RATES`."""
+    return tuple(
+        Coordinate(name=f"{joint.name} {name}".strip(), unit=unit)
+        for joint in scene.joints
+        for name, unit in zip(*entries[joint.type], strict=True)
+    )
+
+
+def quaternions(scene: Scene) -> tuple[int, ...]:
+    """Return where in q each quaternion begins."""
+    units = [coordinate.name.endswith(" qw") for coordinate in coordinates(scene)]
+    return tuple(np.flatnonzero(units).tolist())
 
 
 def reference_pose(scene: Scene) -> Floats:
     """Return q at the pose that `Body.position` gives."""
-    return np.array([joint.reference for joint in scene.joints])
+    placed = {body.name: (*body.position, *body.orientation) for body in scene.bodies}
+    parts: list[Any] = []
+    for joint in scene.joints:
+        single = (1.0, 0.0, 0.0, 0.0) if joint.type == "ball" else (joint.reference,)
+        parts.append(placed[joint.body] if joint.type == "free" else single)
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def held(scene: Scene, ctrl: Any = None) -> Inputs | None:

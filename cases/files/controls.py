@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Inputs
 from crossbody.cases._errors import InvalidValue
+from crossbody.cases._regular import open_regular
 from crossbody.cases.scene import Scene
 
 
@@ -24,6 +25,7 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
     """
     names = [actuator.name for actuator in scene.actuators]
     try:
+        open_regular(path).close()
         times, values = _from_npz(path, names) if path.suffix == ".npz" else _from_table(path, names)
     except (OSError, ValueError, KeyError, UnicodeDecodeError) as error:
         raise InvalidValue(f"Controls {path}: {error}") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from crossbody.cases._regular import open_regular
 from crossbody.cases.files import mjcf, urdf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import Scene
@@ -19,7 +20,7 @@ HEAD = 4096
 
 def is_urdf(path: Path) -> bool:
     """Return whether a file is a URDF."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return path.suffix == ".urdf" or b"<robot" in file.read(HEAD)
 
 

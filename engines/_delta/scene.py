@@ -14,7 +14,6 @@ from crossbody.engines._delta.controller import Controller, controller
 from crossbody.engines._delta.forces import table
 from crossbody.engines._linear import Spot
 from crossbody.reference.delta import Robot, scene
-from crossbody.reference.systems import delta as kernels
 
 
 class Drive:
@@ -82,16 +81,6 @@ class Delta:
         if len(q) > 1:
             q[:, 2::3] = np.unwrap(q[:, 2::3], axis=0)
         return q, v
-
-
-def closures(robot: Robot, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Gaps (n, 6), m, of the loops and energies (n, 2), J, of absolute angles and rates (n, 9)."""
-    p, gap, rate, energy = robot.array(), np.empty((len(q), 6)), np.empty(6), np.empty((len(q), 2))
-    q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
-    for i in range(len(q)):
-        kernels.gaps(0.0, q[i], v[i], p, gap[i], rate)
-        kernels.energy(q[i], v[i], p, energy[i])
-    return gap, energy
 
 
 def delta(case: Case) -> Delta:

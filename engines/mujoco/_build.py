@@ -13,8 +13,14 @@ from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
 
 
 def compiled(spec: Any, scene: Scene) -> Any:
-    """Return the compiled model, with what no element of the format says: where the springs of ball joints rest."""
+    """Return the compiled model, with what no element of the format says.
+
+    That is where the springs of ball joints rest, and the second point of a `connect`, which is computed there.
+    """
     model = spec.compile()
+    for i, loop in enumerate(scene.loops):
+        if loop.type == "connect":
+            model.eq_data[i, 3:6] = loop.second_position
     for joint in scene.joints:
         if joint.type == "ball":
             at = int(model.joint(joint.name).qposadr[0])
@@ -81,12 +87,17 @@ def _add_tendon(spec: Any, tendon: Tendon) -> None:
 
 
 def _add_loop(spec: Any, loop: Loop) -> None:
-    if loop.type != "joint":
+    if loop.type == "weld":
         raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
-    added = spec.add_equality(name=loop.name, type=mujoco.mjtEq.mjEQ_JOINT, active=True)
-    added.objtype = mujoco.mjtObj.mjOBJ_JOINT
+    kind = mujoco.mjtEq.mjEQ_JOINT if loop.type == "joint" else mujoco.mjtEq.mjEQ_CONNECT
+    added = spec.add_equality(name=loop.name, type=kind, active=True)
+    added.objtype = mujoco.mjtObj.mjOBJ_JOINT if loop.type == "joint" else mujoco.mjtObj.mjOBJ_BODY
     added.name1, added.name2 = loop.first, loop.second
-    added.data[:5] = loop.polynomial
+    if loop.type == "joint":
+        added.data[:5] = loop.polynomial
+    else:
+        added.name1, added.name2 = loop.first or "world", loop.second or "world"
+        added.data[:3] = loop.first_position
     added.solref, added.solimp = _solref(loop.law), IMPEDANCE
 
 

@@ -1,4 +1,4 @@
-"""Any scene of slides and hinges in MuJoCo: matched, built from the scene; default, the file as it stands."""
+"""Any scene in MuJoCo: matched, built from the scene; default, the file as it stands."""
 
 from __future__ import annotations
 
@@ -57,7 +57,13 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     M, n, forces, step = np.zeros((model.nv, model.nv)), model.nv, Forces(scene), 1e-6
     mujoco.mj_fullM(model, data, M)
     lift = step * np.eye(n)
-    K = np.array([(forces(q + d, v) - forces(q - d, v)) / (2.0 * step) for d in lift]).T
+
+    def moved(d: Floats) -> Floats:
+        found = np.array(q)
+        mujoco.mj_integratePos(model, found, d, 1.0)
+        return found
+
+    K = np.array([(forces(moved(d), v) - forces(moved(-d), v)) / (2.0 * step) for d in lift]).T
     D = np.array([(forces(q, v + d) - forces(q, v - d)) / (2.0 * step) for d in lift]).T
     A = np.block([[np.zeros((n, n)), np.eye(n)], [np.linalg.solve(M, K), np.linalg.solve(M, D)]])
     return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
@@ -113,6 +119,7 @@ def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
     def start() -> None:
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = case.q0, case.v0
+        mujoco.mj_forward(model, data)  # the rows that are always on stand there only then
 
     return start
 
@@ -139,14 +146,13 @@ class Rows:
         self.always = sum(loop.width for loop in scene.loops)
         self.places: dict[tuple[int, int, bool], int] = {}
         row = self.always
-        groups = ((int(LIMITS[0]), scene.joints, model.joint), (int(LIMITS[1]), scene.tendons, model.tendon))
-        for kind, parts, named in groups:
-            for part in parts:
-                i = int(named(part.name).id)
-                for upper, bound in enumerate(part.range):
-                    if np.isfinite(bound):
-                        self.places[kind, i, bool(upper)] = row
-                        row += 1
+        for j, part in enumerate(scene.bounded):  # in the model's order: a file need not name them
+            tendon = j - len(scene.joints)
+            kind, i = (int(LIMITS[0]), j) if tendon < 0 else (int(LIMITS[1]), tendon)
+            for upper, bound in enumerate(part.range):
+                if np.isfinite(bound):
+                    self.places[kind, i, bool(upper)] = row
+                    row += 1
         self.nc = row
 
     def constants(self) -> dict[str, Any]:
@@ -175,8 +181,7 @@ class Rows:
         J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
         if kind == LIMITS[0]:
             return self.places[kind, part, bool(J.sum() < 0.0)]
-        tendon = next(one for one in self.scene.tendons if self.model.tendon(one.name).id == part)
-        slope = J[int(self.model.joint(tendon.joints[0]).dofadr[0])] * tendon.coefficients[0]
+        slope = J @ tendons(self.scene)[part]
         return self.places[kind, part, bool(slope < 0.0)]
 
     def modes(self) -> Modes:
@@ -187,11 +192,12 @@ class Rows:
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
         data = mujoco.MjData(self.model)
-        T = tendons(self.scene)
+        forces = Forces(self.scene)
 
         def heights(q: Floats) -> list[float]:
             h: list[float] = []
-            lengths = [*q, *(T @ q)]
+            x_all = forces.x(q)
+            lengths = [*(x_all[forces.place[joint.name]] for joint in self.scene.joints), *(forces.T @ x_all)]
             for part, x in zip(self.scene.bounded, lengths, strict=True):
                 low, high = part.range
                 h += [x - low - part.margin] if np.isfinite(low) else []

@@ -115,6 +115,9 @@ class Pinocchio:
     }
     versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": sksundae.__version__}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    interpreted: Mapping[str, str] = {
+        "*": "the loop over steps, the rows of the law, gaps; Pinocchio's algorithms are called from Python"
+    }
     hidden: Mapping[str, Mapping[str, str]] = {"*": {"ledger": "These runs keep no account of the work of their rows."}}
 
     def why_not(self, case: Case, profile: str) -> str | None:
@@ -221,9 +224,9 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
 
 
 def _absolute(scene: Scene, rtol: float) -> Floats:
-    """Absolute tolerances (2 n,): rtol of how far and how fast the scene moves."""
-    n = scene.rows.model.nv
-    return rtol * np.concatenate([np.broadcast_to(size, (n,)) for size in scene.sizes])
+    """Absolute tolerances (nq + nv,): rtol of how far and how fast the scene moves."""
+    widths = (scene.rows.model.nq, scene.rows.model.nv)
+    return rtol * np.concatenate([np.broadcast_to(size, (n,)) for size, n in zip(scene.sizes, widths, strict=True)])
 
 
 def _start(case: Case, scene: Scene) -> tuple[Floats, Floats]:
@@ -257,7 +260,7 @@ def _flowing(machine: Callable[[], Machine], case: Case, scene: Scene, used: Map
     rtol, method, limit = float(used["rtol"]), str(used.get("method", "Adams")), int(used["max_steps"])
 
     def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
-        flow = Flow(machine(), log, rtol, _absolute(scene, rtol), method, limit, scene.world)
+        flow = Flow(machine(), log, rtol, _absolute(scene, rtol), method, limit, scene.world, scene.coordinates)
         flow.run(*_start(case, scene), case.t_end)
         return flow, {"rhs": flow.rhs}
 

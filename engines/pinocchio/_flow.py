@@ -12,6 +12,7 @@ from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Log
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Settled, first_modes
+from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._scene import World
 from crossbody.reference.sundials.quiet import quiet
 
@@ -36,12 +37,13 @@ class Flow:
 
     def __init__(
         self, machine: Machine, log: Log, rtol: float, atol: Floats, method: str, max_steps: int,
-        world: World | None = None,
+        world: World | None = None, coordinates: Coordinates | None = None,
     ) -> None:  # fmt: skip
         self.machine, self.rows, self.log, self.max_steps = machine, machine.rows, log, max_steps
         self.world = world or World()
-        self.n = len(atol) // 2
-        self.q, self.v = np.empty(self.n), np.empty(self.n)  # Pinocchio and CVODE do not share memory
+        self.coordinates = coordinates
+        self.n = len(atol) // 2 if coordinates is None else coordinates.nq
+        self.q, self.v = np.empty(self.n), np.empty(len(atol) - self.n)  # Pinocchio and CVODE do not share memory
         self.vd: Floats = np.zeros(self.n)
         self.steps = self.rhs = self.still = 0
         self.outcome, self.message = Outcome.FINISHED, ""
@@ -121,7 +123,7 @@ class Flow:
 
     def _switch(self, t: float, y: Floats, fired: Fired, first: bool = False) -> Floats:
         """Record an instant, let the machine look at it, and record it again if something switched."""
-        q, v = y[: self.n].copy(), y[self.n :].copy()
+        q, v = self._state(y)
         lam = self.rows.accelerate(q, v, self.modes)[1]
         if not first:
             self.log.add(t, q, v, lam, self.modes)
@@ -132,7 +134,7 @@ class Flow:
             self.modes = settled.modes
             self.log.events += settled.events(t)
             lam = self.rows.accelerate(q, settled.v, self.modes)[1]
-        y = np.concatenate((q, settled.v))
+        y = np.concatenate((y[: self.n], settled.v))
         if settled.passed or first:
             self.log.add(t, q, settled.v, lam, self.modes)
         if settled.cycle:
@@ -145,22 +147,35 @@ class Flow:
 
     def _overran(self, before: Floats, after: Floats, fired: Fired) -> bool:
         """Whether a free row came from above its surface and stands below it without its touch having been found."""
-        h = self.rows.gaps(after[: self.n], after[self.n :])[0]
+        h = self.rows.gaps(*self._state(after))[0]
         if not (h < 0.0).any():
             return False
-        above = self.rows.gaps(before[: self.n], before[self.n :])[0]
+        above = self.rows.gaps(*self._state(before))[0]
         free = [i for i, m in enumerate(self.modes) if m == Mode.FREE]
         return any(h[i] < 0.0 < above[i] and (i, 0) not in fired for i in free)
+
+    def _state(self, y: Floats) -> tuple[Floats, Floats]:
+        """Copies of q, with quaternions of length 1, and v."""
+        q, v = y[: self.n].copy(), y[self.n :].copy()
+        self._normalise(q)
+        return q, v
+
+    def _normalise(self, q: Floats) -> None:
+        """Bring quaternions to length 1: Pinocchio's rnea is wrong for any other."""
+        if self.coordinates is not None:
+            self.coordinates.normalise(q)
 
     def _rhs(self, _t: float, y: NDArray[Any], yp: NDArray[Any]) -> None:
         n = self.n
         self.rhs += 1
         self.q[:], self.v[:] = y[:n], y[n:]
-        yp[:n] = self.v
+        yp[:n] = self.v if self.coordinates is None else self.coordinates.rates(self.q, self.v)
+        self._normalise(self.q)
         yp[n:] = self.vd = self.rows.accelerate(self.q, self.v, self.modes)[0]
 
     def _watch(self, y: NDArray[Any], out: NDArray[Any]) -> None:
         self.q[:], self.v[:] = y[: self.n], y[self.n :]
+        self._normalise(self.q)
         self.machine.watch(self.q, self.v, self.modes, out)
 
     def _end(self, outcome: Outcome, t: float, y: Floats, what: str) -> Floats:

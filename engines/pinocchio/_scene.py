@@ -10,6 +10,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Chart, Observe
+from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._rows import PinRows
 
 Points = Sequence[Any] | Callable[[Floats], Sequence[Any]]
@@ -54,6 +55,7 @@ class Scene:
         start: q and v at the start in the engine's coordinates; None where they are the case's.
         chart: positions and velocities of the engine -> those of the case; None where they are the same.
         world: what acts from outside.
+        coordinates: rates of the positions, where they are not v; None where they are.
         audit: more for the parity audit, or instead of what is read from `rows`.
     """
 
@@ -64,4 +66,5 @@ class Scene:
     start: tuple[Floats, Floats] | None = None
     chart: Chart | None = None
     world: World = field(default_factory=World)
+    coordinates: Coordinates | None = None
     audit: dict[str, Any] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Any scene of slides and hinges in Pinocchio: its own model, joint by joint, with rows and forces written apart."""
+"""Any scene in Pinocchio: its own model, joint by joint, with rows and forces written apart."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import _scene as parts
+from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio._joined import Joined, by_least_norm
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -32,25 +34,49 @@ def build(case: Case, algebra: str) -> Prepared:
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     forces = parts.Forces(scene)
-    rows = parts.Rows(scene, forces)
+    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if loop.type != "connect")), forces)
     model, placed = tree(scene)
     model.armature[:] = forces.armature
-    reference = np.array([joint.reference for joint in scene.joints])
+    to = Coordinates(scene)
     data = model.createData()
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
-        tau[:] = forces(q + reference, v) + lifted(scene, model, data, placed, q)
+        # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
+        ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
+        tau[:] = to.back(q, ours) + lifted(scene, model, data, placed, q)
 
-    pinned = PinRows(
-        model, jacobian=lambda q: rows.jacobian(q + reference), heights=lambda q: rows.heights(q + reference),
-        drift=lambda q, v: rows.drift(q + reference, v), law=case.law, algebra=algebra, forces=apply,
-    )  # fmt: skip
-    span = np.ones(scene.nv)
+    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type == "connect"))
+    order = _order(scene)
+
+    def heights(q: Floats) -> Floats:
+        return np.concatenate([rows.heights(to.ours(q)), joined.heights(q)])[order]
+
+    def jacobian(q: Floats) -> Floats:
+        return np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q)])[order]
+
+    def drift(q: Floats, v: Floats) -> Floats:
+        return np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v)])[order]
+
+    pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
+    if joined.ends:  # planar loops have rows that depend on each other
+        pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
+    start = to.theirs(case.q0)
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, forces, rows, reference), sizes=(span, span),
-        start=(case.q0 - reference, case.v0), chart=lambda q, v: (q + reference, v), world=_world(case, forces),
-        audit=_audit(scene, pinned, forces, apply, reference),
+        rows=pinned, observe=_observe(scene, model, forces, heights, to), sizes=(np.ones(to.nq), np.ones(to.nv)),
+        start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
+        world=_world(case, forces), audit=_audit(scene, pinned, forces, apply, to),
+        coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def _order(scene: Scene) -> list[int]:
+    """Return where each row of a scene stands where all of `connect` come last."""
+    wide = np.repeat([loop.type == "connect" for loop in scene.loops], [loop.width for loop in scene.loops])
+    bounds = np.isfinite([part.range for part in scene.bounded]).sum()
+    last = np.concatenate([wide, np.zeros(bounds)]).astype(bool)
+    stands = np.empty(len(last), dtype=int)
+    stands[np.concatenate([np.flatnonzero(~last), np.flatnonzero(last)])] = np.arange(len(last))
+    return list(stands.tolist())
 
 
 def tree(scene: Scene) -> tuple[Any, Placed]:
@@ -65,7 +91,8 @@ def tree(scene: Scene) -> tuple[Any, Placed]:
             if joint.body != body.name:
                 continue
             anchor = pin.SE3(np.eye(3), np.array(joint.anchor))
-            carrier = model.addJoint(carrier, _joint(joint), pose * anchor, joint.name)
+            before = pin.SE3.Identity() if joint.type == "free" else pose * anchor
+            carrier = model.addJoint(carrier, _joint(joint), before, joint.name)
             pose = anchor.inverse()
         placed[body.name] = (carrier, pose)
         model.appendBodyToJoint(carrier, _inertia(body), pose)
@@ -78,9 +105,9 @@ def _pose(position: Any, orientation: Any) -> Any:
 
 
 def _joint(joint: Joint) -> Any:
+    if joint.type in ("free", "ball"):
+        return pin.JointModelFreeFlyer() if joint.type == "free" else pin.JointModelSpherical()
     kinds = {"hinge": pin.JointModelRevoluteUnaligned, "slide": pin.JointModelPrismaticUnaligned}
-    if joint.type not in kinds:
-        raise CaseUnsupported(f"Joint {joint.name!r} of type {joint.type} is not built in Pinocchio.")
     return kinds[joint.type](np.array(joint.axis))
 
 
@@ -106,7 +133,7 @@ def lifted(scene: Scene, model: Any, data: Any, placed: Placed, q: Floats) -> Fl
     return total
 
 
-def _observe(scene: Scene, model: Any, forces: parts.Forces, rows: parts.Rows, reference: Floats) -> Any:
+def _observe(scene: Scene, model: Any, forces: parts.Forces, heights: Any, to: Coordinates) -> Any:
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
     placed = tree(scene)[1]
@@ -122,9 +149,9 @@ def _observe(scene: Scene, model: Any, forces: parts.Forces, rows: parts.Rows, r
                     carrier, pose = placed[body.name]
                     height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
                     energy[i, 1] += body.weightless * body.mass * height
-        at = q + reference
+        at = to.ours(q)
         energy[:, 1] += forces.energy(at)
-        return np.array([rows.heights(one) for one in at]).reshape(len(q), -1), energy
+        return np.array([heights(one) for one in q]).reshape(len(q), -1), energy
 
     return observe
 
@@ -141,26 +168,35 @@ def _world(case: Case, forces: parts.Forces) -> World:
     return World(instants=given.times.tolist(), change=change, reset=lambda: forces.change(0.0 * forces.u))
 
 
-def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, reference: Floats) -> dict[str, Any]:
+def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:
     """What differs from the rows' own audit: masses body by body, forces at zero input, and the scene's coordinates."""
     model, data = rows.model, rows.data
     on = rows_on(rows)
 
     def bias(q: Floats, v: Floats) -> Floats:
         forces.change(0.0 * forces.u)
-        apply(q - reference, v, rows.tau)
-        total: Floats = pin.nonLinearEffects(model, data, q - reference, v) - rows.tau
+        r = to.theirs(q)
+        u = to.back(r, v)
+        apply(r, u, rows.tau)
+        own = pin.nonLinearEffects(model, data, r, u) - rows.tau
+        total: Floats = to.velocities(r, own) - M(q) @ to.bend(r, u)
         return total
+
+    def M(q: Floats) -> Floats:
+        r = to.theirs(q)
+        half = to.velocities(r, mass_matrix(model, data, r))  # J M J^T: J is orthogonal
+        return to.velocities(r, half.T)
 
     def lam(q: Floats, v: Floats) -> Floats:
         forces.change(0.0 * forces.u)
-        return rows.accelerate(q - reference, v, on)[1]
+        r = to.theirs(q)
+        return rows.accelerate(r, to.back(r, v), on)[1]
 
     return {
         "masses": np.array([body.mass for body in scene.bodies]),
-        "M": lambda q: mass_matrix(model, data, q - reference),
+        "M": M,
         "bias": bias,
-        "H": lambda q: rows.jacobian(q - reference),
+        "H": lambda q: to.velocities(to.theirs(q), rows.jacobian(to.theirs(q))),
         "lam": lam,
     }
 

@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from crossbody.cases import ColumnMapError, FormatUnavailable, LogFormatError, _registry
+from crossbody.cases._regular import open_regular
 from crossbody.hw.formats._bounded import Bounded
 from crossbody.hw.formats._budget import MEMORY, Budget, opening
 from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group, Reader
@@ -100,7 +101,7 @@ def _head(path: Path) -> bytes:
             return b""
         if not stat.S_ISREG(mode):
             raise LogFormatError(path, "is a device or a pipe; name a file.")
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(HEAD)
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None

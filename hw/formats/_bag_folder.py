@@ -8,13 +8,15 @@ from pathlib import Path
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats._budget import Budget, current
-from crossbody.hw.formats._guard import fault
+from crossbody.hw.formats._guard import fault, parsing
 from crossbody.hw.formats.mcap import records
 
-LARGEST_YAML = 1 << 22  # bytes of metadata.yaml
-ALIAS = re.compile(rb"^[^\n'\"]*?(?::|-)\s+[&*][\w-]", re.MULTILINE)  # anchors and what refers to them
+LARGEST_YAML = 1 << 19  # bytes of metadata.yaml, which is read at some 400 kB/s: a topic takes 300
+DEEPEST_YAML = 32  # levels
+MOST_TOPICS = 2000  # of a bag: each is looked for among all definitions, and gone through of its own
 MESSAGES = re.compile(rb"^\s*compression_mode:\s*['\"]?message", re.MULTILINE | re.IGNORECASE)
 PIECE = 1 << 20  # bytes that are unfolded at a time
+FEW = ("topics", "message_definitions")  # tables of a bag that are read whole
 KINDS = ("table", "index")  # of the entries of a database that hold what they show
 
 
@@ -40,14 +42,29 @@ def check_bag(path: Path) -> None:
 
 
 def _check_metadata(path: Path, file: Path) -> None:
+    """Refuse what no recorder writes by the events of the YAML, before anything is made of them."""
     if file.stat().st_size > LARGEST_YAML:
         raise LogFormatError(path, f"has a metadata.yaml of more than {LARGEST_YAML} bytes.")
     text = file.read_bytes()
-    if ALIAS.search(text):
-        raise LogFormatError(path, "has a metadata.yaml with anchors, which no recorder writes.")
+    with parsing(path, "ROS 2 bag"):
+        _check_events(path, text)
     if MESSAGES.search(text):
         text_ = "is compressed message by message, which is not read: `ros2 bag convert` unpacks it."
         raise LogFormatError(path, text_)
+
+
+def _check_events(path: Path, text: bytes) -> None:
+    """Refuse anchors and aliases, which unfold, and levels without an end, however keys are written."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
+
+    depth = 0
+    for event in YAML(typ="safe", pure=True).parse(text.decode()):
+        if isinstance(event, AliasEvent) or getattr(event, "anchor", None):
+            raise LogFormatError(path, "has a metadata.yaml with anchors, which no recorder writes.")
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        if depth > DEEPEST_YAML:
+            raise LogFormatError(path, f"has a metadata.yaml of more than {DEEPEST_YAML} levels.")
 
 
 def _check_database(path: Path, file: Path) -> None:
@@ -63,6 +80,10 @@ def _check_database(path: Path, file: Path) -> None:
                 raise LogFormatError(path, f"has a {kind} {shown!r} that computes what it shows.")
             if kind == "table" and any(row[6] for row in link.execute("SELECT * FROM pragma_table_xinfo(?)", (name,))):
                 raise LogFormatError(path, f"has a table {shown!r} with columns that are computed.")
+            if kind == "table" and name in FEW:
+                query = f"SELECT count(*) FROM (SELECT 1 FROM {name} LIMIT {MOST_TOPICS + 1})"
+                if link.execute(query).fetchone()[0] > MOST_TOPICS:
+                    raise LogFormatError(path, f"has more than {MOST_TOPICS} {name.replace('_', ' ')}.")
     except sqlite3.Error as error:
         raise fault(path, "ROS 2 bag", error) from error
     finally:

@@ -19,10 +19,11 @@ from pathlib import Path
 
 from crossbody.cases import LogFormatError, _arguments
 
-MOST_COLUMNS = 20_000  # of a file: each costs a few kilobytes of checks
+MOST_COLUMNS = 10_000  # of a file: each costs a few kilobytes and half a millisecond of checks
 MEMORY = 1 << 30  # bytes over the file's own size
-PATIENCE = 5.0  # s of processor time for a file of no size
-SLOWEST = 250e3  # bytes of a file that are read in a second at least: JSON of a resting rig, compressed, reaches 1e6
+PATIENCE = 7.0  # s of processor time for a file of up to `PATIENT` bytes
+PATIENT = 5_000_000  # the slowest log that is known, JSON of a resting rig, compressed, is read at 1e6 bytes a second
+SLOWEST = 250e3  # bytes of what is larger that are read in a second at least
 PART = 4  # of the memory, what a file of no size may unfold to: 3e7 numbers, which take seconds to check
 RATIO = 100  # numbers to file: a log of changing numbers reaches 10, zeros in deflate 1000
 BLOCK = 512  # bytes of `st_blocks`, whatever the file system
@@ -52,7 +53,7 @@ class Budget:
         self._path = path
         self.size = _occupied(path)
         self.memory, self.most = memory + self.size, memory // PART + RATIO * self.size
-        self.seconds = PATIENCE + self.size / SLOWEST
+        self.seconds = (PATIENCE + max(self.size - PATIENT, 0) / SLOWEST) * max(1.0, memory / MEMORY)
         self._spent, self.taken, self._entered = 0, 0.0, math.nan
         self._ceiling = min(_private() + self.memory, sys.maxsize)
 
@@ -74,7 +75,8 @@ class Budget:
         """
         taken = self.taken + (0.0 if math.isnan(self._entered) else time.thread_time() - self._entered)
         if taken > self.seconds:
-            text = f"takes more than {self.seconds:.3g} s to unfold, as no log of {_shown(self.size)} does."
+            text = f"takes more than {self.seconds:.3g} s to unfold, as no log of {_shown(self.size)} does"
+            text += " (`memory` raises the limit)."
             raise LogFormatError(self._path, text)
         self._spent += decoded
         if self._spent > self.most:

@@ -71,13 +71,13 @@ def grouped(tables: Iterable[Table]) -> tuple[Group, ...]:
     )
 
 
-def place(tables: Iterable[Table], column: str) -> tuple[Table, int | None]:
-    """The array that holds a column, and its element there."""
+def places(tables: Iterable[Table]) -> dict[str, tuple[Table, int | None]]:
+    """Every column's array, and its element there; of columns with one name the first."""
+    found: dict[str, tuple[Table, int | None]] = {}
     for table in tables:
-        for i, found in enumerate(table.columns):
-            if found.name == column:
-                return table, None if table.width is None else i
-    raise KeyError(column)
+        for i, column in enumerate(table.columns):
+            found.setdefault(column.name, (table, None if table.width is None else i))
+    return found
 
 
 def spans(rows: int) -> Iterator[tuple[int, int]]:

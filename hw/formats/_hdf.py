@@ -12,11 +12,12 @@ import numpy as np
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
-from crossbody.hw.formats._grouping import Table, grouped, layout, place, spans
+from crossbody.hw.formats._grouping import Table, grouped, layout, places, spans
 from crossbody.hw.formats._guard import library, parsing
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MOST_OBJECTS = 20_000  # groups and datasets of a file
+MOST_CHUNKS, TINY = 50_000, 1024  # chunks of a dataset, where they have fewer bytes than this: each takes some 20 us
 DEEPEST = 32  # groups inside one another; the library itself recurses without an end
 LONGEST = 4096  # bytes of an attribute that is read
 CACHE = 1 << 20  # bytes of chunks that HDF5 keeps of its own accord
@@ -50,6 +51,7 @@ class HdfReader:
             self._file.close()
             raise
         self.groups = grouped(self._tables)
+        self._places = places(self._tables)
 
     def _walk(self, prefix: str, group: Any, depth: int) -> None:
         """List the datasets below a group, each object once, whatever links lead to it."""
@@ -87,6 +89,9 @@ class HdfReader:
             return f"holds {str(item.dtype)[:LONGEST]}, not numbers"
         if item.shape is None or not layout(item.shape):
             return f"has shape {item.shape}, which is no table"
+        small = item.chunks and math.prod(item.chunks) * item.dtype.itemsize < TINY
+        if small and _chunks(item) > MOST_CHUNKS:
+            return f"is cut into more than {MOST_CHUNKS} chunks of less than {TINY} bytes: `h5repack` joins them"
         return ""
 
     def _add(self, key: str, name: str, item: Any) -> None:
@@ -103,7 +108,7 @@ class HdfReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`. Every chunk is decoded once: those that a block of rows cuts through are kept."""
-        wanted = {name: place(self._tables, name) for name in columns}
+        wanted = {name: self._places[name] for name in columns}
         with parsing(self._path, self._what):
             items = self._items({table.key for table, _ in wanted.values()})
         for start, stop in spans(group.rows or 0):
@@ -148,12 +153,16 @@ def _chunk_bytes(item: Any) -> int:
     return int(math.prod(item.chunks) * item.dtype.itemsize * across)
 
 
+def _chunks(item: Any) -> int:
+    """Number of chunks that a dataset's shape asks for; 0 for what is not chunked."""
+    return math.prod(-(-n // c) for n, c in zip(item.shape, item.chunks, strict=True)) if item.chunks else 0
+
+
 def _missing(item: Any) -> str:
     """Why a dataset's numbers are not all in this file; empty if they are."""
     if item.external or item.is_virtual:
         return "keeps its numbers in another file"
-    chunks = math.prod(-(-n // c) for n, c in zip(item.shape, item.chunks, strict=True)) if item.chunks else 0
-    if item.chunks and item.id.get_num_chunks() < chunks:
+    if item.chunks and item.id.get_num_chunks() < _chunks(item):
         return "is declared but not written in full: cut off?"
     if not item.chunks and item.size and not item.id.get_storage_size():
         return "is declared but never written: cut off?"

@@ -8,21 +8,40 @@ import zlib
 from pathlib import Path
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import Budget
+from crossbody.hw.formats._budget import MOST_COLUMNS, Budget
 
-HEADER = 128  # bytes of the file's own header
+HEADER, TAG = 128, 8  # bytes of the file's own header, and of what stands before every element
 MATRIX, COMPRESSED = 14, 15  # types of elements
 DEEPEST = 16  # matrices inside one another: structs of structs
 MOST = 100_000  # elements of one struct
 PIECE = 1 << 20  # bytes that are unfolded at a time
 
 
-def whole_variable(path: Path, index: int, budget: Budget) -> io.BytesIO:
+def starts(path: Path) -> list[int]:
+    """Where each variable of a file begins, in the order of the file; reads tags only, each once.
+
+    Raises:
+        LogFormatError: if there are more than a log has columns.
+    """
+    found, at, end = list[int](), HEADER, path.stat().st_size
+    with path.open("rb") as file:
+        order = _order(file.read(HEADER))
+        while at + TAG <= end:
+            if len(found) == MOST_COLUMNS:
+                text = f"holds more than {MOST_COLUMNS} variables; a log of so many is not read."
+                raise LogFormatError(path, text)
+            found.append(at)
+            file.seek(at)
+            at += TAG + _tag(file.read(TAG), order)[1]
+    return found
+
+
+def whole_variable(path: Path, start: int, budget: Budget) -> io.BytesIO:
     """One variable as a MAT file of its own, not compressed.
 
     Args:
         path: the file.
-        index: of the variable, in the order of the file.
+        start: where the variable begins, of `starts`.
         budget: what it may unfold to.
 
     Raises:
@@ -30,11 +49,9 @@ def whole_variable(path: Path, index: int, budget: Budget) -> io.BytesIO:
     """
     with path.open("rb") as file:
         header = file.read(HEADER)
-        order = "<" if header[126:128] == b"IM" else ">"
-        for _ in range(index):
-            _, size = _tag(file.read(8), order)
-            file.seek(size, io.SEEK_CUR)
-        kind, size = _tag(file.read(8), order)
+        order = _order(header)
+        file.seek(start)
+        kind, size = _tag(file.read(TAG), order)
         if kind == COMPRESSED:
             whole = _inflated(file, size, budget)
         else:
@@ -42,7 +59,13 @@ def whole_variable(path: Path, index: int, budget: Budget) -> io.BytesIO:
             whole = struct.pack(order + "II", kind, size) + file.read(size)
     budget.hold(3 * len(whole), "a struct and its arrays")
     _check_nesting(path, whole, order)
+    budget.spend(len(whole))
     return io.BytesIO(header + whole)
+
+
+def _order(header: bytes) -> str:
+    """The byte order of a file, as `struct` has it."""
+    return "<" if header[126:128] == b"IM" else ">"
 
 
 def _tag(raw: bytes, order: str) -> tuple[int, int]:

@@ -18,6 +18,7 @@ from crossbody.hw.formats._names import WIDEST
 BLOCK_MESSAGES = 8192
 DEEPEST = 12  # levels of nesting
 LARGEST = 1 << 20  # bytes of a message that is decoded
+MOST_PARTS = 10_000  # messages inside one message: each is an object that takes its time
 STAMP = ({"sec", "nanosec"}, {"sec", "nsec"}, {"secs", "nsecs"})
 Way = tuple[str | int, ...]
 
@@ -66,6 +67,22 @@ def too_large(data: bytes) -> str:
     if len(data) <= LARGEST:
         return ""
     return f"has messages of {len(data)} bytes; pictures and clouds (more than {LARGEST}) are not read"
+
+
+def crowded(message: Any) -> str:
+    """Why no more messages like a decoded one are decoded; empty if they are."""
+    left, count = [message], 0
+    while left:
+        value = left.pop()
+        members = _members(value)
+        if members is not None:
+            count += 1
+            left.extend(members.values())
+        elif isinstance(value, (list, tuple)) and value and (isinstance(value[0], (list, tuple)) or _members(value[0])):
+            left.extend(value[: MOST_PARTS + 1])
+        if count + len(left) > 10 * MOST_PARTS or count > MOST_PARTS:
+            return f"has messages with more than {MOST_PARTS} messages inside; pictures and clouds are not read"
+    return ""
 
 
 def refuse_large(path: Path, topic: str, data: bytes) -> None:

@@ -10,7 +10,7 @@ from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._definitions import fault_of
 from crossbody.hw.formats._guard import library, parsing, words
-from crossbody.hw.formats._messages import Leaf, refuse_large, rows_of, too_large, topic_group
+from crossbody.hw.formats._messages import Leaf, crowded, refuse_large, rows_of, too_large, topic_group
 from crossbody.hw.formats._unfold import Chunks
 
 CLOCKS = ("log_time",)
@@ -75,6 +75,10 @@ class RosbagReader:
                 message = self._bag.deserialize(data, connection.msgtype)
             except KeyError as error:
                 self.refused[topic] = f"has messages of a type that the bag does not define ({words(error)})"
+                continue
+            why = crowded(message)
+            if why:
+                self.refused[topic] = why
                 continue
             group, self._leaves[topic] = topic_group(topic, about.msgcount, message, CLOCKS)
             yield group

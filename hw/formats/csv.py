@@ -21,8 +21,11 @@ from crossbody.hw.formats._names import header_unit
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
 DELIMITERS = ",;\t|"
 BLOCK_BYTES = 1 << 20
+BLOCK_LINES = 256  # at least in a block: what is checked for every column of a block takes its time
+LARGEST_BLOCK = 1 << 25  # bytes
 WIDE = 0.4  # of the letters' second bytes that are zero in UTF-16
-OPENING = 16 << 20  # bytes that pyarrow takes for a few blocks and its own needs
+OPENING = 12 << 20  # bytes that pyarrow takes for its own needs
+BLOCKS = 4  # that it has in memory, as text and as numbers
 COLUMN = 30_000  # bytes that it takes for each column while it parses: 19,000 were seen
 HEAD = 4096  # bytes that tell the encoding
 EXACT = 2**53  # beyond, an integer is no float64
@@ -82,11 +85,14 @@ class CsvReader:
                 options = msgspec.structs.replace(options, encoding=wide_encoding(file.read(HEAD)) or "utf-8")
         self._path, self._options = path, options
         self._delimiter = options.delimiter or _delimiter(path, options)
-        width = _width(path, options, self._delimiter)
+        line = _first_line(path, options)
+        width = line.count(self._delimiter) + 1
         if width > MOST_COLUMNS:  # before anything is made for each of them
             raise LogFormatError(path, f"has {width} columns; a log of more than {MOST_COLUMNS} is not read.")
         # pyarrow ends the process where memory is denied to it: it is not begun with less than it needs.
-        current(path).hold(OPENING + COLUMN * width, f"a table of {width} columns")
+        most = max(BLOCK_BYTES, min(LARGEST_BLOCK, path.stat().st_size))
+        self._block = min(max(BLOCK_BYTES, BLOCK_LINES * len(line)), most)
+        current(path).hold(OPENING + COLUMN * width + BLOCKS * self._block, f"a table of {width} columns")
         self.library = library("pyarrow")
         self.refused: dict[str, str] = {}
         batch, schema = self._first()
@@ -136,7 +142,7 @@ class CsvReader:
             self._path,
             text.ReadOptions(
                 use_threads=False,
-                block_size=BLOCK_BYTES,
+                block_size=self._block,
                 skip_rows=chosen.skip,
                 skip_rows_after_names=int(chosen.units),
                 encoding=chosen.encoding,

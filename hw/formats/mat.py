@@ -12,9 +12,9 @@ import numpy as np
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
-from crossbody.hw.formats._grouping import HINT, Table, cut, grouped, layout, place
+from crossbody.hw.formats._grouping import HINT, Table, cut, grouped, layout, places
 from crossbody.hw.formats._guard import library, parsing
-from crossbody.hw.formats._mat_elements import whole_variable
+from crossbody.hw.formats._mat_elements import starts, whole_variable
 
 SUFFIXES = (".mat",)
 NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
@@ -47,14 +47,16 @@ class MatReader:
         self._tables: list[Table] = []
         self._structs: dict[str, Any] = {}
         with parsing(path, "MAT file"):
+            begins = starts(path)
             listed = whosmat(path)
-        for i, (name, shape, kind) in enumerate(listed):
-            self._list(i, str(name), tuple(map(int, shape)), str(kind))
+            for start, (name, shape, kind) in zip(begins, listed, strict=False):
+                self._list(start, str(name), tuple(map(int, shape)), str(kind))
         self.groups = grouped(self._tables)
+        self._places = places(self._tables)
 
-    def _list(self, index: int, name: str, shape: tuple[int, ...], kind: str) -> None:
+    def _list(self, start: int, name: str, shape: tuple[int, ...], kind: str) -> None:
         if kind == "struct":
-            self._structs[name] = self._struct(index, name)
+            self._structs[name] = self._struct(start, name)
             self._walk(name, name, self._structs[name])
         elif kind not in NUMBERS:
             self.refused[name] = f"is a MATLAB {kind}: {HINT}"
@@ -79,13 +81,12 @@ class MatReader:
         else:
             self.refused[name] = f"is a MATLAB {_kind(value)}: {HINT}"
 
-    def _struct(self, index: int, name: str) -> Any:
+    def _struct(self, start: int, name: str) -> Any:
         """A struct, decoded once: what it holds is only known when it has been."""
         from scipy.io import loadmat
 
-        with parsing(self._path, "MAT file"):
-            whole: Any = whole_variable(self._path, index, self._budget)
-            return loadmat(whole, mat_dtype=False)[name]
+        whole: Any = whole_variable(self._path, start, self._budget)
+        return loadmat(whole, mat_dtype=False)[name]
 
     def _load(self, tables: Iterable[Table]) -> dict[str, Any]:
         """The variables of some columns, whole."""
@@ -102,7 +103,7 @@ class MatReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`. A MAT variable can only be read whole, so the wanted ones are in memory together."""
-        wanted = {name: place(self._tables, name) for name in columns}
+        wanted = {name: self._places[name] for name in columns}
         loaded = self._load(table for table, _ in wanted.values())
         arrays = {name: (self._inside(loaded, table), table, i) for name, (table, i) in wanted.items()}
         yield from cut(arrays, group.rows or 0)

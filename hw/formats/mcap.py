@@ -16,7 +16,7 @@ from crossbody.cases import LogFormatError
 from crossbody.hw.formats._budget import Budget, current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._guard import library, parsing
-from crossbody.hw.formats._messages import Leaf, refuse_large, rows_of, too_large, topic_group
+from crossbody.hw.formats._messages import Leaf, crowded, refuse_large, rows_of, too_large, topic_group
 from crossbody.hw.formats._metered import MeteredFile
 from crossbody.hw.formats._unfold import Chunks
 
@@ -24,11 +24,16 @@ SUFFIXES = (".mcap",)
 MAGIC = b"\x89MCAP0\r\n"
 WHAT = "MCAP file"
 CLOCKS = ("log_time", "publish_time")
-SCHEMA, CHANNEL, MESSAGE, CHUNK = 3, 4, 5, 6  # opcodes
+FOOTING, SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS = 2, 3, 4, 5, 6, 11  # opcodes
 RECORD = struct.Struct("<BQ")  # opcode and length of every record
 STAMPED = struct.Struct("<HIQQ")  # channel, sequence number, log time and publish time of a message
+LONGEST = 64  # bytes of the name of a compression
+SOME = 1 << 10  # records of a file between two looks at the clock
 LOOK = 1 << 16  # records of a chunk between two looks at the clock
 SIZES = struct.Struct("<QQQ")  # first and last time of a chunk, and its size when unfolded
+CHUNKED = struct.Struct("<QQQII")  # those, its checksum, and the length of the name of its compression
+FOOTER = struct.Struct("<BQQQI")  # as every record, then where summary and its offsets begin, and a checksum
+LARGEST_SCHEMA = 1 << 18  # bytes: a hundred thousand describe all messages of a robot
 
 
 class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -82,8 +87,12 @@ class McapReader:
                 )
                 self.refused[topic] = why or kind
                 continue
-            group, leaves = topic_group(topic, count, decode(data), CLOCKS)
-            self._leaves[topic] = leaves
+            message = decode(data)
+            why = crowded(message)
+            if why:
+                self.refused[topic] = why
+                continue
+            group, self._leaves[topic] = topic_group(topic, count, message, CLOCKS)
             yield group
 
     def _counts(self) -> tuple[dict[str, int], dict[str, tuple[Any, Any, bytes]]]:
@@ -103,17 +112,37 @@ class McapReader:
         return counts, first
 
     def _told(self) -> dict[str, int]:
-        """Messages of every topic by the file's summary; empty if it has none."""
-        from mcap.reader import make_reader
+        """Messages of every topic by the file's summary; empty if it has none.
 
-        self._file.seek(0)
-        summary = make_reader(self._file).get_summary()
+        Raises:
+            LogFormatError: for chunks or messages in there: nothing is unfolded to be listed.
+        """
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Channel, Statistics
+
+        topics: dict[int, str] = {}
+        told: dict[int, int] = {}
+        start = self._summary_start()
+        for _, opcode, length in records(self._file, self._path, self._budget, start) if start else ():
+            if opcode in (CHUNK, MESSAGE):
+                raise LogFormatError(self._path, "has messages in its summary, which no recorder writes there.")
+            if opcode == CHANNEL:
+                channel = Channel.read(ReadDataStream(BytesIO(self._file.read(length))))
+                topics[channel.id] = channel.topic
+            elif opcode == STATISTICS:
+                told = Statistics.read(ReadDataStream(BytesIO(self._file.read(length)))).channel_message_counts
         counts: dict[str, int] = {}
-        if summary is not None and summary.statistics is not None and summary.channels:
-            for key, count in summary.statistics.channel_message_counts.items():
-                topic = summary.channels[key].topic
-                counts[topic] = counts.get(topic, 0) + count
+        for key, count in told.items() if topics else ():
+            counts[topics[key]] = counts.get(topics[key], 0) + count
         return {topic: count for topic, count in counts.items() if count}
+
+    def _summary_start(self) -> int:
+        """Where the summary begins; 0 if there is none."""
+        self._file.seek(-FOOTER.size - len(MAGIC), 2)
+        opcode, length, start, _, _ = FOOTER.unpack(self._file.read(FOOTER.size))
+        if (opcode, length) != (FOOTING, FOOTER.size - RECORD.size):
+            raise ValueError("it does not end with a footer")
+        return int(start)
 
     def _messages(self, topic: str | None) -> Iterator[tuple[Any, Any, int, int, bytes]]:
         """Schema, channel, log time, publish time and data of the messages of a topic, or of all, as they stand."""
@@ -129,6 +158,9 @@ class McapReader:
                 if topic is None or channel.topic == topic:
                     yield schemas.get(channel.schema_id), channel, log_time, publish_time, bytes(raw[STAMPED.size :])
             elif opcode == SCHEMA:
+                if len(raw) > LARGEST_SCHEMA:
+                    text = f"has a schema of {len(raw)} bytes; no message of a rig needs {LARGEST_SCHEMA}."
+                    raise LogFormatError(self._path, text)
                 schema = Schema.read(ReadDataStream(BytesIO(raw)))
                 schemas[schema.id] = schema
             elif opcode == CHANNEL:
@@ -137,18 +169,26 @@ class McapReader:
 
     def _records(self) -> Iterator[tuple[int, memoryview]]:
         """Records of the data section, those inside of chunks too."""
-        from mcap.data_stream import ReadDataStream
-        from mcap.records import Chunk
-
         for at, opcode, length in records(self._file, self._path, self._budget):
             if opcode == CHUNK:
-                chunk = Chunk.read(ReadDataStream(self._file))
-                whole = self._chunks.unfold(at, chunk.compression, chunk.data, chunk.uncompressed_size)
-                if chunk.uncompressed_crc and zlib.crc32(whole) != chunk.uncompressed_crc:
-                    raise LogFormatError(self._path, "has a chunk whose checksum is wrong: damaged.")
-                yield from _inside(memoryview(whole), self._budget)
+                yield from _inside(memoryview(self._unfolded(at, self._file.read(length))), self._budget)
             elif opcode in (SCHEMA, CHANNEL, MESSAGE):
                 yield opcode, memoryview(self._file.read(length))
+
+    def _unfolded(self, at: int, raw: bytes) -> bytes:
+        """What a chunk holds; one of nothing costs nothing."""
+        _, _, size, checksum, length = CHUNKED.unpack_from(raw)
+        begin = CHUNKED.size + length + 8
+        if not size:
+            return b""
+        name = raw[CHUNKED.size : CHUNKED.size + min(length, LONGEST)].decode()
+        (stored,) = struct.unpack_from("<Q", raw, begin - 8)
+        if stored > len(raw) - begin:
+            raise ValueError("a chunk reaches beyond its record")
+        whole = self._chunks.unfold(at, name, raw[begin : begin + stored], size)
+        if checksum and zlib.crc32(whole) != checksum:
+            raise LogFormatError(self._path, "has a chunk whose checksum is wrong: damaged.")
+        return whole
 
     def _decoder(self, schema: Any, channel: Any) -> Callable[[bytes], Any] | None:
         if channel.message_encoding == "json":
@@ -179,14 +219,18 @@ class McapReader:
         self._file.close()
 
 
-def records(file: Any, path: Path, budget: Budget) -> Iterator[tuple[int, int, int]]:
-    """Place, opcode and length of the records of an open MCAP file, each before its content is read.
+def records(file: Any, path: Path, budget: Budget, at: int = len(MAGIC)) -> Iterator[tuple[int, int, int]]:
+    """Place, opcode and length of the records of an open MCAP file from one on, each before its content is read.
 
     Raises:
         LogFormatError: for a record that reaches beyond the file, or a chunk that would unfold to too much.
     """
-    at, end = len(MAGIC), file.seek(0, 2) - len(MAGIC)
-    while at + RECORD.size <= end:
+    end = file.seek(0, 2) - len(MAGIC)
+    for number in itertools.count():
+        if at + RECORD.size > end:
+            return
+        if number % SOME == 0:
+            budget.spend(0)
         file.seek(at)
         opcode, length = RECORD.unpack(file.read(RECORD.size))
         if opcode == 0 or length > end - at - RECORD.size:

@@ -28,9 +28,12 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from crossbody.cases import ColumnMapError, FormatUnavailable, InvalidValue, _arguments
+from crossbody.cases._regular import open_regular
 from crossbody.hw.reading.units import to_si
 
 LARGEST = 1 << 20  # bytes of a map
+MOST_DOTS = 256  # of a line: TOML parsers take the square of a key's parts
+LONGEST = 300  # characters of a parser's own words
 MAPS = Path(__file__).parents[1] / "maps"
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
 
@@ -137,7 +140,7 @@ def load_columns(source: str | Path) -> Columns:
     if str(source) in maps():
         path = MAPS / f"{source}.toml"
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             text = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         known = ", ".join(maps())
@@ -153,14 +156,27 @@ def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns
     path = _arguments.path("path", path)
     if not isinstance(text, (bytes, str)):
         raise InvalidValue(f"text is {_arguments.shown(text)}; it must be TOML, as text or bytes.")
+    raw = text.encode("utf-8", "replace") if isinstance(text, str) else text
+    if any(line.count(b".") > MOST_DOTS for line in raw.split(b"\n")):
+        raise ColumnMapError(path, "$", f"has a line of more than {MOST_DOTS} dots: no key is so deep.")
     try:
         found = msgspec.toml.decode(text)
-    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
-        raise ColumnMapError(path, "$", f"is no TOML: {error}.") from None
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
+        raise ColumnMapError(path, "$", f"is no TOML: {str(error)[:LONGEST]}.") from None
+    _check_numbers(found, "$", path)
     _signals_one_by_one(found, path)
     columns: Columns = _convert(found, Columns, "$", path)
     _check(columns, path)
     return columns
+
+
+def _check_numbers(value: Any, key: str, path: str | Path) -> None:
+    """Refuse whole numbers beyond the 64 bits of TOML, which Python takes: not even a message could show them."""
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ColumnMapError(path, key, "is a whole number of more than 64 bits.")
+    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for name, one in inside:
+        _check_numbers(one, f"{key}.{name}", path)
 
 
 def dump_columns(columns: Columns) -> str:

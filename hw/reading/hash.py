@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from crossbody.cases import LogFormatError
+from crossbody.cases._regular import open_regular
 from crossbody.hw.reading.rows import Floats
 
 CHUNK = 1 << 20
@@ -32,7 +33,7 @@ def file_hash(path: Path) -> str:
 
 
 def _update(digest: hashlib._Hash, file: Path) -> None:
-    with file.open("rb") as stream:
+    with open_regular(file) as stream:
         while chunk := stream.read(CHUNK):
             digest.update(chunk)
 

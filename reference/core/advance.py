@@ -17,6 +17,7 @@ from crossbody.reference.core import (
     exact,
     folds,
     journal,
+    peaks,
     record,
     settle,
     stepping,
@@ -56,6 +57,7 @@ class Kernels(NamedTuple):
     rows: Any
     energy: Any
     power: Any
+    velocity: Any
     solve: Any
     control: Any
     watch: Any
@@ -72,7 +74,7 @@ def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
             w.u[i] += b.inputs_u[s.next_input, i] - (b.inputs_u[before, i] if before >= 0 else 0.0)
         s.next_input += 1
     if s.has_control and s.next_tick * s.tick <= s.t:
-        K.control(s.t, w.y[: s.n], w.y[s.n :], w.u, w.s, m.p)
+        K.control(s.t, w.y[: s.nq], w.y[s.nq :], w.u, w.s, m.p)
         s.next_tick += 1
     s.stop = s.t_end
     if s.next_input < len(b.inputs_t):
@@ -89,8 +91,9 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if code != 0:
         return int(code)
     s.unsettled = 0
+    peaks.forget(s, w, b.mode)
     s.method = EXPLICIT
-    s.stalled, s.hold, s.full_jacobian, s.have_slopes = 0, 0, 0, 0
+    s.stalled, s.hold, s.full_jacobian = 0, 0, 0
     s.h = s.h_active if s.na > 0 else s.h_free
     return ILL_POSED if s.loops and folds.begin(K, s, m, w) != 0 else 0
 
@@ -141,13 +144,13 @@ def _move(s: Any, w: Work, t: float) -> None:
 @inlined
 def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Apply the transitions that fired at the step's end and settle what follows from them."""
-    n = s.n
+    nq = s.nq
     if s.natural:
         if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
             return ILL_POSED
         scatter(s, w, w.lam0)
         record.here(K, s, m, w, b.mode, b.out, b.modes)
-    K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+    K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     journal.remember(s, b)
     moved = False
     for i in range(s.nc):
@@ -193,7 +196,9 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     fired = s.theta <= 1.0
     at_stop = s.t_old + s.hs >= s.stop - 4.0 * ULP * abs(s.stop)
     t = s.t_old + s.theta * s.hs if fired else (s.stop if at_stop else s.t_old + s.hs)
+    before_rows = s.rhs
     record.within_step(K, s, m, w, b.mode, b.samples, t, b.out, b.modes)
+    s.trial_rhs += s.rhs - before_rows  # what is written down is no work of the method, and chooses none
     if fired:
         _land(K, s, m, w)
         _remember_step(s, before)
@@ -237,6 +242,7 @@ def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         for i in range(s.nc):
             s.switching |= m.unilateral[i]
         s.history_t, s.collision_t = np.inf, np.inf
+        w.highest[:] = -np.inf
         lost = s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST
         _take_inputs(K, s, m, w, b)
         if s.audited:
@@ -260,12 +266,12 @@ def _room(s: Any, b: Buffers) -> int:
 
 
 def advance(
-    dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, solve: Any, control: Any, watch: Any, switch: Any,
-    state: Any, model: Index, work: Index, buffers: Index, budget: int,
+    dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, velocity: Any, solve: Any, control: Any, watch: Any,
+    switch: Any, state: Any, model: Index, work: Index, buffers: Index, budget: int,
 ) -> int:  # fmt: skip
     """Go on for at most `budget` steps.
 
-    The nine kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
+    The ten kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
     tables of the bundles in `layout`.
 
     Returns:
@@ -273,7 +279,7 @@ def advance(
         or a negative code for a numerical failure. All that is needed to go on is in the arguments.
     """
     s = state[0]
-    K = Kernels(dynamics, gaps, rows, energy, power, solve, control, watch, switch)
+    K = Kernels(dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch)
     m, w, b = open_model(model), open_work(work), open_buffers(buffers)
     if not s.started or s.unsettled:
         code = _begin(K, s, m, w, b)

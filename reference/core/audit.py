@@ -25,13 +25,15 @@ OPEN = 10.0  # times what the tolerance may add to the energy of all steps until
 @inlined
 def _residual(s: Any, m: Model, w: Work, mode: Bytes, j: int, stage: int) -> tuple[float, float]:
     """H v' + H'v + a1 h' + a0 h + a2 h^3 of the active row in place j, and what rounding of the state makes of it."""
-    n, i = s.n, w.idx[j]
+    nq, i = s.nq, w.idx[j]
     a0, a1, a2 = law_of(m, mode, i)
-    total, position, speed = w.Hdv[j], 0.0, 0.0
+    total, position, speed, largest = w.Hdv[j], 0.0, 0.0, 0.0
+    for a in range(s.nq if s.has_velocity else 0):  # no column of a row belongs to one of them
+        largest = max(largest, abs(w.y1[a]))
     for c in range(m.span[i, 0], m.span[i, 1]):
-        total += w.H[j, c] * w.k[stage, n + c]
-        position = max(position, abs(w.H[j, c] * w.y1[c]))
-        speed = max(speed, abs(w.H[j, c] * w.y1[n + c]))
+        total += w.H[j, c] * w.k[stage, nq + c]
+        position = max(position, abs(w.H[j, c] * (largest if s.has_velocity else w.y1[c])))
+        speed = max(speed, abs(w.H[j, c] * w.y1[nq + c]))
     h = w.ha[j]
     total += a1 * w.hda[j] + (a0 + a2 * h * h) * h
     return abs(total), ULP * (a0 * position + a1 * speed)
@@ -62,7 +64,7 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
     if s.has_solve:
         if s.steps % SELDOM != 0:
             return True
-        q, v = w.y1[: s.n], w.y1[s.n :]
+        q, v = w.y1[: s.nq], w.y1[s.nq :]
         if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t + s.hs, q, v, GENERAL) != 0:
             return True  # redundant for the general algebra: nothing to compare with
     for j in range(s.na):
@@ -81,12 +83,12 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
 @compiled
 def begin_account(K: Any, s: Any, m: Model, w: Work) -> None:
     """Note the energy of the start, and how much of it the absolute tolerance cannot tell."""
-    n = s.n
-    K.energy(w.y[:n], w.y[n:], m.p, w.e)
+    nq = s.nq
+    K.energy(w.y[:nq], w.y[nq:], m.p, w.e)
     s.energy_start = w.e[0] + w.e[1]
-    w.ys[:n] = w.y[:n]
-    w.ys[n:] = 1.0
-    K.energy(w.ys[:n], w.ys[n:], m.p, w.e)
+    w.ys[:nq] = w.y[:nq]
+    w.ys[nq:] = 1.0
+    K.energy(w.ys[:nq], w.ys[nq:], m.p, w.e)
     s.energy_unit = w.e[0]
     s.energy_size = 0.0
 
@@ -100,8 +102,8 @@ def account(K: Any, s: Any, m: Model, w: Work) -> int:
     A step may move every coordinate by its tolerance. That changes the kinetic energy by at most 2 sqrt(T T'), T' that
     of the tolerances as velocities, and the potential energy by about rtol of its size.
     """
-    n, nc = s.n, s.nc
-    K.energy(w.y[:n], w.y[n:], m.p, w.e)
+    nq, nc = s.nq, s.nc
+    K.energy(w.y[:nq], w.y[nq:], m.p, w.e)
     kinetic, potential = w.e[0], w.e[1]
     booked, moved = w.z[nc] - w.z[nc + 1], abs(w.z[nc]) + abs(w.z[nc + 1])
     for i in range(nc):
@@ -109,7 +111,7 @@ def account(K: Any, s: Any, m: Model, w: Work) -> int:
         moved += abs(w.z[i])
     s.energy_size = max(s.energy_size, kinetic + abs(potential) + moved)
     tolerance = s.rtol * s.energy_size + 2.0 * s.atol * np.sqrt(kinetic * s.energy_unit) + s.atol**2 * s.energy_unit
-    s.energy_allowed += OPEN * np.sqrt(2.0 * n) * tolerance
+    s.energy_allowed += OPEN * np.sqrt(nq + s.n) * tolerance
     s.energy_open = kinetic + potential - s.energy_start - booked
     if not np.isfinite(s.energy_open):
         return NOT_FINITE

@@ -13,13 +13,14 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference.core.algebra import copy
-from crossbody.reference.core.dop853 import begin_watch, derivative, watch_multipliers
+from crossbody.reference.core.dop853 import begin_watch, derivative, keep_velocity, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
 
 STAGES = 4
 LAST = np.int64(STAGES - 1)
 _A = np.array([[0.0, 0.0, 0.0], [1 / 2, 0.0, 0.0], [0.0, 3 / 4, 0.0], [2 / 9, 1 / 3, 4 / 9]])
 C = np.array([0.0, 1 / 2, 3 / 4, 1.0])
+B = np.array([*_A[3], 0.0])
 _E = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
 
 
@@ -35,11 +36,12 @@ def _error(s: Any, w: Work, h: float) -> float:
     """Root mean square of the embedded estimate in units of the tolerance; NaN where a stage was NaN."""
     total = 0.0
     k = w.k
-    for i in range(2 * s.n):
+    size = s.nq + s.n
+    for i in range(size):
         e = h * (_E[0] * k[0, i] + _E[1] * k[1, i] + _E[2] * k[2, i] + _E[3] * k[3, i])
-        e /= s.atol + s.rtol * max(abs(w.y[i]), abs(w.y1[i]))
+        e /= w.atol[i] + s.rtol * max(abs(w.y[i]), abs(w.y1[i]))
         total += e * e
-    return float(np.sqrt(total / (2 * s.n)))
+    return float(np.sqrt(total / size))
 
 
 @compiled
@@ -51,6 +53,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
         if derivative(K, s, m, w, s.t + C[stage] * h, w.ys, stage) != 0:
             return -1.0
         watch_multipliers(s, w, stage)
+        keep_velocity(s, w, stage)
     copy(w.ys, w.y1)
     if s.ledger:
         _advance(w.z, w.kz, STAGES - 1, h, w.z1)

@@ -22,10 +22,10 @@ HOLD_STEPS = 400  # explicit steps after a trial that was lost
 @inlined
 def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
     """Hairer's guess for the first step from the sizes of y, y' and y''."""
-    size = 2 * s.n
+    size = s.nq + s.n
     d0, d1, d2 = 0.0, 0.0, 0.0
     for i in range(size):
-        scale = s.atol + s.rtol * abs(w.y[i])
+        scale = w.atol[i] + s.rtol * abs(w.y[i])
         d0 += (w.y[i] / scale) ** 2
         d1 += (w.k[0, i] / scale) ** 2
     h0 = 1e-6 if d0 < 1e-10 or d1 < 1e-10 else 0.01 * np.sqrt(d0 / d1)
@@ -34,7 +34,7 @@ def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
     if dop853.derivative(K, s, m, w, s.t + h0, w.ys, dop853.SECOND) != 0:
         return float(h0)
     for i in range(size):
-        scale = s.atol + s.rtol * abs(w.y[i])
+        scale = w.atol[i] + s.rtol * abs(w.y[i])
         d2 += ((w.k[1, i] - w.k[0, i]) / scale) ** 2
     steep = max(np.sqrt(d1 / size), np.sqrt(d2 / size) / h0)
     h1 = max(1e-6, 1e-3 * h0) if steep <= 1e-15 else (0.01 / steep) ** 0.125

@@ -104,8 +104,8 @@ def _bounce(s: Any, m: Model, w: Work, j: int) -> float:
 @inlined
 def _impulses(K: Any, s: Any, m: Model, w: Work) -> int:
     """Solve the map for la, the impulses; leaves in ha the restitution of every row, -1 where it is not struck."""
-    n = s.n
-    if assemble(K.rows, s, m, w, w.law, s.t, w.y[:n], w.y[n:]) != 0:
+    nq = s.nq
+    if assemble(K.rows, s, m, w, w.law, s.t, w.y[:nq], w.y[nq:]) != 0:
         return 1
     for j in range(s.na):
         w.r[j], w.ha[j] = 0.0, -1.0
@@ -152,7 +152,7 @@ def _let_go(s: Any, m: Model, w: Work, b: Buffers, i: int) -> None:
 @inlined
 def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
     """The jump of v, its work in the ledger, and the end of the struck rows' collisions."""
-    v = w.y[s.n :]
+    v = w.y[s.nq :]
     push_rows(m, w, s.na, w.la, 1.0, v)
     for j in range(s.na):
         i = w.idx[j]
@@ -171,7 +171,7 @@ def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
 def _factor(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """M^-1 of the present state, and the free acceleration in vd, as the map asks for them; 1 if ill posed."""
     activate(s, m, w, b.mode)
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) != 0:
         return 1
     if s.n == 1:
         w.L[0, 0] = np.sqrt(w.M[0, 0])
@@ -211,7 +211,7 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     Collisions that come ever faster (inelastic collapse) end there. The gaps would drift apart by more than rounding,
     and the next impulse would cross the row in the order of these gaps instead of that of the rates.
     """
-    n, still = s.n, False
+    nq, still = s.nq, False
     for i in range(s.nc):
         w.struck[i] = NOT
         if STILL * s.speed < abs(w.rate[i]) <= slow(s) and _touches(s, m, w, b, i):
@@ -222,7 +222,7 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if _factor(K, s, m, w, b) != 0:
         return ILL_POSED
     _list_rows(s, m, w, b)
-    if assemble(K.rows, s, m, w, w.law, s.t, w.y[:n], w.y[n:]) != 0:
+    if assemble(K.rows, s, m, w, w.law, s.t, w.y[:nq], w.y[nq:]) != 0:
         return ILL_POSED
     for j in range(s.na):
         w.r[j], w.ha[j] = 0.0, -1.0
@@ -230,7 +230,7 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             w.r[j] = -w.hda[j]
     solve_schur(w.G, s.na, w.reach, w.r, w.la)
     _apply(s, m, w, b)
-    K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+    K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     s.collisions_now += 1
     s.collisions += 1
     return 0
@@ -251,7 +251,7 @@ def collide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     Returns:
         0, EVENTS_FULL if the caller must make room and come again, or a negative code.
     """
-    n, known = s.n, False
+    nq, known = s.nq, False
     if s.collision_t != s.t:
         s.collision_t, s.collisions_now = s.t, 0
     while _choose(s, m, w, b) >= 0:
@@ -266,5 +266,5 @@ def collide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         known = bool(s.affine and s.na == 1 and not is_active(b.mode[w.idx[0]]))
         s.collisions_now += 1
         s.collisions += 1
-        K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+        K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     return int(_stand_still(K, s, m, w, b))

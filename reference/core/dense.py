@@ -6,28 +6,65 @@ from typing import Any
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array
-from crossbody.reference.core import dop853, exact
+from crossbody.reference.core import bogacki, dop853, esdirk, exact
 from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
 from crossbody.reference.core.algebra import solve_schur
 from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, Model, Work
 
 CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one's residue vanish in rounding
 RESOLVED = 2.0  # |p| h of the rows' fastest pole p, above which a step tells a gap worse than its law does
-ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's
+BEND_PART = 1e-3  # of the step, along which the slope of q' is taken
+ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's: rounding,
+ARRIVED_PART = 0.1  # or this part of the relative tolerance
 
 
 @compiled
 def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
     """Make the dense output of the step, once; 1 if a stage of it is ill posed."""
-    if s.have_dense or s.method != EXPLICIT:
+    if s.have_dense or (s.method != EXPLICIT and not s.has_velocity):
         return 0
     s.have_dense = 1
-    return dop853.make_dense(K, s, m, w)
+    if s.method == EXPLICIT:
+        return dop853.make_dense(K, s, m, w)
+    _make_quintic(K, s, m, w)
+    return 0
 
 
 @inlined
-def _quintic(n: int, end_stage: int, w: Work, theta: float, h: float, out: Array) -> None:
-    """Hermite interpolant of q, v and v' at both ends; its derivative is v."""
+def _bend(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int, out: Array) -> None:
+    """Out = q'' at an end y of the step: the difference of q' along k[stage]."""
+    nq, short = s.nq, BEND_PART * s.hs
+    for sign in range(-1, 2, 2):
+        for i in range(nq + s.n):
+            w.ys[i] = y[i] + sign * short * w.k[stage, i]
+        K.velocity(t + sign * short, w.ys[:nq], w.ys[nq:], m.p, w.turn)
+        for i in range(nq):
+            out[i] = (w.turn[i] - out[i]) / (2.0 * short) if sign > 0 else w.turn[i]
+
+
+@inlined
+def _make_quintic(K: Any, s: Any, m: Model, w: Work) -> None:
+    """What the interpolant asks for where q' is not v: q'' at both ends, and the integral of v over the step."""
+    _bend(K, s, m, w, s.t_old, w.y, 0, w.bend[0])
+    _bend(K, s, m, w, s.t_old + s.hs, w.y1, s.end, w.bend[1])
+    for i in range(s.n):
+        if s.method == IMPLICIT:
+            w.travel[i] = s.hs * esdirk.B[0] * w.y[s.nq + i]
+            for j in range(1, esdirk.STAGES):
+                w.travel[i] += s.hs * esdirk.B[j] * w.stage_v[j, i]
+        else:
+            w.travel[i] = s.hs * bogacki.B[0] * w.y[s.nq + i]
+            for j in range(1, bogacki.STAGES):
+                w.travel[i] += s.hs * bogacki.B[j] * w.stage_v[j, i]
+
+
+@inlined
+def _quintic(s: Any, w: Work, theta: float, h: float, out: Array) -> None:
+    """Hermite interpolant of q, v and v' at both ends; its derivative is v.
+
+    Where q' is not v there are two: one of q, q' and q'', and one of the integral of v, whose derivative is v.
+    """
+    n, nq, end_stage = s.n, s.nq, s.end
     x, x2 = theta, theta * theta
     x3 = x2 * x
     end = x3 * (10.0 - 15.0 * x + 6.0 * x2)
@@ -37,10 +74,17 @@ def _quintic(n: int, end_stage: int, w: Work, theta: float, h: float, out: Array
     v0_d, v1_d = 1.0 - x2 * (18.0 - 32.0 * x + 15.0 * x2), x2 * (-12.0 + 28.0 * x - 15.0 * x2)
     a0_d, a1_d = x * (1.0 - 4.5 * x + 6.0 * x2 - 2.5 * x3), x2 * (1.5 - 4.0 * x + 2.5 * x2)
     for i in range(n):
-        dq, v, ve = w.y1[i] - w.y[i], h * w.y[n + i], h * w.y1[n + i]
-        a, ae = h * h * w.k[0, n + i], h * h * w.k[end_stage, n + i]
+        dq, v, ve = w.y1[i] - w.y[i], h * w.y[nq + i], h * w.y1[nq + i]
+        a, ae = h * h * w.k[0, nq + i], h * h * w.k[end_stage, nq + i]
+        if s.has_velocity:
+            dq = w.travel[i]
+        else:
+            out[i] = w.y[i] + dq * end + v * v0 + ve * v1 + a * a0 + ae * a1
+        out[nq + i] = (dq * end_d + v * v0_d + ve * v1_d + a * a0_d + ae * a1_d) / h
+    for i in range(nq if s.has_velocity else 0):
+        dq, v, ve = w.y1[i] - w.y[i], h * w.k[0, i], h * w.k[end_stage, i]
+        a, ae = h * h * w.bend[0, i], h * h * w.bend[1, i]
         out[i] = w.y[i] + dq * end + v * v0 + ve * v1 + a * a0 + ae * a1
-        out[n + i] = (dq * end_d + v * v0_d + ve * v1_d + a * a0_d + ae * a1_d) / h
 
 
 @compiled
@@ -49,12 +93,12 @@ def state(s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
     if s.method == EXACT:
         exact.evaluate(s, m, w, theta * s.hs, out)
     elif theta == 1.0:
-        for i in range(2 * s.n):
+        for i in range(s.nq + s.n):
             out[i] = w.y1[i]
     elif s.method == EXPLICIT:
         dop853.evaluate(w.y, w.F, theta, out)
     else:
-        _quintic(s.n, s.end, w, theta, s.hs, out)
+        _quintic(s, w, theta, s.hs, out)
 
 
 @inlined
@@ -63,36 +107,54 @@ def long_for_rows(s: Any) -> bool:
     return bool(s.method == IMPLICIT or (s.method == EXPLICIT and s.hs * s.row_rate > RESOLVED))
 
 
+@inlined
+def _shift(K: Any, s: Any, m: Model, w: Work, t: float, q: Array) -> None:
+    """Move q by what M^-1 H^T la is in positions: the change of q' with v."""
+    w.slip[:] = 0.0
+    K.velocity(t, q, w.slip, m.p, w.place)
+    push_rows(m, w, s.na, w.la, 1.0, w.slip)
+    K.velocity(t, q, w.slip, m.p, w.turn)
+    for i in range(s.nq):
+        q[i] += w.turn[i] - w.place[i]
+
+
 @compiled
-def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
+def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> bool:
     """Move out = (q, v), at the part theta of a step that is long for the rows, to where their law has their gaps.
 
     A gap under a linear law is known in closed form whatever the masses do. A long step knows it to the tolerance only,
     and the interpolant across curved rows no better: times a0 that drowns the multiplier of a stiff row, and its root
     is the rate of a row that is let go from rest and falls back. The correction is the least one in the metric of M.
     Rows with a cubic term that counts are left as they are.
+
+    Returns:
+        Whether the workspace holds the acceleration and the multipliers there, so that they need not be evaluated.
     """
-    if not long_for_rows(s) or s.na == 0 or not exact.is_linear(s, w):
-        return
-    q, v = out[: s.n], out[s.n :]
+    if theta == 0.0 or not long_for_rows(s) or s.na == 0 or not exact.is_linear(s, w):
+        return False
+    q, v = out[: s.nq], out[s.nq :]
     t = theta * s.hs
     for _ in range(CORRECTIONS):
         if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t_old + t, q, v, GENERAL) != 0:
-            return
+            return False
         missing = 0.0
         for j in range(s.na):
             i = w.idx[j]
             a0, a1 = w.law[i, 0], w.law[i, 1]
             h, hd = exact.linear_arc(a0, a1, w.gaps[0, i], w.rates[0, i], t)
             # A law without a0 has no memory of a position: its gap may be anything, and only its rate is the law's.
-            w.r[j], w.hda[j] = h - w.ha[j] if a0 > 0.0 else 0.0, hd - w.hda[j]
-            missing = max(missing, (a0 * abs(w.r[j]) + a1 * abs(w.hda[j])) / max(w.scale[j], 1e-300))
-        if missing <= ARRIVED:
-            return
+            w.r[j], w.rate[j] = h - w.ha[j] if a0 > 0.0 else 0.0, hd - w.hda[j]
+            missing = max(missing, (a0 * abs(w.r[j]) + a1 * abs(w.rate[j])) / max(w.scale[j], 1e-300))
+        if missing <= max(ARRIVED, ARRIVED_PART * s.rtol):
+            return not s.has_solve
         solve_schur(w.G, s.na, w.reach, w.r, w.la)
-        push_rows(m, w, s.na, w.la, 1.0, q)
-        solve_schur(w.G, s.na, w.reach, w.hda, w.la)
+        if s.has_velocity:
+            _shift(K, s, m, w, s.t_old + t, q)
+        else:
+            push_rows(m, w, s.na, w.la, 1.0, q)
+        solve_schur(w.G, s.na, w.reach, w.rate, w.la)
         push_rows(m, w, s.na, w.la, 1.0, v)
+    return False
 
 
 @inlined

@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference.core.acceleration import OWN, accelerate
+from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.dop853_table import DENSE_STAGES, E3, E5, STAGES, A, C, D
 from crossbody.reference.core.layout import Model, Work
 
@@ -23,17 +24,26 @@ START, SECOND = np.arange(2)  # stages, as values
 
 @compiled
 def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> int:
-    """k[stage] = (v, v'), and the powers of the ledger if it is kept."""
-    n = s.n
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[:n], y[n:], OWN) != 0:
+    """k[stage] = (q', v'), and the powers of the ledger if it is kept."""
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], OWN) != 0:
         return 1
-    k, vd = w.k[stage], w.vd
+    keep(K, s, m, w, t, y, stage)
+    return 0
+
+
+@inlined
+def keep(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> None:
+    """k[stage] = (q', v') from the acceleration in the workspace, and the powers."""
+    n, nq, k, vd = s.n, s.nq, w.k[stage], w.vd
+    if s.has_velocity:
+        K.velocity(t, y[:nq], y[nq:], m.p, k[:nq])
+    else:
+        for i in range(n):
+            k[i] = y[n + i]
     for i in range(n):
-        k[i] = y[n + i]
-        k[n + i] = vd[i]
+        k[nq + i] = vd[i]
     if s.ledger:
         powers(K, s, m, w, t, y, stage)
-    return 0
 
 
 @inlined
@@ -44,7 +54,7 @@ def powers(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) ->
         w.kz[stage, i] = 0.0
     for j in range(s.na):
         w.kz[stage, w.idx[j]] = w.la[j] * w.hda[j]
-    K.power(t, y[: s.n], y[s.n :], w.u, m.p, w.e)
+    K.power(t, y[: s.nq], y[s.nq :], w.u, m.p, w.e)
     w.kz[stage, nc] = w.e[0]
     w.kz[stage, nc + 1] = w.e[1]
 
@@ -63,13 +73,13 @@ def _combine(base: Array, k: Floats, stage: int, h: float, out: Array) -> None:
 def _error(s: Any, w: Work, h: float) -> float:
     """Hairer's norm of the two embedded estimates; 1 is the tolerance. NaN where a stage was NaN."""
     sum5, sum3 = 0.0, 0.0
-    size = 2 * s.n
+    size = s.nq + s.n
     for i in range(size):
         e5, e3 = 0.0, 0.0
         for j in range(STAGES):
             e5 += E5[j] * w.k[j, i]
             e3 += E3[j] * w.k[j, i]
-        scale = s.atol + s.rtol * max(abs(w.y[i]), abs(w.y1[i]))
+        scale = w.atol[i] + s.rtol * max(abs(w.y[i]), abs(w.y1[i]))
         sum5 += (e5 / scale) ** 2
         sum3 += (e3 / scale) ** 2
     if sum5 == 0.0 and sum3 == 0.0:
@@ -81,13 +91,13 @@ def _error(s: Any, w: Work, h: float) -> float:
 def begin_watch(K: Any, s: Any, m: Model, w: Work) -> None:
     """Guards of the discrete variables at the start of the step."""
     if s.ng > 0:
-        K.watch(s.t, w.y[: s.n], w.y[s.n :], m.p, w.guards[0])
+        K.watch(s.t, w.y[: s.nq], w.y[s.nq :], m.p, w.guards[0])
 
 
 @inlined
 def watch_guards(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
     """Keep the discrete variables' guards at a stage."""
-    K.watch(t, w.ys[: s.n], w.ys[s.n :], m.p, w.guard_at[place])
+    K.watch(t, w.ys[: s.nq], w.ys[s.nq :], m.p, w.guard_at[place])
 
 
 @inlined
@@ -99,10 +109,17 @@ def watch_multipliers(s: Any, w: Work, stage: int) -> None:
 
 
 @inlined
+def keep_velocity(s: Any, w: Work, stage: int) -> None:
+    """Keep v at a stage where k has q' instead: its integral over the step shapes the interpolant."""
+    if s.has_velocity:
+        copy(w.ys[s.nq :], w.stage_v[stage])
+
+
+@inlined
 def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
     """Keep the gaps at a stage."""
     s.guards += 1
-    K.gaps(t, w.ys[: s.n], w.ys[s.n :], m.p, w.gap_at[place], w.rate)
+    K.gaps(t, w.ys[: s.nq], w.ys[s.nq :], m.p, w.gap_at[place], w.rate)
 
 
 @compiled

@@ -116,11 +116,14 @@ def from_slopes(row: Array) -> float:
 
 
 @inlined
-def from_gaps(row: Array, rate: int, gap: int, width: float) -> float:
-    """A bound on g of a rate that stands at `rate` from what the gap, which stands at `gap`, gains between places."""
+def from_gaps(row: Array, rate: int, gap: int, width: float, band: float) -> float:
+    """A bound on g of a rate that stands at `rate` from what the gap, which stands at `gap`, gains between places.
+
+    `band` is what was added to the rate, which its gap knows nothing of.
+    """
     most = 0.0
     for k in range(NODES - 1):
-        gain = (row[gap + k + 1] - row[gap + k]) / width
+        gain = (row[gap + k + 1] - row[gap + k]) / width + band / (NODES - 1)
         for c in range(NODES):
             gain -= INTEGRALS[k, c] * row[rate + c]
         most = max(most, abs(gain / W_INTEGRALS[k]))

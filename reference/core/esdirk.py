@@ -4,6 +4,9 @@ The implicit half of ARK4(3)6L[2]SA: Kennedy and Carpenter, Applied Numerical Ma
 for its velocity V alone, since Q = Q* + h g V:
 
     V - V* - h g a(Q, V) = 0,    Newton matrix  I - h g da/dv - (h g)^2 da/dq
+
+Where q' is not v but N(q) v + r(q), a stage's positions follow from its velocities by iteration, and da/dq N stands in
+the place of da/dq.
 """
 
 from __future__ import annotations
@@ -14,8 +17,15 @@ import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, OWN, SMOOTH, accelerate, push_rows
-from crossbody.reference.core.algebra import factor_lu, solve_lu, solve_schur
-from crossbody.reference.core.dop853 import begin_watch, powers, watch_gaps, watch_guards, watch_multipliers
+from crossbody.reference.core.algebra import ULP, factor_lu, solve_lu, solve_schur
+from crossbody.reference.core.dop853 import (
+    begin_watch,
+    keep_velocity,
+    powers,
+    watch_gaps,
+    watch_guards,
+    watch_multipliers,
+)
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -32,13 +42,14 @@ E = B - np.array(
     [4586570599 / 29645900160, 0.0, 178811875 / 945068544, 814220225 / 1159782912, -3700637 / 11593932, 61727 / 225920]
 )
 NEWTON_STEPS = 8
+FOLLOW_STEPS = 60  # of positions after velocities: each leaves h g |dq'/dq|, a tenth and less, of what is missing
 
 
 @compiled
 def jacobian(K: Any, s: Any, m: Model, w: Work, h: float) -> int:
     """Stiff part of da/dq and da/dv from the rows: -M^-1 H^T G^-1 (a0 + 3 a2 h^2, a1) H; the rest by differences."""
-    n = s.n
-    q, v = w.y[:n], w.y[n:]
+    nq = s.nq
+    q, v = w.y[:nq], w.y[nq:]
     w.Jq[:] = 0.0
     w.Jv[:] = 0.0
     if s.full_jacobian and _smooth_part(K, s, m, w) != 0:
@@ -49,6 +60,32 @@ def jacobian(K: Any, s: Any, m: Model, w: Work, h: float) -> int:
         _row_part(s, m, w, j)
     s.have_jacobian = 1
     return _newton_matrix(s, w, h)
+
+
+@inlined
+def _tangent(K: Any, s: Any, m: Model, w: Work, q: Any) -> None:
+    """Columns of N(q), from q' at unit velocities less q' at rest."""
+    w.slip[:] = 0.0
+    K.velocity(s.t, q, w.slip, m.p, w.place)
+    for c in range(s.n):
+        w.slip[c] = 1.0
+        K.velocity(s.t, q, w.slip, m.p, w.turn)
+        w.slip[c] = 0.0
+        for a in range(s.nq):
+            w.tangent[a, c] = w.turn[a] - w.place[a]
+
+
+@inlined
+def _displace(s: Any, w: Work, c: int, step: float) -> None:
+    """Leave in ys the state moved by a step of position c, or of velocity c - n."""
+    w.ys[:] = w.y
+    if c >= s.n:
+        w.ys[s.nq + c - s.n] = w.y[s.nq + c - s.n] + step
+    elif s.has_velocity:
+        for a in range(s.nq):
+            w.ys[a] += step * w.tangent[a, c]
+    else:
+        w.ys[c] = w.y[c] + step
 
 
 @inlined
@@ -70,16 +107,15 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
 @inlined
 def _smooth_part(K: Any, s: Any, m: Model, w: Work) -> int:
     """Central differences of the acceleration without the rows' law, so that no stiff term is differenced."""
-    n = s.n
+    n, nq = s.n, s.nq
     failed = 0
     for c in range(2 * n):
-        step = 1e-6 * max(1.0, abs(w.y[c]))
-        w.ys[:] = w.y
-        w.ys[c] = w.y[c] + step
-        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], SMOOTH)
+        step = 1e-6 * max(1.0, abs(w.y[c] if c < n else w.y[nq + c - n]))
+        _displace(s, w, c, step)
+        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:nq], w.ys[nq:], SMOOTH)
         w.d[:] = w.vd
-        w.ys[c] = w.y[c] - step
-        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:n], w.ys[n:], SMOOTH)
+        _displace(s, w, c, -step)
+        failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:nq], w.ys[nq:], SMOOTH)
         for a in range(n):
             slope = (w.d[a] - w.vd[a]) / (2.0 * step)
             if c < n:
@@ -104,63 +140,98 @@ def _newton_matrix(s: Any, w: Work, h: float) -> int:
 @inlined
 def _residual(s: Any, w: Work, g: float) -> None:
     """D = -(V - V* - g a) with V* kept in w.g."""
-    n = s.n
+    n, nq = s.n, s.nq
     for a in range(n):
-        w.d[a] = w.g[a] + g * w.vd[a] - w.ys[n + a]
+        w.d[a] = w.g[a] + g * w.vd[a] - w.ys[nq + a]
 
 
 @inlined
-def _update(s: Any, w: Work, g: float) -> float:
+def _update(K: Any, s: Any, m: Model, w: Work, t: float, g: float) -> float:
     """Solve for the correction, apply it to V and Q; returns its size in units of the tolerance."""
-    n = s.n
+    n, nq = s.n, s.nq
     solve_lu(w.J, n, w.pivot, w.d)
     size = 0.0
     for a in range(n):
-        w.ys[n + a] += w.d[a]
-        w.ys[a] += g * w.d[a]
-        size = max(size, abs(w.d[a]) / _scale(s, w, n + a), g * abs(w.d[a]) / _scale(s, w, a))
-    return size
+        w.ys[nq + a] += w.d[a]
+        size = max(size, abs(w.d[a]) / _scale(s, w, nq + a))
+        if not s.has_velocity:
+            w.ys[a] += g * w.d[a]
+            size = max(size, g * abs(w.d[a]) / _scale(s, w, a))
+    return max(size, _follow(K, s, m, w, t, g)) if s.has_velocity else size
+
+
+@inlined
+def _follow(K: Any, s: Any, m: Model, w: Work, t: float, g: float) -> float:
+    """Move Q to where Q = Q* + g q'(Q, V), with Q* in w.place.
+
+    Returns:
+        By how much it moves, in units of the tolerance; infinite if it does not arrive.
+    """
+    first = -1.0
+    for _ in range(FOLLOW_STEPS):
+        K.velocity(t, w.ys[: s.nq], w.ys[s.nq :], m.p, w.turn)
+        size, left = 0.0, 0.0
+        for a in range(s.nq):
+            move = w.place[a] + g * w.turn[a] - w.ys[a]
+            w.ys[a] += move
+            size = max(size, abs(move) / _scale(s, w, a))
+            left = max(left, abs(move) - 4.0 * ULP * (abs(w.ys[a]) + 1.0))
+        first = size if first < 0.0 else first
+        if left <= 0.0:
+            return first
+    return np.inf
 
 
 @inlined
 def _scale(s: Any, w: Work, i: int) -> float:
     """Tolerance of component i, floored where rounding of a stiff row's gap would drown it."""
-    return float(max(s.atol + s.rtol * abs(w.y[i]), 1e-15 * (1.0 + abs(w.y[i]))))
+    return float(max(w.atol[i] + s.rtol * abs(w.y[i]), 1e-15 * (1.0 + abs(w.y[i]))))
 
 
 @inlined
-def _predict(s: Any, w: Work, stage: int, h: float) -> None:
-    """Q*, V* of the stage in ys and g, and a first V that continues the last acceleration."""
-    n, g = s.n, h * GAMMA
-    for a in range(n):
-        q, v = w.y[a], w.y[n + a]
+def _predict(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> bool:
+    """Q*, V* of the stage in ys and g, and a first V that continues the last acceleration; False if no Q follows."""
+    nq, g = s.nq, h * GAMMA
+    for a in range(s.n):
+        v = w.y[nq + a]
+        for j in range(stage):
+            v += h * A[stage, j] * w.k[j, nq + a]
+        w.g[a] = v
+        w.ys[nq + a] = v + g * w.k[stage - 1, nq + a]
+    for a in range(nq):
+        q = w.y[a]
         for j in range(stage):
             q += h * A[stage, j] * w.k[j, a]
-            v += h * A[stage, j] * w.k[j, n + a]
-        w.g[a] = v
-        w.ys[n + a] = v + g * w.k[stage - 1, n + a]
-        w.ys[a] = q + g * w.ys[n + a]
+        if s.has_velocity:
+            w.place[a] = q
+            w.ys[a] = q + g * w.k[stage - 1, a]
+        else:
+            w.ys[a] = q + g * w.ys[nq + a]
+    return bool(not s.has_velocity or _follow(K, s, m, w, s.t + C[stage] * h, g) < np.inf)
 
 
 @inlined
 def _stage(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> int:
     """Newton for one stage; 0 done, 1 ill posed, 2 no convergence."""
-    n, g = s.n, h * GAMMA
-    _predict(s, w, stage, h)
+    n, nq, g, t = s.n, s.nq, h * GAMMA, s.t + C[stage] * h
+    if not _predict(K, s, m, w, stage, h):
+        return 2
     before = np.inf
     for _ in range(NEWTON_STEPS):
-        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t + C[stage] * h, w.ys[:n], w.ys[n:], OWN) != 0:
+        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[:nq], w.ys[nq:], OWN) != 0:
             return 1
         _residual(s, w, g)
-        size = _update(s, w, g)
+        size = _update(K, s, m, w, t, g)
         if not size < 2.0 * before:  # NaN and divergence
             return 2
         if size < 0.01:
             for a in range(n):
-                w.k[stage, a] = w.ys[n + a]
-                w.k[stage, n + a] = (w.ys[n + a] - w.g[a]) / g
+                w.k[stage, nq + a] = (w.ys[nq + a] - w.g[a]) / g
+            for a in range(nq):
+                w.k[stage, a] = (w.ys[a] - w.place[a]) / g if s.has_velocity else w.ys[nq + a]
+            keep_velocity(s, w, stage)
             if s.ledger:
-                powers(K, s, m, w, s.t + C[stage] * h, w.ys, stage)
+                powers(K, s, m, w, t, w.ys, stage)
             return 0
         before = size
     return 2
@@ -169,28 +240,44 @@ def _stage(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> int:
 @inlined
 def _error(s: Any, w: Work, h: float) -> float:
     """Embedded estimate, filtered by the Newton matrix so that decayed stiff modes do not count."""
-    n, g = s.n, h * GAMMA
-    for a in range(2 * n):
+    n, nq, g = s.n, s.nq, h * GAMMA
+    for a in range(nq + n):
         total = 0.0
         for j in range(STAGES):
             total += E[j] * w.k[j, a]
         w.ys[a] = h * total
     for a in range(n):
-        w.d[a] = w.ys[n + a]
+        w.d[a] = w.ys[nq + a]
         for c in range(n):
-            w.d[a] += g * w.Jq[a, c] * w.ys[c]
+            w.d[a] += g * w.Jq[a, c] * (_slipped(s, w, c, h) if s.has_velocity else w.ys[c])
     solve_lu(w.J, n, w.pivot, w.d)
     total = 0.0
-    for a in range(n):
-        e = (w.ys[a] + g * w.d[a]) / _scale(s, w, a)
-        ed = w.d[a] / _scale(s, w, n + a)
+    for a in range(nq):
+        move = w.d[a] if a < n else 0.0
+        ed = move / _scale(s, w, nq + a) if a < n else 0.0
+        if s.has_velocity:
+            move = 0.0
+            for c in range(n):
+                move += w.tangent[a, c] * w.d[c]
+        e = (w.ys[a] + g * move) / _scale(s, w, a)
         total += e * e + ed * ed
-    return float(np.sqrt(total / (2 * n)))
+    return float(np.sqrt(total / (nq + n)))
+
+
+@inlined
+def _slipped(s: Any, w: Work, c: int, h: float) -> float:
+    """Embedded estimate of what v adds up to over the step: a position's, in the coordinates of v."""
+    total = E[0] * w.y[s.nq + c]
+    for j in range(1, STAGES):
+        total += E[j] * w.stage_v[j, c]
+    return float(h * total)
 
 
 @compiled
 def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     """From y and k[0] to y1; the error in units of the tolerance, -1 if ill posed, inf if Newton failed."""
+    if s.has_velocity:
+        _tangent(K, s, m, w, w.y[: s.nq])
     if not s.have_jacobian:
         if jacobian(K, s, m, w, h) != 0:
             return -1.0

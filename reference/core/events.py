@@ -104,13 +104,13 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     """Gaps and rates, and the multipliers if asked, at the inner nodes; at the end as well where the rows move it."""
     for node in range(1, NODES if s.method == EXPLICIT and dense.long_for_rows(s) else NODES - 1):
         dense.state(s, m, w, at_node(node), w.ys)
-        dense.put_on_rows(K, s, m, w, at_node(node), w.ys)
+        known = dense.put_on_rows(K, s, m, w, at_node(node), w.ys)
         t = s.t_old + at_node(node) * s.hs
-        q, v = w.ys[: s.n], w.ys[s.n :]
+        q, v = w.ys[: s.nq], w.ys[s.nq :]
         K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])
         s.guards += 1
         if multipliers:
-            if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
+            if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
                 return 1
             scatter(s, w, w.lams[node])
     return 0
@@ -120,7 +120,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
 def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Take the discrete variables' guards into s.theta; 0 or a negative code."""
     watched = False
-    K.watch(s.t_old + s.hs, w.y1[: s.n], w.y1[s.n :], m.p, w.guards[NODES - 1])
+    K.watch(s.t_old + s.hs, w.y1[: s.nq], w.y1[s.nq :], m.p, w.guards[NODES - 1])
     for i in range(s.ng):
         w.guard_hit[i] = NEVER
         watched = watched or filters.switch_may_fire(s, w, i)
@@ -130,7 +130,7 @@ def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
         return ILL_POSED
     for node in range(NODES - 1):
         dense.state(s, m, w, at_node(node), w.ys)
-        K.watch(s.t_old + at_node(node) * s.hs, w.ys[: s.n], w.ys[s.n :], m.p, w.guards[node])
+        K.watch(s.t_old + at_node(node) * s.hs, w.ys[: s.nq], w.ys[s.nq :], m.p, w.guards[node])
     for i in range(s.ng):
         w.guard_hit[i] = first_below(K, s, m, w, mode, SWITCH, i)
         if np.isnan(w.guard_hit[i]):

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference._cache import inlined
 from crossbody.reference._kinds import Bytes
 from crossbody.reference.core import bogacki, dop853_table, esdirk
+from crossbody.reference.core.algebra import inverse_diagonal
 from crossbody.reference.core.layout import (
     BETWEEN,
+    COLLISION,
     CONTACT,
     EXACT,
     EXPLICIT,
     FREE,
+    HANDOVER_PART,
     IMPLICIT,
     LEVEL,
     NODES,
@@ -23,6 +28,7 @@ from crossbody.reference.core.layout import (
 # What values at the stages say about the whole step (linear programming over all polynomials of a degree).
 STAGES_RANGE = 1.7  # degree 6 within a range at the stages of DOP853: how many times the range it may leave it by
 STAGES_OFF = 4.0  # the same, of what is off a parabola: 3.02 for degree 6, of ESDIRK 1.98 for degree 4
+TURNS = 2.0  # times by which (G^-1)_ii may change in a step
 GAPS_OFF = 0.2  # twice the most that x^2 (1 - x)^2 times a parabola of 1 at the three stages comes to
 
 
@@ -37,20 +43,47 @@ def _stays_clear(start: float, middle: float, end: float, place: float, off: flo
 
 
 @inlined
+def _multiplier_range(s: Any, w: Work, i: int) -> tuple[float, float]:
+    """Least and largest multiplier of an active row at the stages and at both ends."""
+    start, end = w.lams[0, i], w.lams[NODES - 1, i]
+    low, high = min(start, end), max(start, end)
+    for stage in range(1, s.end):
+        low, high = min(low, w.lam_at[stage, i]), max(high, w.lam_at[stage, i])
+    return float(low), float(high)
+
+
+@inlined
 def _presses_on(s: Any, w: Work, i: int) -> bool:
     """Whether the multiplier of an active row stays positive, as far as the stages tell."""
     last, middle = NODES - 1, 9 if s.method == EXPLICIT else 1
     start, end = w.lams[0, i], w.lams[last, i]
-    low, high = min(start, end), max(start, end)
-    for stage in range(1, s.end):
-        low, high = min(low, w.lam_at[stage, i]), max(high, w.lam_at[stage, i])
+    low, high = _multiplier_range(s, w, i)
     if not low > 0.0 or low > STAGES_RANGE * (high - low):
         return bool(low > 0.0)
     off, half = 0.0, w.lam_at[middle, i]
     for stage in range(1, s.end):
-        c = _stage_place(s, stage)
-        off = max(off, abs(w.lam_at[stage, i] - _parabola(start, half, end, _stage_place(s, middle), c)))
-    return _stays_clear(start, half, end, _stage_place(s, middle), off)
+        c = stage_place(s, stage)
+        off = max(off, abs(w.lam_at[stage, i] - _parabola(start, half, end, stage_place(s, middle), c)))
+    return _stays_clear(start, half, end, stage_place(s, middle), off)
+
+
+@inlined
+def _stays_elastic(s: Any, w: Work, i: int) -> bool:
+    """Whether a COLLISION cannot hand over in the step: what moves its gap outweighs its multiplier at the step's end.
+
+    h'' + b1 h' + b0 h = 0 only takes from h'^2 + b0 h^2, so that the elastic part of the multiplier, at least
+    sqrt(b0) |h'| + b0 |h|, is nowhere below sqrt(b0) times the root of its last value. (G^-1)_ii is that of the end.
+    """
+    if s.has_solve or w.law[i, 2] != 0.0:
+        return False
+    last, b0 = NODES - 1, w.law[i, 0]
+    elastic = np.sqrt(b0 * (w.rates[last, i] ** 2 + b0 * w.gaps[last, i] ** 2))
+    low, high = _multiplier_range(s, w, i)
+    most = high + STAGES_RANGE * (high - low)
+    for j in range(s.na):
+        if w.idx[j] == i:
+            return bool(elastic * inverse_diagonal(w.G, s.na, w.reach, j, w.scale) > TURNS * HANDOVER_PART * most)
+    return False
 
 
 @inlined
@@ -64,7 +97,7 @@ def _parabola(start: float, middle: float, end: float, place: float, c: float) -
 
 
 @inlined
-def _stage_place(s: Any, stage: int) -> float:
+def stage_place(s: Any, stage: int) -> float:
     """Where a stage of the method stands in the step."""
     if s.method == EXPLICIT:
         return float(dop853_table.C[stage])
@@ -75,8 +108,8 @@ def _stage_place(s: Any, stage: int) -> float:
 def _between(s: Any, place: int) -> float:
     """Where the stage stands at which gaps and guards were looked at."""
     if s.method == EXPLICIT:
-        return _stage_place(s, 4 * place + 4 - 2 * (place // 2))
-    return _stage_place(s, place + 2)
+        return stage_place(s, 4 * place + 4 - 2 * (place // 2))
+    return stage_place(s, place + 2)
 
 
 @inlined
@@ -103,9 +136,13 @@ def _stays_open(s: Any, w: Work, i: int) -> bool:
 @inlined
 def row_may_switch(s: Any, w: Work, mode: Bytes, i: int) -> bool:
     """Whether a row may switch in this step, by bounds from what the stages have evaluated anyway."""
-    if s.method == EXACT or s.fsm != LEVEL or (mode[i] != FREE and mode[i] != CONTACT):
+    if s.method == EXACT or s.fsm != LEVEL:
         return True
-    return not (_stays_open(s, w, i) if mode[i] == FREE else _presses_on(s, w, i))
+    if mode[i] == FREE:
+        return not _stays_open(s, w, i)
+    if mode[i] == COLLISION:
+        return not (_presses_on(s, w, i) and _stays_elastic(s, w, i))
+    return mode[i] != CONTACT or not _presses_on(s, w, i)
 
 
 @inlined

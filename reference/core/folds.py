@@ -36,8 +36,9 @@ def _keep_rows(s: Any, m: Model, w: Work) -> None:
 @compiled
 def begin(K: Any, s: Any, m: Model, w: Work) -> int:
     """Take the pivots and the rows of the present instant as those of the start; 1 if ill posed."""
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL) != 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) != 0:
         return 1
+    w.pivot0[:] = 0.0  # of rows that are off
     for j in range(s.na):
         w.pivot0[w.idx[j]] = w.G[j, j]
     _keep_rows(s, m, w)
@@ -53,7 +54,7 @@ def _turned_over(s: Any, m: Model, w: Work) -> bool:
             continue
         b = 0
         for i in range(s.nc):
-            if not m.unilateral[i]:
+            if not m.unilateral[i] and w.pivot0[i] > 0.0:
                 total = 0.0
                 for c in range(max(m.span[i, 0], m.span[w.idx[j], 0]), min(m.span[i, 1], m.span[w.idx[j], 1])):
                     total += w.H[j, c] * w.X0[i, c]

@@ -11,20 +11,19 @@ from crossbody.reference._kinds import Array, Bytes
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.layout import MEMORYLESS, NODES, Model, Work
+from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, slow
 
 # Guards: each fires where all of its functions are below zero.
 NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH = np.arange(9)
 FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1])
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
-HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
 
 
 @inlined
-def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
-    """Lam of the active row i at the state in ys."""
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN) != 0:
+def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float, known: bool) -> float:
+    """Lam of the active row i at the state in ys; `known` if it is there already."""
+    if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
         return np.nan
     for j in range(s.na):
         if w.idx[j] == i:
@@ -33,7 +32,7 @@ def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> float:
 
 
 @inlined
-def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> None:
+def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float, known: bool) -> None:
     """Elastic part c |h'| + b0 |h| less eps lam_i / (G^-1)_ii: positive while the elastic part of lam still counts.
 
     c is b1, but at least sqrt(b0): with b1 alone a weakly damped collision would be spent at each passage of h
@@ -41,7 +40,7 @@ def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float) -> None:
     functions, of which the largest counts.
     """
     elastic, spring, inertial = np.nan, 0.0, 0.0
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], GENERAL) == 0:
+    if known or accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], GENERAL) == 0:
         for j in range(s.na):
             if w.idx[j] == i:
                 elastic = max(w.law[i, 1], np.sqrt(w.law[i, 0])) * w.hda[j]
@@ -79,13 +78,12 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     s.guards += 1
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
-    q, v = w.ys[: s.n], w.ys[s.n :]
-    if kind in (RELEASE, HANDOVER):
-        dense.put_on_rows(K, s, m, w, theta, w.ys)
+    q, v = w.ys[: s.nq], w.ys[s.nq :]
+    known = kind in (RELEASE, HANDOVER) and dense.put_on_rows(K, s, m, w, theta, w.ys)
     if kind == RELEASE:
-        w.parts[0] = _multiplier(K, s, m, w, i, t)
+        w.parts[0] = _multiplier(K, s, m, w, i, t, known)
     elif kind == HANDOVER:
-        _handover(K, s, m, w, i, t)
+        _handover(K, s, m, w, i, t, known)
     elif kind == SWITCH:
         K.watch(t, q, v, m.p, w.guard)
         w.parts[0] = w.guard[i]
@@ -129,7 +127,7 @@ def largest(w: Work, count: int) -> float:
 def _rounding(s: Any, w: Work) -> float:
     """What rounding of the positions makes of a gap."""
     largest = 0.0
-    for a in range(s.n):
+    for a in range(s.nq):
         largest = max(largest, abs(w.y[a]))
     return 8.0 * ULP * largest
 

@@ -27,12 +27,15 @@ STAGES_MOST = 12  # of any method, the start counted
 BETWEEN = 3  # stages at which gaps and guards are looked at
 WINDOW_LEVELS = 26  # times that a step is halved in search of an event, and once: a dip as narrow is rounding
 FUNCTIONS_MOST = 4  # that make up one guard
+HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
 STATE = np.dtype(
     [
         # options, set once
-        ("n", "i8"),
+        ("n", "i8"),  # velocities
+        ("nq", "i8"),  # positions
+        ("has_velocity", "i8"),  # q' is not v
         ("nc", "i8"),
         ("nu", "i8"),
         ("k", "i8"),
@@ -52,6 +55,7 @@ STATE = np.dtype(
         ("audited", "i8"),  # the energy account is judged
         ("loops", "i8"),  # rows that are always on, by the general algebra: they may lose rank on the way
         ("keep_events", "i8"),
+        ("has_energy", "i8"),
         ("has_control", "i8"),
         ("has_switch", "i8"),
         ("rtol", "f8"),
@@ -78,7 +82,6 @@ STATE = np.dtype(
         ("have_mass", "i8"),
         ("have_free", "i8"),
         ("have_laws", "i8"),
-        ("have_slopes", "i8"),  # of the multipliers, at the step's start
         ("longest_flight", "f8"),
         ("stalled", "i8"),
         ("hold", "i8"),
@@ -102,6 +105,7 @@ STATE = np.dtype(
         ("next_tick", "i8"),
         ("next_sample", "i8"),
         ("rows", "i8"),
+        ("spoilt", "i8"),  # a row holds what is not finite
         ("events", "i8"),
         ("switches", "i8"),
         ("energy_start", "f8"),
@@ -154,11 +158,12 @@ class Buffers:
 class Work:
     """The workspace."""
 
-    y: Floats  # (2n,) q and v
+    y: Floats  # (nq + n,) q and v
     y1: Floats
     ys: Floats
-    k: Floats2  # (16, 2n) stage derivatives
-    F: Floats2  # (7, 2n) dense output
+    k: Floats2  # (16, nq + n) stage derivatives
+    F: Floats2  # (7, nq + n) dense output
+    atol: Floats  # (nq + n,) absolute tolerances
     z: Floats  # (nz,) ledger: work of every row, of the inputs, of the damping
     z1: Floats
     kz: Floats2  # (16, nz)
@@ -196,8 +201,8 @@ class Work:
     gaps: Floats2  # (5, nc) at the nodes of the step
     rates: Floats2
     lams: Floats2
-    peak: Floats  # (nc,) where in the step each multiplier is largest
-    rising: Floats  # (nc,) above 0 where it rises at the step's start
+    peak: Floats  # (nc,) where in the step each multiplier is largest; NEVER if at an end, or lower than before
+    highest: Floats  # (nc,) largest multiplier of the present contact that is written down
     hit: Floats  # (nc,) where in the step each contact switches
     J: Floats2  # (n, n)
     Jq: Floats2
@@ -218,19 +223,32 @@ class Work:
     ends: Index  # largest column past an active row and all before it
     struck: Index  # (nc,) how each row takes part in a frozen collision
     before: Bytes  # modes before a switch
+    settled: Bytes  # modes that rows left in the last pass
     kind: Index  # (nc,) which guard fired
     pivot: Index
+    # Where q' is not v, and empty elsewhere:
+    tangent: Floats2  # (nq, n) N of q' = N v + r, at the step's start
+    stage_v: Floats2  # (6, n) v at the stages of a method without a dense output of its own
+    travel: Floats  # (n,) integral of v over such a step
+    bend: Floats2  # (2, nq) q'' at both its ends
+    place: Floats  # (nq,) a stage's position without its own part; scratch
+    turn: Floats  # (nq,) scratch
+    slip: Floats  # (n,) scratch
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)
 open_model, open_buffers, open_work = opener(MODEL), opener(BUFFERS), opener(WORK)
 
 
-def workspace(n: int, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: int, nd: int) -> dict[str, Any]:
+def workspace(
+    n: int, nq: int, has_velocity: bool, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: int, nd: int
+) -> dict[str, Any]:
     """Allocate the workspace: one array a field of `Work`, in its order."""
+    ny, turns = nq + n, int(has_velocity)
     shapes: dict[str, tuple[int, ...]] = {
-        **dict.fromkeys(("y", "y1", "ys"), (2 * n,)),
-        "k": (DENSE_STAGES, 2 * n), "F": (DENSE_TERMS, 2 * n),
+        **dict.fromkeys(("y", "y1", "ys", "atol"), (ny,)), "k": (DENSE_STAGES, ny), "F": (DENSE_TERMS, ny),
+        "tangent": (turns * nq, n), "stage_v": (6 * turns, n), "bend": (2 * turns, nq),
+        **dict.fromkeys(("place", "turn"), (turns * nq,)), **dict.fromkeys(("travel", "slip"), (turns * n,)),
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),

@@ -64,11 +64,11 @@ def released_mode(mode: int, h: float) -> int:
 @inlined
 def _from_state(s: Any, w: Work, i: int) -> float:
     """What rounding of the state makes of row i's law."""
-    n = s.n
     position, speed = 0.0, 0.0
-    for a in range(n):
+    for a in range(s.nq):
         position = max(position, abs(w.y[a]))
-        speed = max(speed, abs(w.y[n + a]))
+    for a in range(s.nq, s.nq + s.n):
+        speed = max(speed, abs(w.y[a]))
     return float(8.0 * ULP * (w.law[i, 0] * position + w.law[i, 1] * speed))
 
 
@@ -113,12 +113,12 @@ def _spread_left_over(s: Any, w: Work) -> None:
 @inlined
 def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Everything a machine asks for at the present instant: gaps, rates, multipliers, their noise."""
-    n = s.n
+    nq = s.nq
     activate(s, m, w, mode)
     s.have_jacobian = 0
     if s.nc > 0:
         s.guards += 1
-        K.gaps(s.t, w.y[:n], w.y[n:], m.p, w.gap, w.rate)
+        K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     if derivative(K, s, m, w, s.t, w.y, START) != 0:
         return ILL_POSED
     scatter(s, w, w.lam)
@@ -161,7 +161,7 @@ def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: in
         mode[i] = active_mode(s, m, i)
     activate(s, m, w, mode)
     size = 0.0
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL) == 0:
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) == 0:
         for j in range(s.na):
             if w.idx[j] == i:
                 size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
@@ -177,15 +177,15 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
     Lam of a row that joins is that rest over a positive number, so its sign needs no solution. A row at rest (spec 1.2)
     has no law yet: what is left of its gap and its rate is what collisions left, and presses nothing.
     """
-    n, j = s.n, s.na
+    nq, j = s.nq, s.na
     w.idx[j] = i
     clear(m, w, j)
-    K.rows(s.t, w.y[:n], w.y[n:], m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
+    K.rows(s.t, w.y[:nq], w.y[nq:], m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
     push, size, rate = 0.0, abs(w.Hdv[j]), 0.0
     for c in range(m.span[i, 0], m.span[i, 1]):
-        push += w.H[j, c] * w.k[START, n + c]
-        size += abs(w.H[j, c] * w.k[START, n + c])  # bodies in free fall cancel
-        rate += w.H[j, c] * w.y[n + c]
+        push += w.H[j, c] * w.k[START, nq + c]
+        size += abs(w.H[j, c] * w.k[START, nq + c])  # bodies in free fall cancel
+        rate += w.H[j, c] * w.y[nq + c]
     if not at_rest:
         h, a0, a1, a2 = w.ha[j], w.law[i, 0], w.law[i, 1], w.law[i, 2]
         spring = (a0 + a2 * h * h) * h
@@ -199,7 +199,7 @@ def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest
     """Whether row i would push if it were active now; the acceleration of the present modes stands in k[0]."""
     if at_rest or (not s.has_solve and active_mode(s, m, i) == CONTACT):
         return _own_press(K, s, m, w, i, at_rest)
-    lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.n], w.y[s.n :])
+    lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.nq], w.y[s.nq :])
     return bool(lam > w.noise[i])
 
 

@@ -10,6 +10,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes, Floats
 from crossbody.reference.core import dense, peaks
 from crossbody.reference.core.acceleration import OWN, accelerate, scatter
+from crossbody.reference.core.algebra import all_finite
 from crossbody.reference.core.layout import EXACT, NEVER, Model, Work
 
 ARC_POINTS = 16  # an arc in closed form is one step, however long: these points show its shape
@@ -21,20 +22,22 @@ def write_row(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, y: Array, lam: Array, z: Array, out: Floats, modes: Bytes
 ) -> None:  # fmt: skip
     """Append one row."""
-    n, nc, r = s.n, s.nc, s.rows
+    nq, nc, r = s.nq, s.nc, s.rows
+    at = 1 + nq + s.n
     out[r, 0] = t
-    out[r, 1 : 1 + 2 * n] = y
-    at = 1 + 2 * n
-    K.gaps(t, y[:n], y[n:], m.p, w.gap, w.rate)
+    out[r, 1:at] = y
+    K.gaps(t, y[:nq], y[nq:], m.p, w.gap, w.rate)
     out[r, at : at + nc] = w.gap
     out[r, at + nc : at + 2 * nc] = lam
     at += 2 * nc
-    K.energy(y[:n], y[n:], m.p, w.e)
+    K.energy(y[:nq], y[nq:], m.p, w.e)
     out[r, at] = w.e[0]
     out[r, at + 1] = w.e[1]
     out[r, at + 2 : at + 2 + s.nz] = z
     modes[r] = mode
     s.rows = r + 1
+    if not (all_finite(out[r, :at]) and all_finite(out[r, at if s.has_energy else at + 2 :])):
+        s.spoilt = 1  # gaps, energies and powers steer no step
 
 
 @inlined
@@ -50,9 +53,8 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     theta = min(max((t - s.t_old) / s.hs, 0.0), 1.0)
     dense.prepare(K, s, m, w)
     dense.state(s, m, w, theta, w.ys)
-    if s.na > 0:
-        dense.put_on_rows(K, s, m, w, theta, w.ys)
-        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.n], w.ys[s.n :], OWN)
+    if s.na > 0 and not dense.put_on_rows(K, s, m, w, theta, w.ys):
+        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN)
     scatter(s, w, w.lam)
     z = w.z
     if s.ledger and s.method != EXACT:
@@ -74,7 +76,7 @@ def _points(s: Any, length: float) -> int:
 def _shape(K: Any, s: Any, m: Model, w: Work, mode: Bytes, until: float, out: Floats, modes: Bytes) -> None:
     """Append the peaks of multipliers in the step, and the shape of an arc, in the order of time."""
     length = until - s.t_old
-    peaks.find(K, s, m, w, mode, length / s.hs)
+    peaks.find(K, s, m, w, min(s.theta, 1.0))
     count = _points(s, length) if s.method == EXACT else 1
     for j in range(1, count + 1):
         t = s.t_old + length * j / count

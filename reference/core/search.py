@@ -51,11 +51,11 @@ def _bound(w: Work, row: Array, j: int, g: float) -> None:
 
 
 @inlined
-def _from_its_gap(row: Array, kind: int, j: int, width: float) -> float:
+def _from_its_gap(w: Work, row: Array, kind: int, j: int, width: float) -> float:
     """A bound on g of function j if it is the rate of a gap that stands in the line as well, else 0."""
     if kind == CATCH and j == 0:
-        return from_gaps(row, 0, BESIDE, width)
-    return from_gaps(row, NODES, 0, width) if kind == TOUCH_INSIDE and j == 1 else 0.0
+        return from_gaps(row, 0, BESIDE, width, w.bands[0])
+    return from_gaps(row, NODES, 0, width, w.bands[1]) if kind == TOUCH_INSIDE and j == 1 else 0.0
 
 
 @inlined
@@ -72,7 +72,7 @@ def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, co
         w.tiny[j] = max(8.0 * ULP * most, w.tiny[j])
         row[MEASURED + j] = 0.0
         g = from_slopes(row) if scale != 0.0 and j == 0 else decay(row, at)
-        g = max(g, _from_its_gap(row, kind, j, s.hs))
+        g = max(g, _from_its_gap(w, row, kind, j, s.hs))
         _bound(w, row, j, g)
     return scale
 
@@ -86,7 +86,7 @@ def opens(s: Any, w: Work, i: int, until: float) -> bool:
     row, lowest = w.window[0], w.window[1]
     for c in range(NODES):
         row[c], row[BESIDE + c] = w.rates[c, i], w.gaps[c, i]
-    g = max(decay(row, 0), from_gaps(row, 0, BESIDE, s.hs))
+    g = max(decay(row, 0), from_gaps(row, 0, BESIDE, s.hs, 0.0))
     for k in range(NODES + 1):
         lowest[k] = -g * W_HULL[k]
         for c in range(NODES):
@@ -143,7 +143,7 @@ def _halve(
             left = min(max(row[MEASURED + j] / before, LEFT), 1.0)
         g = from_slopes(row) if scale != 0.0 and j == 0 else SAFETY * left * row[MEASURED + j]
         if level <= GAP_LEVELS:
-            g = max(g, _from_its_gap(row, kind, j, s.hs * 0.5**level))
+            g = max(g, _from_its_gap(w, row, kind, j, s.hs * 0.5**level))
         _bound(w, row, j, 0.0 if known else g)
 
 

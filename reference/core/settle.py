@@ -11,13 +11,25 @@ from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.collisions import collide
 from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
-from crossbody.reference.core.layout import EDGE, FREE, LEVEL, LOST, MEMORYLESS, MODE_CYCLE, Buffers, Model, Work
+from crossbody.reference.core.layout import (
+    EDGE,
+    FREE,
+    ILL_POSED,
+    LEVEL,
+    LOST,
+    MEMORYLESS,
+    MODE_CYCLE,
+    Buffers,
+    Model,
+    Work,
+)
 from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
 TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
 SAME_CHANGE = 1e-9  # part by which changes of v' may differ and count as equal: rounding does not choose
+ALONE = np.int64(2)  # of one_by_one: rows join one after another, however alike
 SWITCH_ROUNDS = 32  # switches that follow one another at one instant
 
 
@@ -46,9 +58,10 @@ def _want(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
 def _keep_strongest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Of the rows that want to switch let those that only change their name, else those that change v' most.
 
-    Rows that change it equally switch together, so that their order does not choose. The changes stand in w.hit.
+    Rows that change it equally switch together, so that their order does not choose; where they depend on each other it
+    has to, and the first one switches alone. The changes stand in w.hit.
     """
-    most = -1.0
+    most, alone = -1.0, s.one_by_one == ALONE
     for i in range(s.nc):
         if w.struck[i] != b.mode[i]:
             w.hit[i] = np.inf
@@ -56,8 +69,11 @@ def _keep_strongest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
                 w.hit[i] = change_of_acceleration(K, s, m, w, b.mode, i)
             most = max(most, w.hit[i])
     for i in range(s.nc):
-        if w.struck[i] != b.mode[i] and not w.hit[i] >= most * (1.0 - SAME_CHANGE):
-            w.struck[i] = b.mode[i]
+        if w.struck[i] != b.mode[i]:
+            if not w.hit[i] >= most * (1.0 - SAME_CHANGE):
+                w.struck[i] = b.mode[i]
+            elif alone:
+                most = np.inf
 
 
 @inlined
@@ -84,7 +100,7 @@ def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
     """What a machine asks for besides `evaluate`: the general algebra's rows and the noise of the multipliers."""
     if s.fsm != EDGE and s.na > 0:
         if s.has_solve:
-            accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.n], w.y[s.n :], GENERAL)
+            accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL)
         noise(s, m, w)
 
 
@@ -92,7 +108,7 @@ def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
 def _touching(s: Any, w: Work) -> None:
     """How large a gap rounding alone can make of a touch."""
     largest = 1.0
-    for a in range(s.n):
+    for a in range(s.nq):
         largest = max(largest, abs(w.y[a]))
     s.touch = TOUCHING * largest
 
@@ -103,11 +119,19 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     changed = b.history[len(b.history) - 1]
     changed[:] = 0
     remember(s, b)
+    events, joined = s.events, False
     while True:
         code = evaluate(K, s, m, w, b.mode)
+        if code == ILL_POSED and joined and s.fsm == LEVEL and s.one_by_one != ALONE:
+            # Rows that joined together depend on each other: back, and one by one. What is left closes by itself.
+            copy(w.settled, b.mode)
+            s.events, s.one_by_one, joined = events, ALONE, False
+            continue
         if code != 0:
             return int(code)
         _consistent(K, s, m, w)
+        copy(b.mode, w.settled)
+        events, joined = s.events, True
         if _pass(K, s, m, w, b) == 0:
             if not s.frozen:
                 return 0
@@ -128,7 +152,7 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 def switch(K: Any, s: Any, m: Model, w: Work, b: Buffers, fired: int) -> int:
     """Let the mechanism change its discrete variables; UNCHANGED, CHANGED or LOST of the kernels."""
     keep_discrete(s, m, w, b)
-    result = K.switch(s.t, w.y[: s.n], w.y[s.n :], m.p, b.mode, fired)
+    result = K.switch(s.t, w.y[: s.nq], w.y[s.nq :], m.p, b.mode, fired)
     write_discrete(s, m, w, b)
     s.have_free = 0
     return int(result)

@@ -60,27 +60,30 @@ def _finite_mass(s: Any, w: Work) -> bool:
 @inlined
 def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Evaluate the end of the step, derivative, multipliers, gaps, and check it."""
-    n = s.n
+    nq = s.nq
     last = NODES - 1
     end = s.end
     t = s.t + s.hs
+    known = s.method == SHORT
+    # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
     if s.method == IMPLICIT:
         s.t_old = s.t
-        dense.put_on_rows(K, s, m, w, 1.0, w.y1)
-    # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
-    if s.method != SHORT and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
+        known = dense.put_on_rows(K, s, m, w, 1.0, w.y1)
+        if known:
+            dop853.keep(K, s, m, w, t, w.y1, end)
+    if not known and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     scatter(s, w, w.lams[last])
     if s.nc > 0:
         s.guards += 1
-        K.gaps(t, w.y1[:n], w.y1[n:], m.p, w.gaps[last], w.rates[last])
+        K.gaps(t, w.y1[:nq], w.y1[nq:], m.p, w.gaps[last], w.rates[last])
     copy(w.lam0, w.lams[0])
     if not (all_finite(w.gaps[last]) and all_finite(w.rates[last]) and all_finite(w.lams[last])):
         return NOT_FINITE
     if not all_finite(w.k[end]) or not _finite_mass(s, w):
         return NOT_FINITE
     y1 = w.y1
-    for i in range(2 * n):
+    for i in range(nq + s.n):
         if abs(y1[i]) > FAR:
             return DIVERGED
     if s.loops and folds.passed(s, m, w, b) != 0:

@@ -70,6 +70,19 @@ class Derivatives:
     size: Floats
 
 
+def check_coordinates(system: System) -> None:
+    """Refuse a system whose linear model would have to live on the tangent space of its positions.
+
+    Raises:
+        SceneError: if its positions are not integrals of its velocities.
+    """
+    if system.velocity is not None:
+        raise SceneError(
+            "System.velocity is given: q' is not v. Linear models, trims, sensitivities and estimates of forces are "
+            "there for systems whose velocities are the derivatives of their positions alone."
+        )
+
+
 def terms(at: Point, q: Array, v: Array, u: Array) -> tuple[Array, Array, Array, Array, Array]:
     """M in blocks (n/k, k, k), f, and of the active rows H, h, H' v; in the type of the state."""
     system, na, given = at.system, len(at.active), at.system.p if at.p is None else at.p

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from crossbody.cases import SceneError, UnknownName
 from crossbody.cases._arrays import frozen
 from crossbody.cases._entry_points import checked_arguments
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._analytic import check_analytic
-from crossbody.reference.linear._derivatives import Derivatives, Point, derivatives
-from crossbody.reference.linear._indices import different
+from crossbody.reference.linear._derivatives import Derivatives, Point, check_coordinates, derivatives
 from crossbody.reference.linear._model import LinearModel
 
 OUTPUTS = ("q", "v", "gap", "lam")
@@ -81,6 +81,7 @@ def point(
         SceneError: for a state of another shape, rows that do not exist, rows that collide without being on, or
             kernels that are not analytic.
     """
+    check_coordinates(system)
     on = np.flatnonzero(np.asarray(system.unilateral) == 0).tolist() if active is None else active
     rows = different("active", on, system.nc)
     if not set(colliding) <= set(rows.tolist()):

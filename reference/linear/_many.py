@@ -17,7 +17,7 @@ from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear import _compiled
-from crossbody.reference.linear._derivatives import Point
+from crossbody.reference.linear._derivatives import Point, check_coordinates
 from crossbody.reference.linear._linearise import point
 from crossbody.reference.linear._pattern import Pattern, coloured, dense, observed
 
@@ -87,6 +87,7 @@ def tangents(
 
 def states(system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None) -> Floats:
     """Lines (q, v, u), checked (N, 2 n + nu)."""
+    check_coordinates(system)
     positions = frozen("tangents", "q", q, (None, system.n))
     count = len(positions)
     rates = frozen("tangents", "v", np.zeros((count, system.n)) if v is None else v, (count, system.n))

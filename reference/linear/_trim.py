@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import Outcome
 from crossbody.cases._entry_points import checked_arguments
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._derivatives import STEP, Point, terms
-from crossbody.reference.linear._indices import different
 from crossbody.reference.linear._linearise import point
 
 STEPS = 50

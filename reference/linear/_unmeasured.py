@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases._arrays import frozen
 from crossbody.cases._entry_points import wholes
+from crossbody.reference._indices import different
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
-from crossbody.reference.linear._derivatives import STEP, Point, terms
-from crossbody.reference.linear._indices import different
+from crossbody.reference.linear._derivatives import STEP, Point, check_coordinates, terms
 
 LARGEST = 1e100  # of a deviation: its square is still a number
 
@@ -78,6 +78,7 @@ class Record:
     def __init__(
         self, system: System, t: ArrayLike, u: ArrayLike | None, unknown: Unknown, active: Sequence[int] | None
     ) -> None:
+        check_coordinates(system)
         self.system, self.unknown = system, unknown
         self.t = frozen("estimate", "t", t, (None,))
         given = np.zeros((len(self.t), system.inputs)) if u is None else u

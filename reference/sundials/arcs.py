@@ -2,7 +2,7 @@
 
     cvode            q' = v, v' from the KKT matrix
     ida, index 1     q' = v, M v' = f + H_A^T lam_A, active rows H M^-1 (f + H_A^T lam_A) + H' v + a1 h' + a0 h + a2 h^3
-                     = 0, else lam = 0; the multipliers are out of the error control
+                     = 0, else lam = 0; the multipliers are all but out of the error control
     ida, index 3     for bilateral rows h = 0 in the stabilised form of index 2 (Gear, Leimkuhler and Gupta 1985):
                      q' = v + H^T mu, h = 0, H v = 0; unilateral rows keep their law
 
@@ -36,7 +36,8 @@ CHUNK = 500  # internal steps between two looks at the clock
 TOO_MUCH_WORK = -1
 ORDER, ORDER_IN_CONTACT = 12, 6  # of Adams' formulas; those of high order are stable for short steps alone
 STALLED, DAMPED = 200, 0.3  # steps bound by stability; damping ratio: beyond both the arc is stiff
-UNWATCHED = 1e6  # N: multipliers follow from the state; at index 2 their errors are errors of the motion over the step
+UNWATCHED = 1e6  # N: in no error control
+LOOSE = 1e-2  # of the size of a multiplier: it follows from the state
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 FAR = 1e30  # beyond this a motion has diverged
 SAME_INSTANT = 8.0 * ULP
@@ -47,7 +48,7 @@ ENDLESS = 2**62
 
 @dataclass(slots=True)
 class State:
-    """One instant: t, q (n,), v (n,), work z; lam (nc,) where the solver carries it."""
+    """One instant: t, q (nq,), v (n,), work z; lam (nc,) where the solver carries it."""
 
     t: float
     q: Floats
@@ -113,7 +114,8 @@ class Arc:
     """
 
     def __init__(self, scene: Scene, start: State, view: View, longest: float, single: bool) -> None:
-        self.scene, self.options, self.n = scene, scene.options, scene.equations.system.n
+        self.scene, self.options = scene, scene.options
+        self.nq, self.ny = scene.equations.system.nq, scene.equations.system.nq + scene.equations.system.n
         self.single, self.fresh = single, True
         self.guards = [*scene.machine.guards, *scene.discrete.watched()]
         scene.looks.begin(self.guards, scene.machine.frozen)
@@ -159,7 +161,8 @@ class Arc:
     def _tolerances(self) -> Floats:
         """Absolute ones, for q, v and the work."""
         share = SHARE * self.options.tolerance
-        return np.concatenate([np.full(2 * self.n, share), np.full(self.scene.nz, share * self.scene.scale)])
+        motion = SHARE * self.options.absolute(self.scene.equations.system)
+        return np.concatenate([motion, np.full(self.scene.nz, share * self.scene.scale)])
 
     def _events(self) -> Any:
         """The bound in the place of a root function, in the form that the library calls."""
@@ -279,8 +282,8 @@ class CvodeArc(Arc):
         return solver, y
 
     def _state(self, t: float, y: Floats) -> State:
-        n = self.n
-        return State(t, y[:n], y[n : 2 * n], y[2 * n :])
+        nq, ny = self.nq, self.ny
+        return State(t, y[:nq], y[nq:ny], y[ny:])
 
 
 class BdfArc(CvodeArc):
@@ -302,14 +305,14 @@ class IdaArc(Arc):
         return events
 
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
-        n, nc, nz, e = self.n, self.scene.equations.system.nc, self.scene.nz, self.scene.equations
-        bilateral = ~np.asarray(e.system.unilateral, dtype=bool)
+        ny, nc, nz, e = self.ny, self.scene.equations.system.nc, self.scene.nz, self.scene.equations
+        bilateral = e.system.held
         self.rigid = np.flatnonzero(bilateral).tolist() if self.options.index == 3 else []
         nb = len(self.rigid)
-        self.lam, self.mu = slice(2 * n, 2 * n + nc), slice(2 * n + nc, 2 * n + nc + nb)
-        self.work = slice(2 * n + nc + nb, None)
+        self.lam, self.mu = slice(ny, ny + nc), slice(ny + nc, ny + nc + nb)
+        self.work = slice(ny + nc + nb, None)
         looks = self.scene.looks
-        call, lines, slopes = looks.call, looks.lines, looks.work["slopes"][: 2 * n + nc + nb + nz]
+        call, lines, slopes = looks.call, looks.lines, looks.work["slopes"][: ny + nc + nb + nz]
         looks.work["rigid"][:] = -1
         looks.work["rigid"][self.rigid] = range(nb)
         looks.work["scale"][e.active] = self._masses(start)
@@ -320,15 +323,16 @@ class IdaArc(Arc):
                 raise Ended(ENDS[code], e.active)
 
         own = self._tolerances()
-        atol = np.concatenate([own[: 2 * n], np.full(nc + nb, UNWATCHED), own[2 * n :]])
+        atol = np.concatenate([own[:ny], self._watched(start), np.full(nb, UNWATCHED), own[ny:]])
         solver = IDA(
-            residual, atol=atol, algebraic_idx=list(range(2 * n, 2 * n + nc + nb)), first_step=self._first_step(),
+            residual, atol=atol, algebraic_idx=list(range(ny, ny + nc + nb)), first_step=self._first_step(),
             **self.common,
         )  # fmt: skip
         powers = e.powers(start.t, start.q, start.v, view.lam) if nz else np.zeros(0)
         zero = np.zeros(nb)
         y = np.concatenate([start.q, start.v, view.lam, zero, start.z])
-        solver.init_step(start.t, y, np.concatenate([start.v, view.vd, np.zeros(nc), zero, powers]))
+        qd = e.system.rates(start.q, start.v, start.t, e.p)
+        solver.init_step(start.t, y, np.concatenate([qd, view.vd, np.zeros(nc), zero, powers]))
         return solver, y
 
     def _masses(self, start: State) -> Floats:
@@ -340,6 +344,21 @@ class IdaArc(Arc):
         masses: Floats = 1.0 / np.einsum("ij,ji->i", H, X)
         return masses
 
+    def _watched(self, start: State) -> Floats:
+        """Tolerance of every multiplier (nc,): loose, but not none, or Newton's iteration ends with any of them.
+
+        Then what it leaves keeps stiff contacts at order two and short steps. At index 2 their errors are errors of the
+        motion over the step, and they are left out.
+        """
+        e = self.scene.equations
+        found = np.full(e.system.nc, UNWATCHED)
+        if not self.rigid and e.active:
+            largest = float(max(np.abs(start.q).max(), np.abs(start.v).max()))
+            error = SHARE * (self.options.rtol * largest + self.options.tolerance)
+            noise, size = e.noise(start.t, start.q, start.v, self.scene.machine.fastest, error)
+            found[e.active] = (LOOSE * size + NOISY * noise)[e.active]
+        return found
+
     def _first_step(self) -> float:
         """0 to let IDA guess; at index 2 its guess is so short that it sees rounding over the step and nothing else."""
         if not self.rigid:
@@ -349,6 +368,6 @@ class IdaArc(Arc):
         return float(CAUTIOUS * np.sqrt(SHARE * self.options.rtol) / fastest)
 
     def _state(self, t: float, y: Floats) -> State:
-        n = self.n
+        nq, ny = self.nq, self.ny
         # At index 1 lam follows from the state.
-        return State(t, y[:n], y[n : 2 * n], y[self.work], y[self.lam] if self.rigid else None)
+        return State(t, y[:nq], y[nq:ny], y[self.work], y[self.lam] if self.rigid else None)

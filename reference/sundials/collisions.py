@@ -71,23 +71,12 @@ def sequential(e: Equations, t: float, q: Floats, v: Floats, now: Touching) -> J
     """One row collides, the most approaching one; ties go to the lowest index."""
     fastest = min(now.rate[i] for i in now.approaching)
     n = next(i for i in now.approaching if now.rate[i] <= fastest + TIE * now.fastest)
-    rows = [*now.held, n]
-    unit = np.array([float(i == n) for i in rows])
-    kept, _ = _pushing(e, t, q, v, rows, unit)  # signs do not depend on e
-    captured = {n} if _captured(e, t, q, v, now, n, {*kept}) else set()
-    bounce = 0.0 if captured else _restitution(e, n)
-    return _jump(e, t, q, v, now, rows, -(1.0 + bounce) * now.rate[n] * unit, captured)
+    return _jump(e, t, q, v, now, [*now.held, n], [n])
 
 
 def simultaneous(e: Equations, t: float, q: Floats, v: Floats, now: Touching) -> Jump:
     """All touching rows that do not separate collide together, each with its own restitution."""
-    captured = {i for i in now.approaching if _captured(e, t, q, v, now, i, {*now.held})}
-    rows = [*now.held, *now.approaching, *now.still]
-    change = np.zeros(len(rows))
-    for j, i in enumerate(rows[len(now.held) :], start=len(now.held)):
-        bounces = i in now.approaching and i not in captured
-        change[j] = -(1.0 + (_restitution(e, i) if bounces else 0.0)) * now.rate[i]
-    return _jump(e, t, q, v, now, rows, change, captured)
+    return _jump(e, t, q, v, now, [*now.held, *now.approaching, *now.still], [*now.approaching, *now.still])
 
 
 RULES = {"sequential": sequential, "simultaneous": simultaneous}
@@ -105,10 +94,25 @@ def _captured(e: Equations, t: float, q: Floats, v: Floats, now: Touching, i: in
     return bool(-now.rate[i] < threshold_speed(e.fast[i, 0], e.fast[i, 1], press))
 
 
-def _pushing(e: Equations, t: float, q: Floats, v: Floats, rows: list[int], change: Floats) -> tuple[list[int], Floats]:
-    """The rows that push when their rates change so, and the impulses (len(rows),), 0 for every other.
+def _changes(
+    e: Equations, t: float, q: Floats, v: Floats, now: Touching, rows: list[int], struck: list[int], kept: set[int]
+) -> tuple[Floats, set[int]]:
+    """Changes of the rates of `rows` while `kept` of them push, and which of the struck ones are captured."""
+    held = kept.difference(struck)
+    bouncing = [i for i in struck if i in now.approaching and i in kept]
+    captured = {i for i in bouncing if _captured(e, t, q, v, now, i, held)}
+    change = np.zeros(len(rows))
+    for j, i in enumerate(rows):
+        if i in struck:
+            change[j] = -(1.0 + (_restitution(e, i) if i in bouncing and i not in captured else 0.0)) * now.rate[i]
+    return change, captured
 
-    A row that follows another may pull, and leaves with it.
+
+def _jump(e: Equations, t: float, q: Floats, v: Floats, now: Touching, rows: list[int], struck: list[int]) -> Jump:
+    """The jump when these rows are struck. The most pulling row leaves first, until all push.
+
+    What presses on a struck row, and so whether it is captured, is asked for again whenever a held row has left. A row
+    that follows another may pull, and leaves with it.
 
     Raises:
         Ended: ILL_POSED if these rows are dependent.
@@ -118,23 +122,19 @@ def _pushing(e: Equations, t: float, q: Floats, v: Floats, rows: list[int], chan
     follows = np.asarray(e.system.follows)[rows]
     may_pull = ~np.asarray(e.system.unilateral, dtype=bool)[rows] | (follows >= 0)
     while True:
+        change, captured = _changes(e, t, q, v, now, rows, struck, {rows[j] for j in kept})
         P[:] = 0.0
         P[kept] = np.linalg.solve(G[np.ix_(kept, kept)], change[kept])
-        pulling = [j for j in kept if not may_pull[j] and P[j] < -NONE * np.abs(P).max()]
+        least = NONE * np.abs(P).max()
+        pulling = [j for j in kept if not may_pull[j] and P[j] < -least]
         if not pulling:
-            return [rows[j] for j in kept], P
+            break
         worst = min(pulling, key=lambda j: float(P[j]))
         kept = [j for j in kept if j != worst and follows[j] != rows[worst]]
-
-
-def _jump(
-    e: Equations, t: float, q: Floats, v: Floats, now: Touching, rows: list[int], change: Floats, captured: set[int]
-) -> Jump:
-    kept, P = _pushing(e, t, q, v, rows, change)
-    H, X = e.mobility(t, q, v, rows)
     after = v + X @ P
     work = np.zeros(e.system.nc)
     work[rows] = 0.5 * P * (H @ (v + after))
-    least = NONE * np.abs(P).max()
-    collide = {i: float(x) for i, x in zip(rows, P, strict=True) if i in now.approaching and i in kept and x > least}
-    return Jump(after, collide, captured & {*collide}, [i for i in now.held if i not in kept], work)
+    pushing = {rows[j]: float(P[j]) for j in kept if P[j] > least}
+    impulses = {i: x for i, x in pushing.items() if i in struck and i in now.approaching}
+    left = {*rows} - {rows[j] for j in kept}
+    return Jump(after, impulses, captured & {*impulses}, [i for i in now.held if i in left], work)

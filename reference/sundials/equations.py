@@ -149,7 +149,7 @@ class Equations:
 
         Args:
             t: instant, s.
-            q: positions (n,).
+            q: positions (nq,).
             v: velocities (n,).
             speed: rate at which gaps may close, m/s.
             error: of positions and velocities, beside their rounding.
@@ -182,16 +182,27 @@ class Equations:
         if values[-1] < DEPENDENT * values[0]:
             raise Ended(Outcome.ILL_POSED, self.active)
 
-    def project(self, q: Floats, v: Floats, rows: list[int]) -> None:
-        """Move q and v onto h = 0 and H v = 0 of the given rows, by the least change in the metric of M.
+    def project(
+        self, q: Floats, v: Floats, rows: list[int], h: Floats | None = None, rate: Floats | None = None
+    ) -> None:
+        """Move q and v to where the given rows have these gaps and rates, by the least change in the metric of M.
+
+        Args:
+            q: positions (n,), changed in place.
+            v: velocities (n,), likewise.
+            rows: m of the rows, active or not.
+            h: gaps (m,), m; NaN where a row's gap may stay as it is, none for zero.
+            rate: rates (m,), m/s; none for zero.
 
         Raises:
             Ended: ILL_POSED if these rows are dependent.
         """
+        gap, speed = (np.zeros(len(rows)) if x is None else x for x in (h, rate))
         with self._selected(rows):
             for _ in range(PROJECTIONS):
-                q -= self._least(q, v, lambda H, h: h)
-            v -= self._least(q, v, lambda H, h: H @ v)
+                off = self._least(q, v, lambda H, h: np.where(np.isnan(gap), 0.0, h - gap))
+                q -= self.system.displacement(q, off, self.p)
+            v -= self._least(q, v, lambda H, h: H @ v - speed)
 
     @contextmanager
     def _selected(self, rows: list[int]) -> Iterator[None]:

@@ -54,7 +54,7 @@ class Evaluator:
         """
         work, e = self.work, self.equations
         terms = [(g, term) for g, guard in enumerate(guards) for term in guard.terms]
-        work["size"][4:] = len(e.active), len(terms), len(guards)
+        work["size"][4:7] = len(e.active), len(terms), len(guards)
         work["idx"][: len(e.active)] = e.active
         work["law"][:], work["law_if"][:] = e.law, e.law
         for i in range(e.system.nc):

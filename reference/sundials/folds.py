@@ -36,7 +36,7 @@ class Folds:
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
         system = equations.system
-        rows = np.flatnonzero(~np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
+        rows = np.flatnonzero(system.held & (np.asarray(system.follows) < 0)).tolist()
         self.rows: list[int] = rows if len(rows) > 1 else []  # one row alone has no other to fold onto
         self._before: Floats = np.zeros((0, 0))
         self._rate: float | None = None

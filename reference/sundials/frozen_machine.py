@@ -18,10 +18,11 @@ from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.sundials.collisions import RULES, Jump, Touching
 from crossbody.reference.sundials.equations import ACTIVE, Ended, Equations
-from crossbody.reference.sundials.level_machine import DEEP, SLOW, TOUCH, LevelMachine, View, Watch
+from crossbody.reference.sundials.level_machine import DEEP, SLOW, LevelMachine, View, Watch
 
 LOCATED = 0.5  # of the least speed of approach: one that was located is not lost to rounding
-FEW, A_PAIR = 1000, 2  # collisions at one instant; a chain of n equal bodies needs n (n - 1) / 2
+STILL = 1e-13  # part of the largest rate seen: a rate below it is 0 but for rounding
+FEW, A_PAIR = 1000, 64  # collisions at one instant; a chain of n equal bodies needs n (n - 1) / 2, inelastic ones more
 
 
 class FrozenMachine(LevelMachine):
@@ -41,7 +42,7 @@ class FrozenMachine(LevelMachine):
         self.deep = max(DEEP, rtol)
         self.strongest = 0.0
         self._located: set[int] = set()
-        self._collided: list[int] = []
+        self._collisions = 0
         self._collided_at = -np.inf
 
     def _active_mode(self, i: int) -> Mode:
@@ -51,14 +52,20 @@ class FrozenMachine(LevelMachine):
         """A touch that was located is one, whatever rounding left of it."""
         if i not in self.frozen:
             return super()._touches(i, h, q)
-        return h <= TOUCH * max(1.0, float(np.abs(q).max())) or i in self._located
+        return h <= self._touch(q) or i in self._located
 
     def _approaches(self, i: int, rate: float) -> bool:
         return rate < -self.slow * (LOCATED if i in self._located else 1.0)
 
     def look(self, t: float, q: Floats, v: Floats) -> View:
-        """Evaluate the present mode set."""
+        """Evaluate the present mode set; what collisions left of gaps and rates is noise of the multipliers."""
         view = super().look(t, q, v)
+        active = self.equations.active
+        left = np.array([self._left_over(i, 0.0, q) for i in active])
+        if left.any():
+            H, X = self.equations.mobility(t, q, v, active)
+            inverse = np.linalg.inv(H @ X)  # whatever the signs: Cauchy and Schwarz
+            view.noise[active] += np.sqrt(left @ inverse @ left * np.diag(inverse))
         self.strongest = max(self.strongest, self.equations.strongest(t, q, v, sorted(self.frozen)))
         return view
 
@@ -66,7 +73,15 @@ class FrozenMachine(LevelMachine):
         """At rest the law has nothing to add: a row presses if its gap would close without it."""
         if i not in self.frozen or h < -self.deep:
             return super()._presses(i, h, t, q, v)
-        return self.equations.row_acceleration(t, q, v, i) < -SLOW * self.strongest
+        band = SLOW * self.strongest + self._left_over(i, h, q)
+        return self.equations.row_acceleration(t, q, v, i) < -band
+
+    def _left_over(self, i: int, h: float, q: Floats) -> float:
+        """What the law of a row at rest makes of a gap that counts as closed and a rate that counts as none, m/s^2."""
+        if i not in self.frozen:
+            return 0.0
+        a0, a1, _ = self.equations.slow[i]
+        return float(a0 * max(abs(h), self._touch(q)) + a1 * self.slow)
 
     def fire(self, t: float, q: Floats, v: Floats, fired: Iterable[tuple[int, Watch]]) -> bool:
         """A frozen row that meets the other body is noted; `settle` collides it. Other rows as ever."""
@@ -88,7 +103,7 @@ class FrozenMachine(LevelMachine):
         """
         if t != self._collided_at:
             self._collided_at = t
-            self._collided.clear()
+            self._collisions = 0
         while True:
             view = self._switch_rows(t, q, v)
             if not self._collide_all(t, q, v, view):
@@ -101,11 +116,35 @@ class FrozenMachine(LevelMachine):
 
     def _collide_all(self, t: float, q: Floats, v: Floats, view: View) -> bool:
         """Collide until no touching gap closes; whether there was a collision."""
-        before = len(self._collided)
+        before = self._collisions
         while (now := self._touching(q, view)).approaching:
             self._collide(t, q, v, view, now)
             view = self.look(t, q, v)
-        return len(self._collided) > before
+        if self._stand_still(t, q, v, view):
+            return True
+        return self._collisions > before
+
+    def _stand_still(self, t: float, q: Floats, v: Floats, view: View) -> bool:
+        """Give touching gaps that stand still the rate 0, which they have but for `slow`; whether any had another.
+
+        Collisions that come ever faster (inelastic collapse) end there: the gaps would drift apart by more than
+        rounding, and the next impulse would cross the rows in the order of their gaps.
+        """
+        active = self.equations.active
+        still = [
+            i for i in sorted(self.frozen)
+            if i not in active and self._touches(i, float(view.gap[i]), q)
+            and STILL * self.fastest < abs(view.rate[i]) <= self.slow
+        ]  # fmt: skip
+        if not still:
+            return False
+        rows = [*active, *still]
+        H, X = self.equations.mobility(t, q, v, rows)
+        P = np.linalg.solve(H @ X, np.array([0.0] * len(active) + [-view.rate[i] for i in still]))
+        before = v.copy()
+        v += X @ P
+        self.work[rows] += 0.5 * P * (H @ (before + v))
+        return True
 
     def _touching(self, q: Floats, view: View) -> Touching:
         """Sort the rows; a row in CONTACT without pressure is not held."""
@@ -125,9 +164,9 @@ class FrozenMachine(LevelMachine):
 
     def _collide(self, t: float, q: Floats, v: Floats, view: View, now: Touching) -> None:
         """One collision: velocities, modes, work. Rows without pressure are let go first."""
-        self._collided += now.approaching
-        if len(self._collided) > FEW + A_PAIR * len(self.rows) ** 2:
-            raise Ended(Outcome.MODE_CYCLE, sorted({*self._collided[-len(self.rows) :]}))
+        self._collisions += 1
+        if self._collisions > FEW + A_PAIR * len(self.rows) ** 2:
+            raise Ended(Outcome.MODE_CYCLE, [i for i in sorted(self.frozen) if self._touches(i, float(view.gap[i]), q)])
         for i in (*now.approaching, *now.still):
             if self.modes[i] in ACTIVE:
                 self._switch(t, i, self._parted(i, view))

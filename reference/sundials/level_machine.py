@@ -5,8 +5,8 @@
     BALLISTIC -> FREE     h > 0                   BALLISTIC -> active   h <= 0, h' < 0, lam would be > 0
     COLLISION -> CONTACT  max(b1, sqrt(b0)) |h'| + b0 |h| <= eps lam_i / (G_A^-1)_ii and lam_i > 0
 
-h' counts as zero below 1e-9 of the largest rate seen, lam as zero below what rounding makes of it. A gap below -1e-9 m
-that does not close was started in penetration: it is active if it would press, else BALLISTIC.
+h' counts as zero below 1e-9 of the largest rate seen, and both h' and lam below what rounding makes of them. A gap
+below -1e-9 m that does not close was started in penetration: it is active if it would press, else BALLISTIC.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class LevelMachine:
         self.frozen: frozenset[int] = frozenset()
         self.work = np.zeros(system.nc)
         self.deep = DEEP
-        self.fastest = 0.0
+        self.fastest = self._rounding = 0.0
         self._instant = -np.inf
         self._seen: set[tuple[int, ...]] = set()
         self._one_by_one = False
@@ -105,11 +105,16 @@ class LevelMachine:
 
     @property
     def slow(self) -> float:
-        """The rate below which a gap stands still."""
-        return SLOW * self.fastest
+        """The rate below which a gap stands still: a part of the fastest one seen, and no less than rounding."""
+        return max(SLOW * self.fastest, self._rounding)
 
     def _active_mode(self, i: int) -> Mode:
         return Mode.COLLISION if self.equations.fast[i, 0] > 0.0 else Mode.CONTACT
+
+    @staticmethod
+    def _touch(q: Floats) -> float:
+        """How large a gap rounding alone can make of a touch, m."""
+        return TOUCH * max(1.0, float(np.abs(q).max()))
 
     def _touches(self, i: int, h: float, q: Floats) -> bool:
         """Whether gap i is closed."""
@@ -133,6 +138,8 @@ class LevelMachine:
         if not (np.isfinite(gap).all() and np.isfinite(rate).all()):
             raise Ended(Outcome.NOT_FINITE)
         self.fastest = max([self.fastest, *(abs(float(rate[i])) for i in self.rows)])
+        if self.rows:  # where bodies slide along each other, their gaps hardly move at all
+            self._rounding = 8.0 * ULP * float((np.abs(e.held(t, q, v, self.rows)[1]) @ np.abs(v)).max())
         noise, size = e.noise(t, q, v, self.fastest)
         vd, lam = e.accelerate(t, q, v)
         return View(gap, rate, vd, lam, noise, size)
@@ -170,13 +177,13 @@ class LevelMachine:
             return Mode.FREE
         if closing and i in self.frozen:
             return mode  # it collides
-        if mode != Mode.FREE:
+        if mode != Mode.FREE and not (i in self.frozen and h >= -self.deep):
             return self._active_mode(i) if closing and presses() else mode
         if closing:
             return self._active_mode(i)
         if h < -self.deep:
             return self._active_mode(i) if presses() else Mode.BALLISTIC
-        return self._active_mode(i) if rate <= self.slow and presses() else Mode.FREE
+        return self._active_mode(i) if rate <= self.slow and presses() else mode
 
     def _released(self, i: int, h: float) -> Mode:
         if h > 0.0:
@@ -278,10 +285,11 @@ class LevelMachine:
         self.guards = [guard for i in self.rows for guard in self._guards(i, view, t, q, v)]
 
     def _guards(self, i: int, view: View, t: float, q: Floats, v: Floats) -> list[Guard]:
-        mode, closed = self.modes[i], view.gap[i] <= TOUCH * max(1.0, float(np.abs(q).max()))
+        mode, touch = self.modes[i], self._touch(q)
+        closed, frozen = view.gap[i] <= touch, i in self.frozen
         # The rate's own zero is the place; one that stands still there already must close first. So must a gap that has
         # just opened, whose next values round to either side; a gap that was open cannot close without a rate below 0.
-        still = i in self.frozen or view.rate[i] <= self.slow
+        still = view.rate[i] <= self.slow or (frozen and mode != Mode.FREE)
         closing = Term(Kind.RATE, i, self.slow if still and (closed or mode != Mode.FREE) else 0.0)
         if mode in ACTIVE:
             lam, noise = float(view.lam[i]), float(view.noise[i])
@@ -291,9 +299,14 @@ class LevelMachine:
                 return [released]
             return [released, Guard(i, Watch.OTHER, [Term(Kind.SPENT, i, sides=sides) for sides in SIDES])]
         if mode == Mode.FREE:
-            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i), closing])]
+            # A collision may leave so little speed that the gap never opens by more than rounding: it is at rest again
+            # where it turns back, not at a zero that rounding has put anywhere. Opened by `touch`, it is open.
+            opened = 2.0 * touch if frozen and closed else 0.0
+            return [Guard(i, Watch.SWITCH, [Term(Kind.GAP, i, -opened), closing])]
         catch = [closing]
-        if i not in self.frozen:
+        if not frozen:
             lam, band = self.pressure(i, t, q, v, self.error)  # likewise: one that has just let go is at zero
             catch.append(Term(Kind.PRESS, i, band if abs(lam) <= band else 0.0))
-        return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i)]), Guard(i, Watch.OTHER, catch)]
+        # One that was let go at its touch while it closes is at zero: what rounds to above it does not open.
+        sinks = -touch <= view.gap[i] and view.rate[i] < -self.slow
+        return [Guard(i, Watch.SWITCH, [Term(Kind.BELOW, i, touch if sinks else 0.0)]), Guard(i, Watch.OTHER, catch)]

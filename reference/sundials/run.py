@@ -18,9 +18,10 @@ from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajector
 from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
+from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
 from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
-from crossbody.reference.sundials.compiled.evaluation import entry
+from crossbody.reference.sundials.compiled.evaluation import entry, linear_arc
 from crossbody.reference.sundials.discrete import START, TOUCHED, Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.folds import Folds
@@ -51,13 +52,14 @@ class SundialsRun:
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         if options.fsm != "level":
             raise InvalidValue(f"fsm is {options.fsm!r} with solver {options.solver!r}; valid: 'level'.")
+        if options.index == 3 and system.velocity is not None:
+            raise InvalidValue("index is 3; valid: 1, since the system has a kernel velocity: q' is not v.")
         self.system, self.options, self.q0, self.v0 = system, options, q0, v0
         self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
         self.natural = options.samples is None
         entry(system)  # the kernels are built into the compiled equations before the clock runs
         self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
-        held = ~np.asarray(system.unilateral, dtype=bool)
-        self.rigid: list[int] = np.flatnonzero(held).tolist() if options.index == 3 else []
+        self.rigid: list[int] = np.flatnonzero(system.held).tolist() if options.index == 3 else []
         self._check_manifold()
 
     def _check_manifold(self) -> None:
@@ -110,7 +112,7 @@ class SundialsRun:
         t_end = self.options.t_end
         stop = self._take_inputs()
         self._discretely(START)
-        view = self._settle()
+        view = self._settle(switched=True)
         self._sample(view.lam)
         self.folds.begin(self.state.t, self.state.q, self.state.v)
         arc = self._arc(view)
@@ -126,7 +128,7 @@ class SundialsRun:
             if at_stop and stop < t_end:
                 stop = self._take_inputs()
             if switched or (at_stop and self.state.t < t_end):
-                view = self._settle()
+                view = self._settle(switched)
                 arc = self._arc(view)
             elif self.kind is CvodeArc and arc.stiff:
                 arc = BdfArc(self.scene, self.state, view, self.options.max_step, self.single)
@@ -137,12 +139,12 @@ class SundialsRun:
         if time.perf_counter() - began > self.options.time_limit:
             raise Ended(Outcome.TIME_LIMIT)
 
-    def _settle(self) -> View:
-        """Switch what must be switched now, and record the instant behind it.
+    def _settle(self, switched: bool) -> View:
+        """Switch what must be switched now (more, if something has `switched`), and record the instant behind it.
 
         IDA cannot start off the manifold of rigid rows: the drift of the arc before is taken away first.
         """
-        s, work = self.state, self.machine.work.copy()
+        s, work, known = self.state, self.machine.work.copy(), len(self.machine.events)
         s.q, s.v = s.q.copy(), s.v.copy()
         if self.rigid:
             self.equations.project(s.q, s.v, self.rigid)
@@ -150,6 +152,7 @@ class SundialsRun:
         if self.scene.nz:
             s.z = s.z.copy()
             s.z[: self.system.nc] += self.machine.work - work
+        self._follow_law(view, switched or len(self.machine.events) > known)
         if self.natural:
             self._record(view.lam)
         return view
@@ -201,6 +204,8 @@ class SundialsRun:
             self.state = arc.at(self._next_sample())
             self._sample(arc.multipliers(self.state))
         self.state = state
+        if fired.rows:
+            self._put_on_law()
         self._check_progress(state.t - before.t > 16.0 * ULP * stop)
         if self.natural:
             self._record(arc.multipliers(state))
@@ -224,6 +229,34 @@ class SundialsRun:
         for guard in fired.guards:
             self._discretely(guard)
         return switched or bool(fired.guards)
+
+    def _put_on_law(self) -> None:
+        """Move the state to where the linear laws of the active rows have their gaps.
+
+        The solver keeps a gap to its tolerance, and a0 times that is the multiplier of a row that is to let go: it
+        would let go at another instant, and at a rate at which it comes back.
+        """
+        s, arc = self.state, self.scene.work["arc"]
+        rows = [i for i in self.equations.active if i not in self.rigid and np.isfinite(arc[i, 0])]
+        if not any(self.machine.switching[i] for i in rows):
+            return
+        laws = self.equations.law[rows]
+        h, rate = np.array(
+            [linear_arc(a0, a1, *arc[i, 1:], s.t - arc[i, 0]) for i, (a0, a1, _) in zip(rows, laws, strict=True)]
+        ).T
+        s.q, s.v = s.q.copy(), s.v.copy()
+        self.equations.project(s.q, s.v, rows, np.where(laws[:, 0] > 0.0, h, np.nan), rate)
+        if not self.rigid:
+            s.lam = self.equations.accelerate(s.t, s.q, s.v)[1]
+
+    def _follow_law(self, view: View, anew: bool) -> None:
+        """Note from where each active row follows its law; one that did so before goes on, unless all begin anew."""
+        arc, active = self.scene.work["arc"], self.equations.active
+        for i in range(self.system.nc):
+            if i not in active or self.equations.law[i, 2] > 0.0:
+                arc[i, 0] = np.nan
+            elif anew or np.isnan(arc[i, 0]):
+                arc[i] = self.state.t, view.gap[i], view.rate[i]
 
     def _check_progress(self, moved: bool) -> None:
         self.still = 0 if moved else self.still + 1
@@ -268,21 +301,23 @@ class SundialsRun:
             gap, energy = self.system.gap(self.q0, self.v0)[0], self.equations.energy(self.q0, self.v0)
             nothing, start = np.zeros(self.system.nc), [int(m) for m in self.machine.modes]
             self.rows.append((0.0, self.q0, self.v0, gap, nothing, energy, start, np.zeros(self.scene.nz)))
-        n, nc, count = self.system.n, self.system.nc, len(self.rows)
+        n, nq, nc, count = self.system.n, self.system.nq, self.system.nc, len(self.rows)
         columns = list(zip(*self.rows, strict=True))
-        widths = (n, n, nc, nc, 2, nc, self.scene.nz)
+        widths = (nq, n, nc, nc, 2, nc, self.scene.nz)
         t = np.array(columns[0], dtype=np.float64)
         q, v, gap, lam, energy, mode, z = (
             np.array(c, dtype=np.float64).reshape(count, w) for c, w in zip(columns[1:], widths, strict=True)
         )
         modes = mode.astype(np.int8)
-        return Trajectory(
-            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, events=tuple(self.machine.events),
+        run = Trajectory(
+            t=t, q=self.system.normalised("run", q), v=v, gap=gap, lam=lam, energy=energy, mode=modes,
+            events=tuple(self.machine.events),
             switches=tuple(self.discrete.switches),
             outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
             counts=MappingProxyType({"rhs": self.scene.evaluations}),
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
         )  # fmt: skip
+        return watched(self.system, run)
 
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:

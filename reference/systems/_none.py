@@ -55,3 +55,10 @@ def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
 def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> int:
     """Never called."""
     return 0
+
+
+@kernels.velocity
+def velocity(t: float, q: Array, v: Array, p: Array, qd: Array) -> None:
+    """Positions change by v itself."""
+    for i in range(len(v)):
+        qd[i] = v[i]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 FREE, BALL, SLIDE, HINGE = range(4)
 
-# Head of the table: sizes, gravity, where each part begins, and the potential energy of what never moves.
-NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, RESTING, HEAD = (
-    0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14,
+# Head of the table: sizes, gravity, where each part begins, the potential energy of what never moves, and how many
+# rows join points of bodies.
+NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, RESTING = (
+    0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13,
 )  # fmt: skip
+JOINS, HEAD = 14, 15
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (

@@ -8,7 +8,9 @@ import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
-from crossbody.reference.tree import forces, layout, sweeps
+from crossbody.reference.tree import forces, layout, loops, sweeps
+
+PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
 
 
 @kernels.dynamics
@@ -67,9 +69,18 @@ def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
 
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
-    """Of every row."""
+    """Of every row; where points of bodies are to meet their poses are computed first."""
+    size = 0
+    if p[layout.JOINS].real > 0.0:
+        size = layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v)
+    w = np.empty(size, dtype=q.dtype)
+    if size > 0:
+        sweeps.outwards(q, v, p, w)
     for i in range(len(h)):
-        h[i], hd[i], _ = _row(q, v, p, i)
+        if int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real) == layout.CONNECT:
+            h[i], hd[i], _ = loops.connect(p, i, w)
+        else:
+            h[i], hd[i], _ = _row(q, v, p, i)
 
 
 @kernels.rows
@@ -77,8 +88,12 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
     """The active ones."""
     H[:na] = 0.0
     for j in range(na):
-        h[j], _, Hdv[j] = _row(q, v, p, idx[j])
-        _gradient(q, p, idx[j], H[j])
+        if int(p[int(p[layout.AT_ROW].real) + layout.ROW * idx[j]].real) == layout.CONNECT:
+            h[j], _, Hdv[j] = loops.connect(p, idx[j], w)
+            loops.connect_columns(p, idx[j], w, H[j])
+        else:
+            h[j], _, Hdv[j] = _row(q, v, p, idx[j])
+            _gradient(q, p, idx[j], H[j])
 
 
 @kernels.helper
@@ -142,6 +157,34 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         speed = forces.rate(v, p, o)
         taken += speed * forces.damper(p, o + layout.DAMP, speed)
     e[0], e[1] = given, taken
+
+
+@kernels.helper
+def _turn(q: Array, at: int, v: Array, j: int, qd: Array) -> None:
+    """Fill q' = q w / 2 + PULL (1 - |q|^2) q of the quaternion at q[at:] with the angular velocity w at v[j:].
+
+    The pull keeps the length at 1 and turns nothing: R is that of q / |q|.
+    """
+    w, x, y, z = q[at], q[at + 1], q[at + 2], q[at + 3]
+    a, b, c = 0.5 * v[j], 0.5 * v[j + 1], 0.5 * v[j + 2]
+    g = PULL * (1.0 - w * w - x * x - y * y - z * z)
+    qd[at], qd[at + 1] = g * w - x * a - y * b - z * c, g * x + w * a + y * c - z * b
+    qd[at + 2], qd[at + 3] = g * y + w * b + z * a - x * c, g * z + w * c + x * b - y * a
+
+
+@kernels.velocity
+def velocity(t: float, q: Array, v: Array, p: Array, qd: Array) -> None:
+    """The rates of all positions: v itself of hinges, slides and free joints' origins."""
+    for i in range(int(p[layout.NODES].real)):
+        o = int(p[layout.AT_NODE].real) + layout.NODE * i
+        kind, at, j = p[o + layout.TYPE].real, int(p[o + layout.Q].real), int(p[o + layout.V].real)
+        if kind >= layout.SLIDE:
+            qd[at] = v[j]
+        elif kind == layout.FREE:
+            qd[at], qd[at + 1], qd[at + 2] = v[j], v[j + 1], v[j + 2]
+            _turn(q, at + 3, v, j + 3, qd)
+        else:
+            _turn(q, at, v, j, qd)
 
 
 KERNELS: dict[str, Any] = {"dynamics": dynamics, "gaps": gaps, "rows": rows, "energy": energy, "power": power}

@@ -2,21 +2,42 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
 from crossbody.cases import Law
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
-from crossbody.reference.tree.mechanism import KERNELS
+from crossbody.reference._kinds import Floats
+from crossbody.reference._redundant import redundant
+from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import tabulate
 
 
-def system(scene: Scene, law: Law) -> System:
+def system(scene: Scene, law: Law, q0: Floats | None = None) -> System:
     """Return the equations of a scene; nothing is compiled for it.
+
+    Args:
+        scene: bodies, joints and what acts between them.
+        law: of its rows.
+        q0: an assembled start (nq,), at which rows of loops that follow from others are found and left out; without it
+            none is.
 
     Raises:
         SceneError: for a scene that the kernels cannot do.
     """
     table = tabulate(scene)
-    return System(
-        n=scene.nv, parameters=table.p, a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
+    turning = {"velocity": velocity, "quaternions": table.quaternions} if table.quaternions else {}
+    fields: dict[str, Any] = dict(
+        n=scene.nv, nq=scene.nq, parameters=table.p, **turning,
+        a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
         inputs=len(scene.actuators), scratch=table.scratch, **KERNELS,
     )  # fmt: skip
+    whole = System(**fields)
+    if q0 is None or not scene.loops:
+        return whole
+    ends = np.cumsum([0, *(loop.width for loop in scene.loops)]).tolist()
+    left_out = redundant(whole, q0, [range(a, b) for a, b in pairwise(ends)])
+    return System(**fields, redundant=left_out) if left_out else whole

@@ -76,6 +76,15 @@ class Table:
     coordinates: dict[str, int]
 
     @property
+    def quaternions(self) -> list[int]:
+        """First coordinate of every quaternion."""
+        first = int(self.p[layout.AT_NODE])
+        nodes = self.p[first : first + layout.NODE * self.nodes].reshape(-1, layout.NODE)
+        kinds, at = nodes[:, layout.TYPE], nodes[:, layout.Q].astype(int)
+        found: list[int] = (at + 3 * (kinds == layout.FREE))[kinds < layout.SLIDE].tolist()
+        return found
+
+    @property
     def scratch(self) -> int:
         """Length of w that the kernels need; the actuators' sums stand at its end."""
         return self.nodes * layout.NODE_SCRATCH + int(self.p[layout.DOFS]) * (layout.DOF_SCRATCH + 1)
@@ -146,6 +155,8 @@ class _Builder:
             self.resting -= (1.0 - body.weightless) * body.mass * float(centre @ np.array(self.scene.gravity))
 
     def _node(self, joint: Joint, before: Place) -> None:
+        if joint.type == "free" and any(joint.stiffness):
+            raise SceneError(f"Joint {joint.name!r}: springs of a free joint are not done.")
         row, kind = np.zeros(layout.NODE), TYPES[joint.type]
         width_q, width_v = WIDTHS[joint.type]
         dof, index = len(self.dof_rows), len(self.rows)
@@ -185,6 +196,7 @@ class _Builder:
         )  # fmt: skip
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
         head[layout.RESTING] = self.resting
+        head[layout.JOINS] = sum(row[layout.KIND] == layout.CONNECT for row in rows)
         parts = [self.rows, self.dof_rows, actuators, tendons, rows]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW]] = starts[:5]
@@ -204,6 +216,10 @@ class _Builder:
             if len(actuator.gear) < width:
                 raise SceneError(
                     f"Actuator {actuator.name!r}: gear is {list(actuator.gear)}; it needs {width} numbers."
+                )
+            if width > 1 and (actuator.gain[1] or actuator.bias[1]):
+                raise SceneError(
+                    f"Actuator {actuator.name!r}: its force depends on its length, which a {joint.type} joint has not."
                 )
             dof = self.dofs[joint.name]
             row[[layout.TARGET, layout.WHICH, layout.ANGLE]] = layout.ON_JOINT, dof, self.coordinates[joint.name]

@@ -23,17 +23,18 @@ from crossbody.reports.runs.watch import LIMIT
 from crossbody.reports.voice import progress
 
 SHOWN = {
-    "bench": ["case", "engine", "profile", "knob", "setting", "error", "honesty", "median_ms", "iqr_ms", "call_ms",
-              "outcome"],
+    "bench": ["case", "engine", "profile", "knob", "setting", "error", "honesty", "error_between", "median_ms",
+              "iqr_ms", "call_ms", "native_ms", "outcome"],
     "orders": ["case", "engine", "profile", "knob", "order", "promised", "says"],
     "headline": ["case", "engine", "profile", "tier", "best_error", "engine_ms", "reference_ms", "ratio",
-                 "least_ratio", "ahead", "says"],
+                 "ratio_native", "least_ratio", "ahead", "says"],
 }  # fmt: skip
 
 
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
     repeats: int | None, full: bool, against: Path | None, command: str, limit: float = LIMIT,
+    minutes: float = math.inf,
 ) -> int:  # fmt: skip
     """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code.
 
@@ -44,7 +45,8 @@ def run(
     base = None if against is None else bench_against.read(against)
     if base is not None:
         bench_against.check_common(base[0], [case.label for case in cases])
-    effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats)
+    each = 60.0 * minutes / max(1, len(cases) * len(picks))
+    effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats, each=each)
     output.check(out, "bench")
     with Parts(out, command, identity("bench", cases, names, picks=picks, effort=effort)) as parts:
         with progress(len(cases) * len(picks)) as tell:

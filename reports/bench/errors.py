@@ -6,9 +6,17 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from crossbody import engines
 from crossbody.cases import Case, Trajectory
+from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import Truth, law_of, truth_of
+from crossbody.reports.runs.jobs import Pick
+
+GRID = 2001
+"""Instants at which all engines are compared alike."""
 
 PARTS = {
     "error_q": "position", "error_v": "velocity", "error_impulse": "lam_impulse", "error_energy": "energy_drift",
@@ -56,6 +64,39 @@ def errors(truth: Truth, run: Trajectory, case: Case) -> dict[str, float]:
         return dict.fromkeys(("error", *PARTS), math.inf) | {"touches": touches}
     parts = {part: _measured(name, truth, run, case) for part, name in PARTS.items()}
     return {"error": _larger(parts["error_q"], parts["error_times"] / case.t_end), **parts, "touches": 0.0}
+
+
+def between(case: Case, pick: Pick, run: Any, steps: Trajectory, truth: Truth) -> float:
+    """Error of the position on one grid for all engines: what a user sees between steps.
+
+    Where an engine can be asked for instants it is asked for these; else a cubic through places and rates of its steps
+    stands for what lies between them.
+    """
+    grid = np.linspace(0.0, case.t_end, GRID)
+    if "samples" in run.settings:
+        own = {name: run.settings[name] for name in ("rtol", "ledger") if name in run.settings}
+        found: Trajectory = engines.load(pick.engine).prepare(case, pick.profile, samples=grid, **own).run()
+    else:
+        found = hermite(steps, grid)
+    return _measured("position", truth, found, case) if found.outcome.ok else math.inf
+
+
+def hermite(run: Trajectory, grid: Floats) -> Trajectory:
+    """A run on a grid, by cubics through q and v of its steps; where v are not the rates of q, by straight lines.
+
+    An instant that stands twice ends one cubic and begins another.
+    """
+    last = np.clip(np.searchsorted(run.t, grid, side="right") - 1, 0, len(run.t) - 2)
+    last -= (run.t[last + 1] == run.t[last]) & (last > 0)
+    width = (run.t[last + 1] - run.t[last])[:, None]
+    s = np.divide(grid[:, None] - run.t[last][:, None], width, out=np.zeros_like(width), where=width > 0.0)
+    q0, q1 = run.q[last], run.q[last + 1]
+    v0, v1 = (run.v[at] * width if run.v.shape == run.q.shape else q1 - q0 for at in (last, last + 1))
+    q = q0 + s * (v0 + s * (3.0 * (q1 - q0) - 2.0 * v0 - v1 + s * (2.0 * (q0 - q1) + v0 + v1)))
+    return replace(
+        run, t=grid, q=q, v=run.v[last], gap=run.gap[last], lam=run.lam[last], energy=run.energy[last],
+        mode=run.mode[last], ledger=None,
+    )  # fmt: skip
 
 
 def _measured(metric: str, truth: Truth, run: Trajectory, case: Case) -> float:

@@ -14,7 +14,7 @@ from crossbody.reports.bench.order import FLOOR
 REFERENCE = ("reference", "compiled")
 COLUMNS = [
     "case", "engine", "profile", "tier", "against", "knob", "setting", "best_error", "engine_ms", "reference_error",
-    "reference_ms", "ratio", "ratio_call", "least_ratio", "least_error", "ahead", "says",
+    "reference_ms", "ratio", "ratio_call", "ratio_native", "least_ratio", "least_error", "interpreted", "ahead", "says",
 ]  # fmt: skip
 
 
@@ -25,7 +25,8 @@ def headline(rows: pd.DataFrame) -> pd.DataFrame:
         rows: as of `crossbody.reports.bench.measure.bench`, with those of the compiled reference.
 
     Returns:
-        ratio: of the runs themselves; ratio_call: of the whole calls from Python; least_ratio: the smallest of all
+        ratio: of the runs themselves; ratio_call: of the whole calls from Python; ratio_native: of the engine's own
+        loop over the same steps, without what is `interpreted` in its run; least_ratio: the smallest of all
         error levels that the engine reaches, which is that of least_error; ahead: "yes" where the reference is
         faster at every one of them, else "no" and `says` why; nothing where an engine reaches none. An error below
         rounding, or below what the truth is known to, counts as that.
@@ -71,7 +72,7 @@ def _level(ours: pd.DataFrame, rung: Mapping[Any, Any]) -> dict[str, Any]:
     error = max(float(rung["error"]), FLOOR, float(rung["known_to"]))
     found = {
         "knob": rung["knob"], "setting": rung["setting"], "best_error": float(rung["error"]),
-        "engine_ms": float(rung["median_ms"]), "ratio": math.nan,
+        "engine_ms": float(rung["median_ms"]), "ratio": math.nan, "interpreted": rung.get("interpreted", ""),
     }  # fmt: skip
     good = ours[ours["error"].astype(float) <= error]
     if not len(good):
@@ -80,7 +81,7 @@ def _level(ours: pd.DataFrame, rung: Mapping[Any, Any]) -> dict[str, Any]:
     ms, call = float(cheapest["median_ms"]), float(good["call_ms"].astype(float).min())
     return found | {
         "reference_error": float(cheapest["error"]), "reference_ms": ms, "ratio": float(rung["median_ms"]) / ms,
-        "ratio_call": float(rung["call_ms"]) / call,
+        "ratio_call": float(rung["call_ms"]) / call, "ratio_native": float(rung.get("native_ms", math.nan)) / ms,
     }  # fmt: skip
 
 

@@ -19,7 +19,7 @@ import pandas as pd
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Trajectory
-from crossbody.reports.bench.errors import PARTS, Truths, errors, known_to
+from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
 from crossbody.reports.judging.truth import Truth
@@ -28,8 +28,13 @@ from crossbody.reports.runs.jobs import Pick
 
 COLUMNS = (
     "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "touches",
-    "honesty", "median_ms", "iqr_ms", "call_ms", "cores", "repeats", "steps", "outcome", "promised",
+    "error_between", "honesty", "median_ms", "iqr_ms", "call_ms", "native_ms", "interpreted", "cores", "repeats",
+    "steps", "outcome", "promised",
 )  # fmt: skip
+
+
+NATIVE = 3
+"""Runs of an engine's own loop, the shortest of which counts."""
 
 
 @dataclass(slots=True)
@@ -45,6 +50,8 @@ class Rung:
     first: Trajectory
     errors: dict[str, float]
     promised: float
+    between: float
+    interpreted: str
     inner: list[float] = field(default_factory=list)
     call: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
@@ -73,7 +80,9 @@ def _rungs(
 
 def _climbed(case: Case, pick: Pick, effort: Effort, truths: Truths) -> Iterator[Rung]:
     """The rungs of one engine, up to the one that takes too long."""
-    promised = float(getattr(engines.load(pick.engine), "orders", {}).get(pick.profile, math.nan))
+    engine = engines.load(pick.engine)
+    promised = float(getattr(engine, "orders", {}).get(pick.profile, math.nan))
+    python = engines.interpreted(engine, pick.profile)
     rungs = Ladder(case, pick, effort)
     for knob, setting, run in rungs:
         began = time.perf_counter()
@@ -81,7 +90,9 @@ def _climbed(case: Case, pick: Pick, effort: Effort, truths: Truths) -> Iterator
         took = time.perf_counter() - began
         rungs.climbed(took, first.steps)
         against, truth = truths.of(run)
-        rung = Rung(pick, against, truth, knob, setting, run, first, errors(truth, first, case), promised)
+        off = errors(truth, first, case)
+        shown = between(case, pick, run, first, truth) if math.isfinite(off["error"]) else math.inf
+        rung = Rung(pick, against, truth, knob, setting, run, first, off, promised, shown, python)
         if took > effort.slow:
             rung.note(first, took, 1.0)
         yield rung
@@ -128,6 +139,8 @@ def bench(
 
     Returns:
         One row a rung, columns `COLUMNS`; errors and honesty (error over tolerance) are ratios, event times in s;
+        error_between is the position's on one grid for all, interpreted what of a run is Python, and native_ms the time
+        of the engine's own loop over the same steps without that;
         cores is processor time over wall time: 1 for one thread.
     """
     effort = Effort(repeats=effort) if isinstance(effort, int) else effort
@@ -143,8 +156,11 @@ def _row(case: Case, rung: Rung) -> dict[str, Any]:
         "case": case.label, "engine": rung.pick.engine, "profile": rung.pick.profile, "against": rung.against,
         "tier": rung.truth.tier.value[0], "known_to": known_to(case, rung.truth), "knob": rung.knob,
         "setting": rung.setting, **rung.errors,
+        "error_between": rung.between,
         "honesty": rung.errors["error"] / rung.setting if rung.knob == "rtol" else math.nan,
         "median_ms": median, "iqr_ms": high - low, "call_ms": 1e3 * float(np.median(rung.call)),
+        "native_ms": 1e3 * min((rung.run.native() for _ in range(NATIVE)), default=math.nan)
+        if hasattr(rung.run, "native") else math.nan, "interpreted": rung.interpreted,
         "cores": float(np.median(rung.cpu)), "repeats": len(rung.call), "steps": rung.first.steps,
         "outcome": rung.first.outcome.value, "promised": rung.promised,
     }  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -69,10 +70,21 @@ def chosen(names: Sequence[str], variant: str | None, given: Mapping[str, Value]
     return tuple(labelled(case, given) for case in jobs.load_cases(names, variant, given))
 
 
-def effort(full: bool, every_rung: bool, repeats: int | None) -> Effort:
-    """What is spent on them; scenes that were named are run on every rung."""
+def effort(full: bool, every_rung: bool, repeats: int | None, each: float = math.inf) -> Effort:
+    """What is spent on them; scenes that were named are run on every rung.
+
+    Args:
+        full: every case, or the quick scenes.
+        every_rung: whether no rung is left out.
+        repeats: timed runs of each rung, if it was said.
+        each: time for an engine on a scene, s: half of it to climb its ladder, half for its share of the rounds.
+    """
     chosen = FULL_EFFORT if full else QUICK_EFFORT
     chosen = replace(chosen, every=1) if every_rung else chosen
+    chosen = replace(
+        chosen, climb=min(chosen.climb, 0.5 * each), longest=min(chosen.longest, 0.25 * each),
+        slow=min(chosen.slow, 0.05 * each), rounds=min(chosen.rounds, 3.0 * each),
+    )  # fmt: skip
     return chosen if repeats is None else replace(chosen, repeats=repeats)
 
 

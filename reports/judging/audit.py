@@ -14,6 +14,7 @@ import numpy as np
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import normalised
 
 TOLERANCE = 1e-10
 LAM_TOLERANCE = 1e-8
@@ -84,9 +85,10 @@ def states(case: Case, theirs: Mapping[str, Any] = MappingProxyType({})) -> list
             is taken for a gap of its own.
     """
     draw = np.random.default_rng(SEED)
-    n = len(case.q0)
+    n, nv = len(case.q0), len(case.v0)
     if case.scene is not None or (len(case.law.a0) and not case.law.unilateral.any()):
-        return [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, n)) for _ in range(STATES)]
+        near = [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, nv)) for _ in range(STATES)]
+        return [(normalised(q, case.quaternions), v) for q, v in near]
     if len(case.law.a0) and "gap" in theirs:
         return [_entered(case, theirs["gap"], theirs["H"], draw) for _ in range(STATES)]
     reach = 1e-2 * np.maximum(np.abs(case.q0), 1e-3)

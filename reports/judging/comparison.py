@@ -16,7 +16,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.stored import Deviations, deviations, differing, words
+from crossbody.reports.judging.stored import Deviations, defaults, deviations, differing, words
 from crossbody.reports.judging.truth import Truth, from_run, truth_of
 from crossbody.reports.judging.verdict import (
     Regression,
@@ -50,6 +50,7 @@ class Entry:
     Attributes:
         engine, profile: who ran.
         settings: what was really used.
+        default: whether these are the engine's own, none having been asked for.
         run: the motion; None if it was skipped.
         skipped: why, in one sentence.
         audit: what reached the engine beside the reference.
@@ -63,6 +64,7 @@ class Entry:
     engine: str
     profile: str
     settings: Mapping[str, Any] = field(default_factory=dict)
+    default: bool = False
     run: Trajectory | None = None
     skipped: str = ""
     audit: tuple[AuditRow, ...] = ()
@@ -247,7 +249,7 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
         return [judge_.row("run", math.nan, "", Word.CRASHED, entry.crashed)]
     if entry.run is None:
         return [judge_.row("run", math.nan, "", Word.SKIPPED, entry.skipped)]
-    rows = [_outcome(judge_, entry.run)]
+    rows = [_outcome(judge_, entry.run), *_defaults(judge_)]
     if entry.audit:
         rows.append(_audit(judge_))
         if rows[-1].verdict == Word.OUTSIDE:
@@ -264,7 +266,8 @@ def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
     found = {
         row.metric: deviation(row.value, claims.get(row.metric))
         for row in rows
-        if row.metric not in ("finished", "audit") and not (math.isnan(row.limit) and not math.isnan(row.value))
+        if row.metric not in ("finished", "settings", "audit")
+        and not (math.isnan(row.limit) and not math.isnan(row.value))
     }
     return found | {f"audit {row.quantity}": row.difference for row in entry.audit if not row.ok}
 
@@ -276,6 +279,15 @@ def _outcome(judge_: _Judge, run: Trajectory) -> Verdict:
     told = "" if run.outcome.advice in run.message else run.outcome.advice
     why = " ".join(text for text in (f"{run.outcome.value}:", run.message, told) if text)
     return judge_.row("finished", 0.0, "1", Word.OUTSIDE, why, expected=1.0, limit=0.0)
+
+
+def _defaults(judge_: _Judge) -> Iterator[Verdict]:
+    """An engine's own settings that are not those of the stored run: nothing that was stored judges it any more."""
+    was, now = defaults(judge_.case, judge_.entry), words(judge_.entry.settings)
+    if judge_.entry.default and was and was != now:
+        changed = ", ".join(sorted(set(was.split()) ^ set(now.split())))
+        why = f"Its own settings are not those of the stored run ({changed}); if they should be, make bands stores it."
+        yield judge_.row("settings", math.nan, "", Word.OUTSIDE, why, tier="")
 
 
 def _audit(judge_: _Judge) -> Verdict:

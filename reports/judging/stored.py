@@ -38,9 +38,17 @@ def deviations(case: Case, entry: Entry) -> Deviations:
     if stored.get("parameters") != _digest(case):
         return {}
     run = stored["runs"].get(f"{entry.engine}:{entry.profile}")
-    if run is None or run["settings"] != _digest_of(words(entry.settings)):
+    if run is None or run["settings"] != words(entry.settings):
         return {}
     return {metric: float(value) for metric, value in run["deviations"].items()}
+
+
+def defaults(case: Case, entry: Entry) -> str:
+    """Settings, in words, that the engine had by itself in the stored run with the same parameters; empty without."""
+    stored = _table().get(case.label, {})
+    if stored.get("parameters") != _digest(case):
+        return ""
+    return str(stored["runs"].get(f"{entry.engine}:{entry.profile}", {}).get("settings", ""))
 
 
 def differing(case: Case, entry: Entry) -> frozenset[str]:
@@ -56,10 +64,7 @@ def _table() -> dict[str, Any]:
 
 
 def _digest(case: Case) -> str:
-    return _digest_of(repr(sorted(case.parameters.items())) + f"{case.t_end!r}")
-
-
-def _digest_of(text: str) -> str:
+    text = repr(sorted(case.parameters.items())) + f"{case.t_end!r}"
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -70,7 +75,7 @@ def write(measured: Iterable[tuple[Case, Entry, Deviations]]) -> None:
     for case, entry, found in measured:
         runs = fresh.setdefault(case.label, {"parameters": _digest(case), "runs": {}})["runs"]
         runs[f"{entry.engine}:{entry.profile}"] = {
-            "settings": _digest_of(words(entry.settings)),
+            "settings": words(entry.settings),
             "deviations": {metric: _short(value) for metric, value in sorted(found.items())},
         }
     lines = [f"{json.dumps(label)}: {_block(runs)}" for label, runs in sorted((table | fresh).items())]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Tier, Trajectory, _arguments
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import differences
 from crossbody.cases._trajectory import Ledger
 from crossbody.reports.judging._between import between
 from crossbody.reports.judging.modes import violated
@@ -155,7 +156,8 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     @cache_of_one
     def at(times: Floats) -> Trajectory:
         run = reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)).run()
-        return with_both_sides(run, first)
+        # A run that is asked for samples need not take the same steps: its events move by the tolerance.
+        return replace(with_both_sides(run, first), events=first.events, switches=first.switches)
 
     dense = at(sample_times(first, case.t_end))
     tier = Tier.D if other == "compiled" else Tier.C
@@ -184,7 +186,7 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
 
 def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
     """The truth with what a second source says of it: agreement, until when, and how fast they part if they do."""
-    t, off = _apart(truth, second)
+    t, off = _apart(truth, second, case)
     parted = off > PARTED
     trusted = math.inf if second.outcome.ok else float(second.t[-1]) if len(second.t) else 0.0
     growth = math.nan
@@ -198,13 +200,14 @@ def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> 
     return replace(truth, trusted=agreed, parted=trusted, allowed=allowed, growth=growth, agreement=agreement)
 
 
-def _apart(truth: Truth, second: Trajectory) -> tuple[Floats, Floats]:
+def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats]:
     """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
     from crossbody.reports.metrics._align import aligned
 
     inside, exact = aligned(truth, second)
     scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0)) or 1.0
-    return second.t[inside], np.max(np.abs(second.q[inside] - exact.q), axis=1, initial=0.0) / scale
+    off = differences(second.q[inside], exact.q, case.quaternions)
+    return second.t[inside], np.max(off, axis=1, initial=0.0) / scale
 
 
 def _growth(t: Floats, off: Floats) -> float:
@@ -217,27 +220,29 @@ def _growth(t: Floats, off: Floats) -> float:
 
 
 def with_both_sides(run: Trajectory, natural: Trajectory) -> Trajectory:
-    """A run sampled at given times, with the state after an event where an instant was asked for twice.
+    """A run sampled at given times, with the states at both sides of an event where an instant was asked for twice.
 
     Args:
-        run: sampled; an event's instant gives the state before it.
+        run: sampled; an event's instant gives the state before it, or after it where its own event came earlier.
         natural: the same run at its own steps, both sides of every event.
     """
     again = np.flatnonzero(run.t[1:] == run.t[:-1]) + 1
-    after = np.searchsorted(natural.t, run.t[again], side="right") - 1
-    known = natural.t[after] == run.t[again]
+    before, behind = (np.searchsorted(natural.t, run.t[again], side=side) for side in ("left", "right"))
+    twice = behind - before > 1
     rows: dict[str, Floats] = {}
+    at = np.concatenate([again[twice] - 1, again[twice]])
+    known = np.concatenate([before[twice], behind[twice] - 1])
     for name in ("q", "v", "gap", "lam", "energy", "mode"):
         rows[name] = getattr(run, name).copy()
-        rows[name][again[known]] = getattr(natural, name)[after[known]]
+        rows[name][at] = getattr(natural, name)[known]
     booked = run.ledger
     if booked is not None and natural.ledger is not None:
-        booked = _booked(booked, natural.ledger, again[known], after[known])
+        booked = _booked(booked, natural.ledger, at, known)
     return replace(run, ledger=booked, **rows)  # type: ignore[arg-type]
 
 
 def _booked(run: Ledger, natural: Ledger, at: NDArray[np.intp], after: NDArray[np.intp]) -> Ledger:
-    """The account behind an event: a collision in no time does its work at one instant."""
+    """The account on both sides of an event: a collision in no time does its work at one instant."""
     accounts = {name: getattr(run, name).copy() for name in ("contact", "input", "dissipated")}
     for name, account in accounts.items():
         account[at] = getattr(natural, name)[after]

@@ -32,12 +32,14 @@ def matched(truth: Truth, run: Trajectory) -> _Pairs:
     return pairs
 
 
-def clock(truth: Truth, run: Trajectory) -> Floats:
-    """The truth's time of every sample of the run (n,), s."""
-    start = float(truth.trajectory.t[0])
-    knots = [(start, start), *((b.touch, a.touch) for a, b in matched(truth, run))]
-    kept = [knots[0]]
-    for knot in knots[1:]:
+def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
+    """The truth's time of every sample of the run (n,), s; `releases` are laid on those of the truth too."""
+    start, pairs = float(truth.trajectory.t[0]), matched(truth, run)
+    knots = [(b.touch, a.touch) for a, b in pairs]
+    if releases:
+        knots += [(b.release, a.release) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+    kept = [(start, start)]
+    for knot in sorted(knots) if releases else knots:
         if knot[0] > kept[-1][0] and knot[1] > kept[-1][1]:
             kept.append(knot)
     here, there = np.array(kept).T
@@ -46,8 +48,8 @@ def clock(truth: Truth, run: Trajectory) -> Floats:
     return mapped
 
 
-def aligned(truth: Truth, run: Trajectory) -> tuple[NDArray[np.bool_], Trajectory]:
+def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDArray[np.bool_], Trajectory]:
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
-    t = clock(truth, run)
+    t = clock(truth, run, releases)
     inside = t <= min(truth.trajectory.t[-1], truth.trusted)
     return inside, truth.at(t[inside])

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases._rotations import differences
 from crossbody.reports.metrics._align import aligned
 
 if TYPE_CHECKING:
@@ -26,5 +27,5 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     inside, exact = aligned(truth, run)
     scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0))
-    off = np.max(np.abs(run.q[inside] - exact.q), axis=1) > APART * scale
+    off = np.max(differences(run.q[inside], exact.q, case.quaternions), axis=1) > APART * scale
     return float(run.t[inside][np.argmax(off)] if off.any() else run.t[inside][-1])

@@ -22,9 +22,10 @@ NEEDS = "lam"
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time included.
 
-    NaN where lam is not known; None where nothing presses; N s where only the run's does.
+    Releases are matched too, as lam jumps there: a sample on the wrong side would count for half its step. NaN where
+    lam is not known; None where nothing presses; N s where only the run's does.
     """
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, releases=True)
     if not inside.any():
         return None
     if np.isnan(run.lam).any():

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import differences
 from crossbody.reports.metrics._align import aligned
+from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -15,22 +17,30 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
-STILL = 1e-9
+SMALL, STILL = 1e-6, 1e-9
 """A coordinate that moves less than this part of its like rests."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests."""
+    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests.
+
+    A quaternion is told by the angle between both, rad, since q and -q are the same rotation.
+    """
     inside, exact = aligned(truth, run)
-    scale = _scale(truth.trajectory, case)
     if not inside.any():
         return None
-    return float(np.max(np.abs(run.q[inside] - exact.q) / np.where(scale > 0.0, scale, 1.0)))
+    off = differences(run.q[inside], exact.q, case.quaternions)
+    return float(np.max(off / _scale(truth.trajectory, case)))
 
 
 def _scale(exact: Trajectory, case: Case) -> Floats:
-    """Largest |q_truth| of each coordinate (n,); of all that share its unit, for one that rests but for rounding."""
+    """Largest |q_truth| of each coordinate (n,); of all that share its unit, for one that rests but for rounding.
+
+    Where all of these rest, what the case says of their size. Errors below 1e-12, what absolute tolerances are, pass
+    the usual limit of 1e-6.
+    """
     own: Floats = np.max(np.abs(exact.q), axis=0)
-    units = np.array([coordinate.unit for coordinate in case.coordinates])
-    shared = np.array([own[units == unit].max() for unit in units])
-    return np.where(own > STILL * shared, own, shared)
+    shared, smallest = of_like(own, case.coordinates), least(case.coordinates)
+    scale = np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
+    scale[list(case.quaternions)] = 1.0  # rad
+    return scale

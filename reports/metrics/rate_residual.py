@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.reports.metrics._scale import least, of_like
+
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
     from crossbody.reports.judging.truth import Truth
@@ -31,7 +33,6 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     moved = np.diff(run.q, axis=0)
     way = np.sum(np.abs(moved), axis=0)
     off = np.abs(np.sum((moved - mean * np.diff(run.t)[:, None]) * np.sign(mean), axis=0))
-    units = np.array([coordinate.unit for coordinate in case.coordinates])
-    longest = np.array([np.max(way[units == unit]) for unit in units])
-    moving = way > STILL * longest
+    longest = of_like(way, case.coordinates)
+    moving = (way > STILL * longest) & (longest > least(case.coordinates))
     return float(np.max(off[moving] / way[moving])) if moving.any() else None

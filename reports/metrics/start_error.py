@@ -5,12 +5,15 @@ A known property of an engine never explains where it starts.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases._case import Coordinate
+from crossbody.cases._rotations import differences
+from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -27,14 +30,13 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """
     if not len(run.t) or run.t[0] != 0.0 or run.q.shape[1] != len(case.q0):
         return None
-    units = np.array([coordinate.unit for coordinate in case.coordinates])
-    pairs = [(run.q[0], case.q0, truth.trajectory.q)]
+    off = differences(run.q[:1], case.q0[None], case.quaternions)[0]
+    pairs = [(off, truth.trajectory.q, case.coordinates, False)]
     if not any(event.impulse and event.t == 0.0 for event in run.events):  # else the first row may be behind it
-        pairs.append((run.v[0], case.v0, truth.trajectory.v))
-    return max(_apart(mine, given, motion, units) for mine, given, motion in pairs if motion.shape[1] == len(units))
+        pairs.append((np.abs(run.v[0] - case.v0), truth.trajectory.v, case.velocities, True))
+    return max(_apart(*pair) for pair in pairs if pair[1].shape[1] == len(pair[2]))
 
 
-def _apart(mine: Floats, given: Floats, motion: Floats, units: NDArray[np.str_]) -> float:
-    own = np.max(np.abs(motion), axis=0, initial=0.0)
-    scale = np.array([own[units == unit].max() for unit in units])
-    return float(np.max(np.abs(mine - given) / np.where(scale > 0.0, scale, 1.0), initial=0.0))
+def _apart(off: Floats, motion: Floats, named: Sequence[Coordinate], rates: bool) -> float:
+    largest = of_like(np.max(np.abs(motion), axis=0, initial=0.0), named)
+    return float(np.max(off / np.maximum(largest, least(named, rates)), initial=0.0))

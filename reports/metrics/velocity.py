@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import away
+from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+STILL = 1e-9
+"""Velocities below this part of what would carry their like through the horizon are rest but for rounding."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -24,11 +28,21 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     collisions that take no time are left out: several may share one, and a sample does not say behind which it stands.
     """
     inside, exact = aligned(truth, run)
-    own = np.max(np.abs(truth.trajectory.v), axis=0)
-    units = np.array([coordinate.unit for coordinate in case.coordinates])
-    scale = np.array([own[units == unit].max() for unit in units])
+    scale = _scale(truth.trajectory, case)
     if not inside.any():
         return None
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
-    off = np.abs(run.v[inside] - exact.v)[smooth] / np.where(scale > 0.0, scale, 1.0)
+    off = np.abs(run.v[inside] - exact.v)[smooth] / scale
     return float(np.max(off, initial=0.0))
+
+
+def _scale(exact: Trajectory, case: Case) -> Floats:
+    """Largest |v_truth| of all that share a unit (nv,); where they all rest, what carries them by their size."""
+    own, sizes = np.max(np.abs(exact.v), axis=0), np.max(np.abs(exact.q), axis=0)
+    units, of_q = (np.array([one.unit for one in named]) for named in (case.velocities, case.coordinates))
+    sizes[list(case.quaternions)] = 1.0
+    of_q[list(case.quaternions)] = "rad"
+    shared = of_like(own, case.velocities)
+    carrying = np.array([sizes[of_q == unit].max(initial=0.0) for unit in units]) / case.t_end
+    moving = np.where(shared > STILL * carrying, shared, carrying)
+    return np.maximum(moving, least(case.velocities, rates=True))

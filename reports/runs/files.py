@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 import re
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
 from crossbody.cases import OutputError
+from crossbody.cases._regular import open_regular
 
 NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.+ -]{0,200}")
 """One part of the name of a file of ours: it cannot climb out, and does not begin with a dot."""
@@ -76,10 +79,13 @@ def decoded(text: bytes) -> Any:
     """JSON that a stranger may have written.
 
     Raises:
-        ValueError: for what is no JSON, or holds half of a surrogate pair, which no file can be written with.
-        RecursionError: for what is nested too deeply.
+        ValueError: for what is no JSON, is nested too deeply, or holds half of a surrogate pair, which no file can be
+            written with.
     """
-    found = json.loads(text)
+    try:
+        found = json.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
     if b"\\ud" in text.lower():
         json.dumps(found, ensure_ascii=False).encode()
     return found
@@ -97,13 +103,31 @@ def open_inside(folder: Path, name: str) -> BinaryIO:
         mode = os.stat(place.name, dir_fd=where, follow_symlinks=False).st_mode
         if not stat.S_ISREG(mode):
             raise OutputError(f"{folder / name} is a link or no file; crossbody follows no link there.")
-        return os.fdopen(os.open(place.name, os.O_RDONLY | os.O_NOFOLLOW, dir_fd=where), "rb")
+        return open_regular(place.name, os.O_NOFOLLOW, where)
 
 
 def read_inside(folder: Path, name: str) -> bytes:
     """Return what a file in a folder holds; errors as `open_inside`."""
     with open_inside(folder, name) as file:
         return file.read()
+
+
+def digest(folder: Path, name: str) -> str:
+    """Return the digest of a file in a folder; errors as `open_inside`."""
+    with open_inside(folder, name) as file:
+        status = os.fstat(file.fileno())
+        return _digest(str(folder / name), status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+
+@lru_cache(maxsize=4096)
+def _digest(path: str, *_status: int) -> str:
+    """Digest what has not changed since only once a process."""
+    place = Path(path)
+    made = hashlib.blake2b(digest_size=16)
+    with open_inside(place.parent, place.name) as file:
+        while block := file.read(1 << 20):
+            made.update(block)
+    return made.hexdigest()
 
 
 def listed(folder: Path, name: str = "") -> list[str]:

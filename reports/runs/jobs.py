@@ -207,6 +207,7 @@ def _ran(
         engine=pick.engine,
         profile=pick.profile,
         settings=prepared.settings,
+        default=not any(name in prepared.settings for name in asked),
         run=_dense(case, pick, prepared, natural, asked),
         stepped=natural.t,
         audit=rows,

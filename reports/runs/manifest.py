@@ -1,4 +1,8 @@
-"""Which files of a folder are whose: every study lists its own, and nothing else is ever replaced or removed."""
+"""Which files of a folder are whose: every study lists its own, and nothing else is ever replaced or removed.
+
+A folder may come from a stranger: a name that only crossbody gives is enough to make a file ours, any other name needs
+the content that was written.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +27,7 @@ JUDGED = frozenset({"run", "replay", "identify"})
 ASSETS = frozenset({"plotly.min.js", "crossbody.css", "crossbody.js"})
 _TABLE = re.compile(r"[a-z][a-z_-]*\.(json|csv|parquet)")
 _MOTION = re.compile(r"traces/[0-9]{4,}\.parquet")
+_GIVEN = re.compile(r"(verdicts|audit|provenance)\.(json|csv|parquet)|traces/[0-9]{4,}\.parquet|index\.html")
 _BASE = re.compile(r"(verdicts|audit|provenance)\.(json|csv|parquet)")
 
 
@@ -82,7 +87,9 @@ class Manifest:
 
 
 def read(folder: Path) -> Manifest:
-    """Read the manifest of a folder; of one that an earlier version wrote, what is recognised as its own.
+    """Read the manifest of a folder, less what has been written by others since.
+
+    Of what an earlier version wrote, that is ours which is recognised.
 
     Raises:
         OutputError: if the manifest is none.
@@ -97,20 +104,40 @@ def read(folder: Path) -> Manifest:
         raise OutputError(f"{folder / MARKER} cannot be read: {error.strerror}.") from None
     if not text.lstrip().startswith("{"):
         return Manifest({EARLIER: frozenset(_recognised(folder))})
-    return Manifest(_studies(folder / MARKER, text))
+    told = _studies(folder / MARKER, text)
+    return Manifest({study: frozenset(_unchanged(folder, sums)) for study, sums in told.items()})
 
 
-def _studies(path: Path, text: str) -> dict[str, frozenset[str]]:
-    """Studies of a manifest, every name looked at: files are removed by it."""
+def _studies(path: Path, text: str) -> dict[str, dict[str, str]]:
+    """Studies of a manifest, and the digest of every file; an earlier version gave none."""
     try:
         found: Any = files.decoded(text.encode())["studies"]
-        told = {str(study): frozenset(names) for study, names in found.items()}
+        told = {
+            str(study): dict(names) if isinstance(names, dict) else dict.fromkeys(names, "")
+            for study, names in found.items()
+        }
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise OutputError(f"{path} is not a manifest of crossbody: it has no table `studies` of lists.") from None
+        raise OutputError(f"{path} is not a manifest of crossbody: it has no table `studies` of tables.") from None
     for study, names in told.items():
         if wrong := [name for name in names if not files.is_plain(name)]:
             raise OutputError(f"{path}: studies.{study} names {wrong[0]!r}, which is no file of this folder.")
     return told
+
+
+def _unchanged(folder: Path, sums: Mapping[str, str]) -> Iterator[str]:
+    """Yield the files that are not there, or are as they were written."""
+    plain = [name for name, told in sums.items() if not told and not is_table(name)]
+    known = {name for name in plain if os.path.lexists(folder / name) and _is_generated(folder, name)}
+    for name, told in sums.items():
+        try:
+            if _GIVEN.fullmatch(name) or name in ASSETS or name in known or files.digest(folder, name) == told:
+                yield name
+        except FileNotFoundError:
+            yield name
+        except OutputError:
+            continue  # a link or a folder stands there
+        except OSError as error:
+            raise OutputError(f"{folder / name} cannot be read: {error.strerror}.") from None
 
 
 def _recognised(folder: Path) -> list[str]:
@@ -132,7 +159,11 @@ def _is_generated(folder: Path, name: str) -> bool:
 
 def write(folder: Path, manifest: Manifest) -> None:
     """Write the manifest of a folder, whole or not at all."""
-    told = {"written by": "crossbody", "studies": {key: sorted(value) for key, value in manifest.studies.items()}}
+    sums = {
+        study: {name: files.digest(folder, name) for name in sorted(names) if os.path.lexists(folder / name)}
+        for study, names in manifest.studies.items()
+    }
+    told = {"written by": "crossbody", "studies": sums}
     replace_text(folder / MARKER, json.dumps(told, indent=1) + "\n")
 
 

@@ -25,8 +25,11 @@ TIMINGS = columns(
     tier="Tier", error=("Error [1]", Kind.NUMBER), error_q=("Position [1]", Kind.NUMBER),
     error_v=("Velocity [1]", Kind.NUMBER), error_impulse=("Impulse [1]", Kind.NUMBER),
     error_energy=("Energy [1]", Kind.NUMBER), error_times=("Event times [s]", Kind.NUMBER),
+    error_between=("Position on one grid [1]", Kind.NUMBER),
     honesty=("Error over tolerance [1]", Kind.NUMBER), median_ms=("Median [ms]", Kind.NUMBER),
-    iqr_ms=("IQR [ms]", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER), cores=("Cores [1]", Kind.NUMBER),
+    iqr_ms=("IQR [ms]", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER),
+    native_ms=("Its own loop [ms]", Kind.NUMBER), interpreted=("Interpreted", Kind.LONG),
+    cores=("Cores [1]", Kind.NUMBER),
     repeats=("Repeats", Kind.NUMBER), outcome="Outcome",
 )  # fmt: skip
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import InvalidValue
+from crossbody.cases._regular import open_regular
+from crossbody.reports.runs.files import decoded
 from crossbody.reports.runs.output import replace_text
 
 if TYPE_CHECKING:
@@ -58,7 +60,8 @@ class Baseline:
 
     def _read(self) -> dict[str, float]:
         try:
-            stored = json.loads(self.path.read_text(encoding="utf-8"))
+            with open_regular(self.path) as file:
+                stored = decoded(file.read())
             return {str(name): float(_WORDS.get(value, value)) for name, value in stored.items()}
         except (OSError, ValueError, TypeError, AttributeError) as error:
             raise InvalidValue(f"Baseline {self.path} is not a JSON object of numbers: {error}.") from None

@@ -64,7 +64,7 @@ CAUTION = 16.0  # errors along the step in units of those seen at two places
 class Workspace:
     """Everything that `evaluate` reads and writes."""
 
-    size: Index  # n, nc, k, nz, na, terms, guards
+    size: Index  # n, nc, k, nz, na, terms, guards, nq, and 1 where q' is not v
     count: Index  # evaluations, steps, steps in a row that stability binds, the most of these, guards undecided
     clock: Floats  # last instant, fastest damped pole, end of the last step and its start
     p: Floats
@@ -74,6 +74,8 @@ class Workspace:
     f: Floats
     q: Floats
     v: Floats
+    law_q: Floats  # the state put onto the law
+    law_v: Floats
     H: Floats2  # (nc, n), compact, as h, Hdv
     h: Floats
     Hdv: Floats
@@ -81,6 +83,7 @@ class Workspace:
     rate: Floats
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam1: Floats  # at the end of the step
+    arc: Floats2  # (nc, 3) instant, gap and rate from which an active row has followed its law; instant NaN: unknown
     two: Floats
     matrix: Floats2  # (n + nc, n + nc + 2): the last columns are right-hand sides
     solution: Floats2  # (n + nc, 2)
@@ -102,8 +105,9 @@ class Workspace:
     check: Floats2  # (4, terms) at two places, without the quintic's error and with it
     grid: Floats2  # (POINTS, terms)
     ends: Floats2  # (2, of the solver's vector) the last step's start and end
-    y0: Floats  # (2n,) start of the step
+    y0: Floats  # (nq + n,) start of the step
     y1: Floats
+    qd: Floats  # (nq,) q'
     curve: Floats  # (n,) v' of the quintic
     a0: Floats  # (n,)
     a1: Floats
@@ -144,32 +148,73 @@ def _eliminate(A: Floats2, x: Floats2, size: int, sides: int) -> int:
 
 
 @compiled
-def _solve(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, idx: Index, na: int, law: Floats2,
-           unit: int) -> int:  # fmt: skip
-    """V' and lam of the rows in idx into `solution`; with unit >= 0 the response to that row alone beside it."""
+def linear_arc(a0: float, a1: float, h: float, rate: float, t: float) -> tuple[float, float]:
+    """Gap and rate after time t of h'' + a1 h' + a0 h = 0.
+
+    h e^{p1 t} + (h' - p1 h) (e^{p1 t} - e^{p2 t}) / (p1 - p2); near equal poles the quotient by its series.
+    """
+    half = 0.5 * a1
+    root = np.sqrt(complex(half * half - a0))
+    p2 = -(half + root)
+    p1 = a0 / p2 if p2 != 0.0 else p2  # without cancellation
+    e1, e2, x = np.exp(p1 * t), np.exp(p2 * t), root * t
+    if abs(x) < 1e-2:
+        divided = t * np.exp(-half * t) * (1.0 + x * x / 6.0 * (1.0 + x * x / 20.0 * (1.0 + x * x / 42.0)))
+    else:
+        divided = (e1 - e2) / (p1 - p2)
+    c = rate - p1 * h
+    return float((h * e1 + c * divided).real), float((p1 * h * e1 + c * (e1 + p2 * divided)).real)
+
+
+@inlined
+def _assemble(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, idx: Index, na: int) -> None:
+    """The matrix of M and of the rows in idx, and zero right-hand sides; f, H, h, Hdv as the kernels leave them."""
     n, k, A = s.size[0], s.size[2], s.matrix
-    size = n + na
     s.count[0] += 1
     dynamics(t, q, v, s.u, s.p, s.blocks, s.f, s.w)
-    A[:size, : size + 2] = 0.0
+    A[: n + na, : n + na + 2] = 0.0
     for i in range(n):
         first = i // k * k
         for j in range(k):
             A[i, first + j] = s.blocks[i, j]
-        A[i, size] = s.f[i]
     if na > 0:
         s.H[:na] = 0.0  # kernels need not write the zeros
         rows(t, q, v, s.p, s.w, idx, na, s.H, s.h, s.Hdv)
-        for j in range(na):
-            rate = 0.0
-            for c in range(n):
-                A[n + j, c] = s.H[j, c]
-                A[c, n + j] = -s.H[j, c]
-                rate += s.H[j, c] * v[c]
-            h, i = s.h[j], idx[j]
-            A[n + j, size] = -(s.Hdv[j] + law[i, 1] * rate + (law[i, 0] + law[i, 2] * h * h) * h)
-        if unit >= 0:
-            A[n + unit, size + 1] = 1.0
+    for j in range(na):
+        for c in range(n):
+            A[n + j, c] = s.H[j, c]
+            A[c, n + j] = -s.H[j, c]
+
+
+@inlined
+def _by_law(s: Workspace, law: Floats2, i: int, t: float) -> tuple[float, float]:
+    """Gap and rate of a row that has followed its linear law since a known instant."""
+    h, rate = linear_arc(law[i, 0], law[i, 1], s.arc[i, 1], s.arc[i, 2], t - s.arc[i, 0])
+    return h, rate
+
+
+@compiled
+def _solve(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, idx: Index, na: int, law: Floats2,
+           unit: int, by_law: bool) -> int:  # fmt: skip
+    """V' and lam of the rows in idx into `solution`; with unit >= 0 the response to that row alone beside it.
+
+    With `by_law` the gaps of rows that have followed a linear law since a known instant are those of the law.
+    """
+    n, A = s.size[0], s.matrix
+    size = n + na
+    _assemble(dynamics, rows, s, t, q, v, idx, na)
+    for i in range(n):
+        A[i, size] = s.f[i]
+    for j in range(na):
+        rate = 0.0
+        for c in range(n):
+            rate += s.H[j, c] * v[c]
+        h, i = s.h[j], idx[j]
+        if by_law and not np.isnan(s.arc[i, 0]):
+            h, rate = _by_law(s, law, i, t)
+        A[n + j, size] = -(s.Hdv[j] + law[i, 1] * rate + (law[i, 0] + law[i, 2] * h * h) * h)
+    if unit >= 0:
+        A[n + unit, size + 1] = 1.0
     total = 0.0
     for i in range(size):
         for j in range(size + 1):
@@ -183,9 +228,34 @@ def _solve(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Float
 
 
 @compiled
-def _accelerate(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats) -> int:
+def _put_on_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats) -> int:
+    """Move q and v by one Newton step to where linear laws have the active rows' gaps: the least change in M's norm.
+
+    What is left is of the second order in the solver's error.
+    """
+    n, na, A = s.size[0], s.size[4], s.matrix
+    _assemble(dynamics, rows, s, t, q, v, s.idx, na)
+    for j in range(na):
+        i = s.idx[j]
+        if np.isnan(s.arc[i, 0]):
+            continue
+        h, rate = _by_law(s, s.law, i, t)
+        A[n + j, n + na] = h - s.h[j] if s.law[i, 0] > 0.0 else 0.0  # a law of rates knows no gap
+        A[n + j, n + na + 1] = rate
+        for c in range(n):
+            A[n + j, n + na + 1] -= s.H[j, c] * v[c]
+    if _eliminate(A, s.solution, n + na, 2) != 0:
+        return ILL_POSED
+    for i in range(n):
+        q[i] += s.solution[i, 0]
+        v[i] += s.solution[i, 1]
+    return GOOD
+
+
+@compiled
+def _accelerate(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, by_law: bool) -> int:
     """V' into `solution`, multipliers of all rows into `lam`."""
-    code = _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, -1)
+    code = _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, -1, by_law)
     s.lam[:] = 0.0
     for j in range(s.size[4]):
         s.lam[s.idx[j]] = s.solution[s.size[0] + j, 0]
@@ -202,57 +272,88 @@ def _tick(s: Workspace, t: float) -> None:
 
 
 @inlined
-def _derivative(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t: float, y: Any, yp: Any) -> int:
+def _take(s: Workspace, y: Any) -> None:
+    """Q and v of the solver's vector."""
+    nq = s.size[7]
+    for i in range(nq):
+        s.q[i] = y[i]
+    for i in range(s.size[0]):
+        s.v[i] = y[nq + i]
+
+
+@inlined
+def _rates(velocity: Any, s: Workspace, t: float) -> None:
+    """Q' at the state taken."""
+    if s.size[8]:
+        velocity(t, s.q, s.v, s.p, s.qd)
+    else:
+        for i in range(s.size[0]):
+            s.qd[i] = s.v[i]
+
+
+@inlined
+def _derivative(
+    dynamics: Any, gaps: Any, rows: Any, power: Any, velocity: Any, s: Workspace, t: float, y: Any, yp: Any
+) -> int:
     """Y' of q, v and the work done by rows, by inputs and against damping."""
-    n, nc, nz = s.size[0], s.size[1], s.size[3]
+    n, nc, nz, nq = s.size[0], s.size[1], s.size[3], s.size[7]
+    ny = nq + n
     _tick(s, t)
+    _take(s, y)
+    code = _accelerate(dynamics, rows, s, t, s.q, s.v, False)
+    _rates(velocity, s, t)
+    for i in range(nq):
+        yp[i] = s.qd[i]
     for i in range(n):
-        s.q[i], s.v[i] = y[i], y[n + i]
-    code = _accelerate(dynamics, rows, s, t, s.q, s.v)
-    for i in range(n):
-        yp[i], yp[n + i] = s.v[i], s.solution[i, 0]
+        yp[nq + i] = s.solution[i, 0]
     if code == GOOD and nz > 0:
         gaps(t, s.q, s.v, s.p, s.gap, s.rate)
         power(t, s.q, s.v, s.u, s.p, s.two)
         for i in range(nc):
-            yp[2 * n + i] = s.lam[i] * s.rate[i]
-        yp[2 * n + nc], yp[2 * n + nc + 1] = s.two[0], s.two[1]
-        for i in range(2 * n, 2 * n + nz):
+            yp[ny + i] = s.lam[i] * s.rate[i]
+        yp[ny + nc], yp[ny + nc + 1] = s.two[0], s.two[1]
+        for i in range(ny, ny + nz):
             if not np.isfinite(yp[i]):
                 return NOT_FINITE
     return int(code)
 
 
 @inlined
-def _residual(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t: float, y: Any, out: Any) -> int:
+def _residual(
+    dynamics: Any, gaps: Any, rows: Any, power: Any, velocity: Any, s: Workspace, t: float, y: Any, out: Any
+) -> int:
     """The implicit equations of (q, v, lam, mu, z), with the derivative in `slopes`; all rows of `lam`.
 
     M v' = f + H^T lam, and of every active row H M^-1 (f + H^T lam) + H' v + a1 h' + a0 h + a2 h^3 = 0: with v' of the
     solver in its place, the rounding of a difference over a short step would stand in the multiplier.
     """
     n, nc, k, nz, na, A = s.size[0], s.size[1], s.size[2], s.size[3], s.size[4], s.matrix
-    mu = 2 * n + nc
+    nq = s.size[7]
+    ny = nq + n
+    mu = ny + nc
     _tick(s, t)
-    for i in range(n):
-        s.q[i], s.v[i] = y[i], y[n + i]
+    _take(s, y)
+    _rates(velocity, s, t)
     s.count[0] += 1
     dynamics(t, s.q, s.v, s.u, s.p, s.blocks, s.f, s.w)
     s.H[:na] = 0.0
     if na > 0:
         rows(t, s.q, s.v, s.p, s.w, s.idx, na, s.H, s.h, s.Hdv)
     A[:n, : n + 1] = 0.0
+    for i in range(nq):
+        out[i] = s.slopes[i] - s.qd[i]
     for i in range(n):
         first = i // k * k
-        out[i], out[n + i], A[i, n] = s.slopes[i] - s.v[i], 0.0, s.f[i]
+        out[nq + i], A[i, n] = 0.0, s.f[i]
         for j in range(k):
             A[i, first + j] = s.blocks[i, j]
-            out[n + i] += s.blocks[i, j] * s.slopes[n + first + j]
+            out[nq + i] += s.blocks[i, j] * s.slopes[nq + first + j]
         for j in range(na):
-            A[i, n] += s.H[j, i] * y[2 * n + s.idx[j]]
-        out[n + i] -= A[i, n]
+            A[i, n] += s.H[j, i] * y[ny + s.idx[j]]
+        out[nq + i] -= A[i, n]
     if na > 0 and _eliminate(A, s.solution, n, 1) != 0:
         return ILL_POSED
-    for i in range(2 * n, mu):
+    for i in range(ny, mu):
         out[i] = y[i]
     for j in range(na):
         i = s.idx[j]
@@ -261,13 +362,13 @@ def _residual(dynamics: Any, gaps: Any, rows: Any, power: Any, s: Workspace, t: 
             rate += s.H[j, c] * s.v[c]
             push += s.H[j, c] * s.solution[c, 0]
         drive = s.law[i, 1] * rate + (s.law[i, 0] + s.law[i, 2] * h * h) * h
-        out[2 * n + i] = (push + s.Hdv[j] + drive) * s.scale[i]
+        out[ny + i] = (push + s.Hdv[j] + drive) * s.scale[i]
         if s.rigid[i] >= 0:
-            out[2 * n + i], out[mu + s.rigid[i]] = h, rate
+            out[ny + i], out[mu + s.rigid[i]] = h, rate
             for c in range(n):
                 out[c] -= s.H[j, c] * y[mu + s.rigid[i]]
     if nz > 0:
-        _accelerate(dynamics, rows, s, t, s.q, s.v)  # lam of the state itself
+        _accelerate(dynamics, rows, s, t, s.q, s.v, False)  # lam of the state itself
         gaps(t, s.q, s.v, s.p, s.gap, s.rate)
         power(t, s.q, s.v, s.u, s.p, s.two)
         at = len(y) - nz
@@ -293,7 +394,7 @@ def _would_press(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v:
         if s.follows[j] == i:
             s.trial[count] = j
             count += 1
-    if _solve(dynamics, rows, s, t, q, v, s.trial, count, s.law_if, -1) != GOOD:
+    if _solve(dynamics, rows, s, t, q, v, s.trial, count, s.law_if, -1, True) != GOOD:
         return -np.inf
     return float(s.solution[s.size[0] + na, 0])
 
@@ -304,7 +405,7 @@ def _spent(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Float
     i = s.row[e]
     for j in range(s.size[4]):
         if s.idx[j] == i:
-            if _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, j) != GOOD:
+            if _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, j, False) != GOOD:
                 return np.nan
             at = s.size[0] + j
             inertial = s.solution[at, 0] / s.solution[at, 1]
@@ -324,11 +425,16 @@ def _terms(
         watch(t, q, v, s.p, s.watched)
     known = False
     for e in range(s.size[5]):
-        kind, i = s.kind[e], s.row[e]
+        kind = s.kind[e]
         if kind == FORCE and not known:
-            if _accelerate(dynamics, rows, s, t, q, v) != GOOD:
+            s.law_q[:], s.law_v[:] = q, v
+            # Positions that turn stay where they are: the law's own gaps are most of what counts.
+            if not s.size[8] and _put_on_law(dynamics, rows, s, t, s.law_q, s.law_v) != GOOD:
+                return NOT_FINITE
+            if _accelerate(dynamics, rows, s, t, s.law_q, s.law_v, True) != GOOD:
                 return NOT_FINITE
             known = True
+        i = s.row[e]
         if kind == GAP:
             value = s.gap[i]
         elif kind == BELOW:
@@ -387,7 +493,7 @@ def _doubt(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: flo
         _hermite(s, x, length)
         code = _terms(dynamics, gaps, rows, watch, s, at, s.q, s.v, s.check[2 + j])
         if code == GOOD:
-            code = _accelerate(dynamics, rows, s, at, s.q, s.v)
+            code = _accelerate(dynamics, rows, s, at, s.q, s.v, False)
         if code != GOOD:
             return int(code)
         for i in range(n):
@@ -433,10 +539,10 @@ def _decide(s: Workspace) -> int:
 def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
     """The end of the step becomes the start of the next one."""
     n = s.size[0]
-    for i in range(n):
-        s.q[i], s.v[i] = y[i], y[n + i]
-        s.y1[i], s.y1[n + i] = y[i], y[n + i]
-    code = _accelerate(dynamics, rows, s, t, s.q, s.v)
+    _take(s, y)
+    for i in range(s.size[7] + n):
+        s.y1[i] = y[i]
+    code = _accelerate(dynamics, rows, s, t, s.q, s.v, False)
     for i in range(n):
         s.a1[i] = s.solution[i, 0]
     s.lam1[:] = s.lam
@@ -456,10 +562,16 @@ def _move_on(s: Workspace, t: float, y: Any) -> None:
 def _scan(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, y: Any) -> int:
     """Look whether a guard can fire inside the step that ends at t; minus a code, or the number of undecided guards.
 
-    A bound on the terms along the quintic decides, with a margin for its error.
+    A bound on the terms along the quintic decides, with a margin for its error. Where q' is not v there is no such
+    quintic: every guard is undecided.
     """
     start = s.clock[2]
     code = _carry(dynamics, rows, s, t, y)
+    if s.size[8] and code == GOOD:
+        s.undecided[:] = 1
+        s.count[4] = s.size[6]
+        _move_on(s, t, y)
+        return int(s.count[4])
     for j in range(DEGREE + 1):
         if code == GOOD:
             _hermite(s, NODES[j], t - start)
@@ -490,8 +602,9 @@ def _grid(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: floa
 
 
 def evaluate(
-    dynamics: Any, gaps: Any, rows: Any, power: Any, watch: Any, what: int, t: float, y: Floats, out: Floats, lines: Any
-) -> int:
+    dynamics: Any, gaps: Any, rows: Any, power: Any, velocity: Any, watch: Any,
+    what: int, t: float, y: Floats, out: Floats, lines: Any,
+) -> int:  # fmt: skip
     """Do what is asked at (t, y); GOOD or what went wrong, except for SCAN, as `_scan`.
 
     DERIVATIVE: y' into out. TERMS: all terms into out. FORCES: the multipliers. BEGIN: a step begins here. SCAN, GRID:
@@ -499,17 +612,14 @@ def evaluate(
     RESIDUAL: of the implicit equations into out, with the derivative in `slopes`.
     """
     s = open_work(lines)
-    n = s.size[0]
     if what == DERIVATIVE:
-        return int(_derivative(dynamics, gaps, rows, power, s, t, y, out))
+        return int(_derivative(dynamics, gaps, rows, power, velocity, s, t, y, out))
     if what == TERMS:
-        for i in range(n):
-            s.q[i], s.v[i] = y[i], y[n + i]
+        _take(s, y)
         return int(_terms(dynamics, gaps, rows, watch, s, t, s.q, s.v, out))
     if what == FORCES:
-        for i in range(n):
-            s.q[i], s.v[i] = y[i], y[n + i]
-        return int(_accelerate(dynamics, rows, s, t, s.q, s.v))
+        _take(s, y)
+        return int(_accelerate(dynamics, rows, s, t, s.q, s.v, False))
     if what == BEGIN:
         code = _carry(dynamics, rows, s, t, y)
         _move_on(s, t, y)
@@ -517,7 +627,7 @@ def evaluate(
     if what == GRID:
         return int(_grid(dynamics, gaps, rows, watch, s, t, y))
     if what == RESIDUAL:
-        return int(_residual(dynamics, gaps, rows, power, s, t, y, out))
+        return int(_residual(dynamics, gaps, rows, power, velocity, s, t, y, out))
     if what == WATCHED:
         out[0] = 1.0
         if t <= s.clock[2]:  # the solver looks back
@@ -529,7 +639,7 @@ def evaluate(
     return int(_scan(dynamics, gaps, rows, watch, s, t, y))
 
 
-_USED = ("dynamics", "gaps", "rows", "power", "watch")
+_USED = ("dynamics", "gaps", "rows", "power", "velocity", "watch")
 _ARGUMENTS = (
     types.int64, types.float64, types.Array(types.float64, 1, "C", readonly=True), types.float64[::1], TABLE,
 )  # fmt: skip
@@ -545,10 +655,10 @@ def _address() -> Address:
 def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """`evaluate` with one system's kernels built in."""
     general = _address()
-    dynamics, gaps, rows, power, watch = functions
+    dynamics, gaps, rows, power, velocity, watch = functions
 
     def call(what, t, y, out, lines):  # type: ignore[no-untyped-def]
-        return general(dynamics, gaps, rows, power, watch, what, t, y, out, lines)
+        return general(dynamics, gaps, rows, power, velocity, watch, what, t, y, out, lines)
 
     found: Callable[..., int] = embedding(call, types.int64(*_ARGUMENTS))
     return found
@@ -571,16 +681,17 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
         terms: largest number of terms of its guards.
         nz: accounts of work.
     """
-    n, nc, all_ = system.n, system.nc, system.n + system.nc
+    n, nq, nc, all_ = system.n, system.nq, system.nc, system.n + system.nc
+    ny = nq + n
     shapes: dict[str, tuple[int, ...]] = {
-        "size": (7,), "count": (5,), "clock": (4,), "w": (system.scratch,), "blocks": (n, system.mass_block),
-        **dict.fromkeys(("f", "q", "v", "a0", "a1", "curve"), (n,)), "H": (nc, n), "two": (2,),
-        "matrix": (all_, all_ + 2), "solution": (all_, 2), "law": (nc, 3), "law_if": (nc, 3), "trial": (nc + 1,),
-        "slopes": (2 * n + 2 * nc + nz,),
+        "size": (9,), "count": (5,), "clock": (4,), "w": (system.scratch,), "blocks": (n, system.mass_block),
+        **dict.fromkeys(("q", "qd", "law_q"), (nq,)), **dict.fromkeys(("f", "v", "law_v", "a0", "a1", "curve"), (n,)),
+        "H": (nc, n), "two": (2,), "matrix": (all_, all_ + 2), "solution": (all_, 2), "law": (nc, 3),
+        "law_if": (nc, 3), "arc": (nc, 3), "trial": (nc + 1,), "slopes": (ny + 2 * nc + nz,),
         "watched": (system.guards if system.watch is not None else 0,),
         **dict.fromkeys(("kind", "row", "shift", "group", "undecided"), (terms,)), "side": (terms, 2),
         "values": (DEGREE + 1, terms), "check": (4, terms), "grid": (POINTS, terms),
-        "y0": (2 * n,), "y1": (2 * n,), "ends": (2, 2 * all_ + nz),
+        "y0": (ny,), "y1": (ny,), "ends": (2, ny + 2 * nc + nz),
     }  # fmt: skip
     kinds = {"Index": np.int64}
     arrays = {
@@ -589,5 +700,7 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
     }
     arrays["p"], arrays["u"] = p, u
     arrays["follows"][:] = system.follows
+    arrays["arc"][:, 0] = np.nan
     arrays["size"][:4] = n, nc, system.mass_block, nz
+    arrays["size"][7:] = nq, system.velocity is not None
     return arrays, table([*arrays.values()])

@@ -1,0 +1,31 @@
+"""Files that somebody else may have put there, opened without ever waiting for a writer that does not come."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+
+def open_regular(path: str | Path, flags: int = 0, folder: int | None = None) -> BinaryIO:
+    """Open a regular file for reading; a pipe, which would wait for a writer, and a device are refused.
+
+    Args:
+        path: the file.
+        flags: of `os.open`, beside reading.
+        folder: descriptor of the folder that the path is relative to.
+
+    Raises:
+        OSError: EINVAL for what is no regular file, otherwise as `os.open`.
+    """
+    never_wait = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_CLOEXEC", 0)
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0) | never_wait | flags, dir_fd=folder)
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "it is a folder, a pipe or a device", str(path))
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise

@@ -1,0 +1,102 @@
+"""A scene's coordinates and Pinocchio's.
+
+    scene      free: q = (p, w x y z), v = (p', angular in body axes);            ball: q = (w x y z), v in body axes
+    Pinocchio  free: q = (p, x y z w), v = (R^T p', angular), both in body axes;  ball: q = (x y z w), v in body axes
+
+With v = J v_e: tau_e = J^T tau, M_e = J^T M J, b_e = J^T (b + M J' v_e). J is R on the linear velocity of a free joint
+and 1 elsewhere; there J' v_e = R (w x v_lin), and 0 elsewhere. Slides and hinges count from their reference.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import Scene
+from crossbody.engines._scene import places
+
+PULL = 0.1  # 1/s, of a quaternion to length 1
+
+
+class Coordinates:
+    """The map of one scene.
+
+    Attributes:
+        nq, nv: numbers of positions and of velocities, in both.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.nq, self.nv = scene.nq, scene.nv
+        at, place = places(scene)
+        self.reference: Floats = np.zeros(self.nq)
+        self.frees: list[tuple[int, int]] = []
+        self.turns: list[tuple[int, int]] = []  # first entry of a quaternion, first of its angular velocity
+        single = []
+        for joint in scene.joints:
+            q, v = at[joint.name], place[joint.name]
+            if joint.type in ("slide", "hinge"):
+                self.reference[q] = joint.reference
+                single.append((q, v))
+            elif joint.type == "free":
+                self.frees.append((q, v))
+            if joint.type in ("free", "ball"):
+                self.turns.append((q + 3, v + 3) if joint.type == "free" else (q, v))
+        self.single = np.array(single, dtype=int).reshape(-1, 2).T
+
+    def theirs(self, q: Floats) -> Floats:
+        """Return Pinocchio's positions (..., nq)."""
+        found: Floats = q - self.reference
+        for at, _ in self.turns:
+            found[..., at : at + 4] = np.roll(found[..., at : at + 4], -1, axis=-1)
+        return found
+
+    def ours(self, q: Floats) -> Floats:
+        """Return the scene's positions (..., nq)."""
+        found: Floats = q + self.reference
+        for at, _ in self.turns:
+            found[..., at : at + 4] = np.roll(found[..., at : at + 4], 1, axis=-1)
+        return found
+
+    def blocks(self, q: Floats) -> list[tuple[int, Floats]]:
+        """Return for every free joint its first velocity and R (..., 3, 3), at Pinocchio's positions."""
+        return [(v, Rotation.from_quat(q[..., at + 3 : at + 7]).as_matrix()) for at, v in self.frees]
+
+    def velocities(self, q: Floats, v: Floats) -> Floats:
+        """Return J v, the scene's velocities (..., nv), at Pinocchio's positions."""
+        found: Floats = np.array(v)
+        for first, R in self.blocks(q):
+            found[..., first : first + 3] = np.einsum("...ij,...j->...i", R, v[..., first : first + 3])
+        return found
+
+    def back(self, q: Floats, x: Floats) -> Floats:
+        """Return J^T x: Pinocchio's velocities, or forces, of the scene's (..., nv)."""
+        found: Floats = np.array(x)
+        for first, R in self.blocks(q):
+            found[..., first : first + 3] = np.einsum("...ji,...j->...i", R, x[..., first : first + 3])
+        return found
+
+    def bend(self, q: Floats, v: Floats) -> Floats:
+        """Return J' v_e (nv,) at Pinocchio's positions and velocities."""
+        found: Floats = np.zeros(self.nv)
+        for first, R in self.blocks(q):
+            found[first : first + 3] = R @ np.cross(v[first + 3 : first + 6], v[first : first + 3])
+        return found
+
+    def rates(self, q: Floats, v: Floats) -> Floats:
+        """Return q' (nq,) in Pinocchio's coordinates; of a quaternion with a pull to length 1."""
+        found: Floats = np.empty(self.nq)
+        found[self.single[0]] = v[self.single[1]]
+        for (at, first), (_, R) in zip(self.frees, self.blocks(q), strict=True):
+            found[at : at + 3] = R @ v[first : first + 3]
+        for at, first in self.turns:
+            x, w, turn = q[at : at + 3], q[at + 3], v[first : first + 3]
+            pull = PULL * (1.0 - q[at : at + 4] @ q[at : at + 4])
+            found[at : at + 3] = 0.5 * (w * turn + np.cross(x, turn)) + pull * x
+            found[at + 3] = -0.5 * (x @ turn) + pull * w
+        return found
+
+    def normalise(self, q: Floats) -> None:
+        """Bring every quaternion of Pinocchio's positions (nq,) to length 1, in place."""
+        for at, _ in self.turns:
+            q[at : at + 4] /= np.sqrt(q[at : at + 4] @ q[at : at + 4])

@@ -1,0 +1,79 @@
+"""Rows that follow from others: which they are at a start, and whether they still follow at the end of a motion.
+
+A planar loop that is closed by points in space has rows that depend on each other. Which of them are left out is
+decided once, at an assembled start, and stays so: off the rows the rank is full of noise. What was left out is watched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import qr
+
+from crossbody.cases import Outcome, Trajectory
+from crossbody.reference._kinds import Floats, Index
+from crossbody.reference._state import State, started
+from crossbody.reference._system import System
+
+INDEPENDENT = 1e-4  # pivot over the first from which on a row does not follow from the others
+OPEN, ROUNDING = 100.0, 1e-6  # times the gap of the rows that hold, and at least, m: more is not held any longer
+
+
+def redundant(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> list[int]:
+    """Return the rows that follow from others at an assembled state, by pivots of H M^-1/2.
+
+    Args:
+        system: the mechanism.
+        q: positions (nq,).
+        groups: rows that are scaled by one length, the largest of them: one a loop. Each by its own would lift a row
+            that is nothing but rounding to the size of the others.
+
+    Returns:
+        Their indices. A row whose pivot is small but not rounding is left out too: an axis that is off by 1e-6 rad
+        would lock the mechanism.
+    """
+    rows = [i for group in groups for i in group]
+    if len(rows) < 2:
+        return []
+    p, _ = started(system, np.array(q), np.zeros(system.n))
+    state = State(system, 0.0, system.checked_state("q", q), np.zeros(system.n), p)
+    root = np.linalg.cholesky(state.mass_matrix())
+    scaled = np.linalg.solve(root, state.H[rows].T).T
+    at = 0
+    for group in groups:
+        part = scaled[at : at + len(group)]
+        part /= np.linalg.norm(part, axis=1).max() or 1.0
+        at += len(group)
+    triangle, order = qr(scaled.T, mode="r", pivoting=True)[-2:]
+    count = min(triangle.shape)
+    pivots = np.zeros(len(rows))
+    pivots[:count] = np.abs(np.diag(triangle)[:count]) / abs(triangle[0, 0])
+    return sorted(rows[i] for i, pivot in zip(order, pivots, strict=True) if pivot < INDEPENDENT)
+
+
+def watched(system: System, run: Trajectory) -> Trajectory:
+    """Return the run, or one that is inconsistent where a row that was left out is not held by the others.
+
+    The multipliers of what was left out are NaN: with those of the rows that they follow from they are one of many.
+    """
+    left_out: Index = np.asarray(system.redundant)
+    if not len(left_out) or not len(run.t):
+        return run
+    rates = np.array([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)])
+    for values, what in ((run.gap, "h"), (rates, "h'")):
+        most = np.abs(values[:, system.held]).max(initial=0.0)
+        off = np.abs(values[:, left_out])
+        bound = max(OPEN * most, ROUNDING * (1.0 if what == "h" else max(1.0, float(np.abs(run.v).max()))))
+        if np.any(off > bound):
+            k, j = np.argwhere(off > bound)[0]
+            row = int(left_out[j])
+            message = (
+                f"{Outcome.INCONSISTENT.advice} Row {row} followed from the others at the start and was left out; "
+                f"at t = {run.t[k]:.12g} s it has {what} = {values[k, row]:.3g}."
+            )
+            return replace(run, outcome=Outcome.INCONSISTENT, message=message)
+    lam = np.array(run.lam)
+    lam[:, left_out] = np.nan
+    return replace(run, lam=lam, counts={**run.counts, "redundant": len(left_out)})

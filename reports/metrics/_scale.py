@@ -1,0 +1,29 @@
+"""What a coordinate's error is measured by: the largest of its own motion, or of its like where it rests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+
+if TYPE_CHECKING:
+    from crossbody.cases import Coordinate
+
+RESTS = 1e-4
+"""Coordinates of one unit that all stay below this, in SI, rest: what is left of their motion is known to absolute
+tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hundred of them."""
+
+
+def of_like(largest: Floats, named: Sequence[Coordinate]) -> Floats:
+    """Largest value (n,) of all coordinates that share a unit, from that of each coordinate (n,)."""
+    units = np.array([coordinate.unit for coordinate in named])
+    return np.array([largest[units == unit].max() for unit in units])
+
+
+def least(named: Sequence[Coordinate], rates: bool = False) -> Floats:
+    """What coordinates, or their rates, are measured by at least (n,), SI."""
+    known = [coordinate.rate if rates else coordinate.size for coordinate in named]
+    return np.maximum(of_like(np.array(known), named), RESTS)
