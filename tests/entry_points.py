@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import enum
 import inspect
-import typing
 from collections.abc import Callable, Iterator
+from contextlib import _GeneratorContextManager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -109,6 +109,6 @@ def wrong_arguments(folder: Path) -> Iterator[Call]:
 
 def _called(entry: Callable[..., Any], given: dict[str, Any]) -> None:
     made = entry(**given)
-    if isinstance(made, typing.ContextManager):
+    if isinstance(made, _GeneratorContextManager):
         with made:
             pass
