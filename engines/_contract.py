@@ -22,6 +22,7 @@ def hidden(engine: Engine, profile: str) -> Mapping[str, str]:
     return {**told.get("*", {}), **told.get(profile, {})}
 
 
+@checked_arguments
 def interpreted(engine: Engine, profile: str) -> str:
     """What of an engine's timed runs is Python; empty for nothing."""
     told: Mapping[str, str] = getattr(engine, "interpreted", {})

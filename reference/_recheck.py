@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from crossbody.cases import Mode, Trajectory, _arguments
 from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
+from crossbody.reference._options import Options
 from crossbody.reference._system import System
 from crossbody.reference.sundials.compiled import evaluation
 from crossbody.reference.sundials.compiled.evaluation import Kind
@@ -135,9 +136,7 @@ class _Recheck:
         fast = np.asarray(system.b0) > 0.0
         self.frozen = frozenset() if collisions == "resolved" else frozenset(np.flatnonzero(fast).tolist())
         self.near = _near(run, rtol)
-        times, values = ((), ()) if inputs is None else inputs
-        self.inputs_t: Floats = np.asarray(times, dtype=np.float64)
-        self.inputs_u: Floats = np.asarray(values, dtype=np.float64)
+        self.inputs_t, self.inputs_u = Options(t_end=1.0, inputs=inputs).schedule(system)
         self.speed = np.abs([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)]).max(axis=0)
 
     def between(self) -> Iterator[Violation]:

@@ -335,6 +335,7 @@ class System:
 
         return project(self, *self._state(q, v))
 
+    @checked_arguments
     def checked_state(self, name: str, value: ArrayLike) -> Floats:
         """A copy of q0 or v0.
 

@@ -397,7 +397,7 @@ def _summary_messages() -> bytes:
 
 
 def _mcap_empty_chunks(folder: Path) -> Path:
-    return mcap(folder, DEFINED, chunk(b"") * 200_000, message(1, CDR + bytes(8)))
+    return mcap(folder, DEFINED, chunk(b"") * 200_000)
 
 
 def _mcap_schema(folder: Path) -> Path:

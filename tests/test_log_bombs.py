@@ -17,6 +17,7 @@ import pytest
 from crossbody import hw
 from crossbody.cases import InvalidValue, LogFormatError
 from crossbody.hw import formats
+from crossbody.hw.formats import _messages
 
 BOMBS = {bomb.name: bomb for bomb in log_bombs.bombs()}
 QUICK = (
@@ -108,6 +109,20 @@ def test_a_summary_is_not_unfolded(inside: Callable[[int], bytes], tmp_path: Pat
     path = log_bombs.mcap_summary(lambda: inside(1 << 20), tmp_path)
     with pytest.raises(LogFormatError, match="summary"):
         hw.survey(path)
+
+
+@pytest.mark.parametrize(
+    ("message", "refused"),
+    [
+        ({"a": 1.0, "joints": [{"q": 1.0, "v": 2.0}] * 40}, False),
+        ({"a": 1.0, "cells": [0] * 500_000}, False),
+        ({"a": 1.0, "parts": [{"q": 1.0}] * 20_000}, True),
+        ({"a": 1.0, "parts": [{}] * 20_000}, True),
+        ({"a": 1.0, "parts": [[{"q": 1.0}] * 200] * 200}, True),
+    ],
+)
+def test_messages_full_of_messages_are_refused(message: dict[str, object], refused: bool) -> None:
+    assert bool(_messages.crowded(message)) == refused
 
 
 @pytest.mark.parametrize("many", ["variables", "structs"])
@@ -246,6 +261,7 @@ import sys
 from pathlib import Path
 import pandas, pyarrow as pa
 from crossbody.hw import formats
+from crossbody.hw.formats import _messages
 if sys.argv[2] == "first":
     pa.allocate_buffer(1 << 20)
 reader = formats.open_log(Path(sys.argv[1]))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from entry_points import wrong_arguments
 from wrong_calls import Call, _logs, arguments_of_entry_points, calls, failure, fields_of_a_system
 
 from crossbody import cases
@@ -72,6 +73,14 @@ def test_wrong_arguments_for_logs_are_refused_in_a_sentence(tmp_path: Path) -> N
 @pytest.mark.parametrize("kind", [fields_of_a_system, arguments_of_entry_points])
 def test_every_argument_refuses_every_wrong_value_in_a_sentence(kind: Callable[[], Iterator[Call]]) -> None:
     found = [text for call in kind() if (text := failure(call))]
+    assert not found, "\n".join(text[:300] for text in found[:20])
+
+
+@pytest.mark.parametrize("step", [7, pytest.param(1, marks=pytest.mark.slow)])
+def test_every_public_name_refuses_every_wrong_argument_in_a_sentence(step: int, cheap: Path) -> None:
+    every = list(wrong_arguments(cheap))
+    assert len(every) > 30_000  # the packages were walked
+    found = [text for call in every[::step] if (text := failure(call))]
     assert not found, "\n".join(text[:300] for text in found[:20])
 
 

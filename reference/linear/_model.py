@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import EngineUnavailable, InvalidValue, SceneError, UnknownName
-from crossbody.cases._arrays import frozen
+from crossbody.cases._arrays import frozen, numbers
 from crossbody.cases._entry_points import checked_arguments, checked_fields
 from crossbody.reference._kinds import Floats, Index
 
@@ -88,7 +88,7 @@ class LinearModel:
         Raises:
             InvalidValue: if a frequency is not finite, or is itself a pole.
         """
-        w: Floats = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+        w: Floats = np.atleast_1d(numbers("LinearModel.response", "omega", omega))
         if not np.all(np.isfinite(w)):
             raise InvalidValue(f"LinearModel.response: omega is {w.tolist()}; every frequency must be finite.")
         resolvent = 1j * w[:, None, None] * np.eye(len(self.states)) - self.A
