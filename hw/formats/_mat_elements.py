@@ -14,6 +14,10 @@ HEADER, TAG = 128, 8  # bytes of the file's own header, and of what stands befor
 MATRIX, COMPRESSED = 14, 15  # types of elements
 DEEPEST = 16  # matrices inside one another: structs of structs
 MOST = 100_000  # elements of one struct
+FIRST = 1 << 16  # bytes in which class, shape and name of a variable stand
+LOGICAL = 0x200
+NAMES = "cell struct object char sparse double single int8 uint8 int16 uint16 int32 uint32 int64 uint64 function opaque"
+CLASSES = dict(enumerate(NAMES.split(), start=1))
 PIECE = 1 << 20  # bytes that are unfolded at a time
 
 
@@ -34,6 +38,46 @@ def starts(path: Path) -> list[int]:
             file.seek(at)
             at += TAG + _tag(file.read(TAG), order)[1]
     return found
+
+
+def described(path: Path, start: int) -> tuple[str, tuple[int, ...], str]:
+    """Name, shape and class of a variable, from the first bytes of it: a compressed one is not unfolded for them.
+
+    Args:
+        path: the file.
+        start: where the variable begins, of `starts`.
+
+    Raises:
+        LogFormatError: if these bytes are no beginning of a variable.
+    """
+    with path.open("rb") as file:
+        order = _order(file.read(HEADER))
+        file.seek(start)
+        kind, size = _tag(file.read(TAG), order)
+        raw = file.read(min(size, FIRST))
+    head = zlib.decompressobj().decompress(raw, FIRST)[TAG:] if kind == COMPRESSED else raw
+    try:
+        flags, at = _element(head, 0, order)
+        (word,) = struct.unpack(order + "I", flags[:4])
+        found = "logical" if word & LOGICAL else CLASSES[word & 0xFF]
+        if found == "opaque":
+            return _element(head, at, order)[0].decode("latin-1"), (), found
+        dims, at = _element(head, at, order)
+        name, _ = _element(head, at, order)
+        return name.decode("latin-1"), struct.unpack(f"{order}{len(dims) // 4}i", dims), found
+    except (struct.error, KeyError):
+        raise LogFormatError(path, f"has no MAT v5 variable at byte {start}.") from None
+
+
+def _element(raw: bytes, at: int, order: str) -> tuple[bytes, int]:
+    """The data of an element, and where the next one begins; a small one keeps its data in its own tag."""
+    (word,) = struct.unpack(order + "I", raw[at : at + 4])
+    if word >> 16:
+        return raw[at + 4 : at + 4 + min(word >> 16, 4)], at + TAG
+    _, size = _tag(raw[at : at + TAG], order)
+    if at + TAG + size > len(raw):
+        raise struct.error
+    return raw[at + TAG : at + TAG + size], at + TAG + size + -size % 8
 
 
 def whole_variable(path: Path, start: int, budget: Budget) -> io.BytesIO:

@@ -14,7 +14,7 @@ from crossbody.hw.formats._budget import current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._grouping import HINT, Table, cut, grouped, layout, places
 from crossbody.hw.formats._guard import library, parsing
-from crossbody.hw.formats._mat_elements import starts, whole_variable
+from crossbody.hw.formats._mat_elements import described, starts, whole_variable
 
 SUFFIXES = (".mat",)
 NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
@@ -38,25 +38,25 @@ class MatReader:
     """Numeric arrays, also those in structs; `s.signals.values[1]` is the second column of that field."""
 
     def __init__(self, path: Path) -> None:
-        from scipy.io import whosmat
-
         self._path = path
         self._budget = current(path)
         self.library = library("scipy")
         self.refused: dict[str, str] = {}
         self._tables: list[Table] = []
         self._structs: dict[str, Any] = {}
+        self._begins: dict[str, int] = {}
         with parsing(path, "MAT file"):
-            begins = starts(path)
-            listed = whosmat(path)
-            for start, (name, shape, kind) in zip(begins, listed, strict=False):
-                self._list(start, str(name), tuple(map(int, shape)), str(kind))
+            for start in starts(path):
+                name, shape, kind = described(path, start)
+                self._begins[name] = start
+                self._list(name, shape, kind)
+                self._budget.spend(0)
         self.groups = grouped(self._tables)
         self._places = places(self._tables)
 
-    def _list(self, start: int, name: str, shape: tuple[int, ...], kind: str) -> None:
+    def _list(self, name: str, shape: tuple[int, ...], kind: str) -> None:
         if kind == "struct":
-            self._structs[name] = self._struct(start, name)
+            self._structs[name] = self._variable(name)
             self._walk(name, name, self._structs[name])
         elif kind not in NUMBERS:
             self.refused[name] = f"is a MATLAB {kind}: {HINT}"
@@ -81,25 +81,20 @@ class MatReader:
         else:
             self.refused[name] = f"is a MATLAB {_kind(value)}: {HINT}"
 
-    def _struct(self, start: int, name: str) -> Any:
-        """A struct, decoded once: what it holds is only known when it has been."""
+    def _variable(self, name: str) -> Any:
+        """A variable, decoded by itself; what a struct holds is only known when it has been."""
         from scipy.io import loadmat
 
-        whole: Any = whole_variable(self._path, start, self._budget)
+        whole: Any = whole_variable(self._path, self._begins[name], self._budget)
         return loadmat(whole, mat_dtype=False)[name]
 
     def _load(self, tables: Iterable[Table]) -> dict[str, Any]:
         """The variables of some columns, whole."""
-        from scipy.io import loadmat
-
         plain = {table.key: table for table in tables if table.key not in self._structs}
         size = sum(table.rows * (table.width or 1) * np.dtype(table.type).itemsize for table in plain.values())
         self._budget.hold(size, "what the columns announce")
-        if not plain:
-            return self._structs
         with parsing(self._path, "MAT file"):
-            found: dict[str, Any] = loadmat(self._path, variable_names=list(plain), mat_dtype=False)
-        return {**self._structs, **found}
+            return self._structs | {key: self._variable(key) for key in plain}
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`. A MAT variable can only be read whole, so the wanted ones are in memory together."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats import Group, Reader
+from crossbody.hw.formats._budget import current
 from crossbody.hw.reading.clock_guess import unit_of_ticks
 from crossbody.hw.reading.plan import Plan, Source
 from crossbody.hw.reading.rows import Floats, Rows
@@ -44,6 +45,7 @@ class Stream:
             rows = rows[kept]
             time = self._time(block, kept, counted, len(rows))
             counted += len(rows)
+            current(plan.path).hold(8 * len(rows) * len(own), f"one block of {len(own)} signals")
             yield Rows(rows=rows, time=time, values=tuple(s.to_si(block[s.signal.column][kept]) for s in own))
 
     def _time(self, block: dict[str, NDArray[Any]], kept: Any, counted: int, size: int) -> Floats:
