@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from crossbody.cases import SceneError
 from crossbody.cases._arguments import flag, shown
 from crossbody.cases._arrays import frozen, full, is_number
-from crossbody.cases._entry_points import checked_arguments, finite
+from crossbody.cases._entry_points import checked_arguments, finite, wholes
 from crossbody.reference import kernels as kernel_types
 from crossbody.reference._indices import different
 from crossbody.reference._kinds import Bytes, Floats, Index
@@ -117,7 +117,7 @@ class System:
             raise SceneError(f"System.unilateral is {shown(self.unilateral)}; valid: True, False.")
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
-        put(self, "redundant", different("System.redundant", np.asarray(self.redundant, dtype=np.int64).tolist(), nc))
+        put(self, "redundant", different("System.redundant", wholes("System.redundant", self.redundant), nc))
         if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
             raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters

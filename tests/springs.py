@@ -34,12 +34,16 @@ def system_of(case: Any) -> Any:
     return module(CASE).system(case.parameters, case.law)
 
 
+def springs(M: Any, K: Any, g: Any, H: Any, c: Any, a0: float, a1: float) -> Any:
+    """The system M q'' = g - K q beside walls h = H q + c that all have the same constants."""
+    rows = len(H)
+    law = Law(a0=np.full(rows, a0), a1=np.full(rows, a1), a2=np.zeros(rows), unilateral=np.ones(rows, dtype=bool))
+    return module(CASE).from_numbers(np.concatenate([np.ravel(part) for part in (M, K, g, c, H)]), len(M), law)
+
+
 def beside(x: Any, a0: float, a1: float, order: Any) -> Any:
     """The system of `Numbers` with its rows in another order."""
-    kernels, rows = module(CASE), len(x.H)
-    parts = (x.M, x.K, x.g, x.c[order], x.H[order])
-    law = Law(a0=np.full(rows, a0), a1=np.full(rows, a1), a2=np.zeros(rows), unilateral=np.ones(rows, dtype=bool))
-    return kernels.from_numbers(np.concatenate([np.ravel(part) for part in parts]), len(x.M), law)
+    return springs(x.M, x.K, x.g, x.H[order], x.c[order], a0, a1)
 
 
 def inside(seed: int) -> tuple[Any, float, float]:

@@ -341,7 +341,7 @@ def test_a_folder_in_place_of_a_file_is_told_and_written_over(folder, capsys):
         (folder / (taken + CODE)).mkdir()
     (folder / (other + CODE) / "mine").touch()
     assert store.read(name) is store.read(other) is None
-    assert capsys.readouterr().err.count("is no file; it is compiled again") == 2
+    assert capsys.readouterr().err.count("(it is a folder, a pipe or a device); it is compiled again") == 2
     store.write(name, b"code")
     store.write(other, b"code")
     assert store.read(name) == b"code"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mechanisms import flyby
-from random_walls import springs
+from springs import springs
 
 from crossbody.cases import Mode, Trajectory
 from crossbody.reference import System, simulate
