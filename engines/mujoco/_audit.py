@@ -12,6 +12,7 @@ from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._scene import Scene
 
 
@@ -26,9 +27,7 @@ def audit(case: Case, scene: Scene, matched: bool) -> Mapping[str, Any]:
 
     def M(q: Floats) -> Floats:
         look(q, np.zeros(model.nv))
-        full = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, full)
-        return full
+        return mass_matrix(model, data)
 
     def bias(q: Floats, v: Floats) -> Floats:
         look(q, v)

@@ -30,6 +30,7 @@ from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases._arrays import Floats
 from crossbody.engines._linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
+from crossbody.engines.mujoco._observe import mass_matrix
 
 EPS = 1e-5
 """Step of the centred differences, in the units of the coordinates."""
@@ -153,9 +154,9 @@ def _logarithm(transition: Floats, dt: float) -> Floats:
 
 def _pressed(stand: Stand, slope: Callable[[], Floats]) -> Floats:
     """The derivative at the multipliers of the equilibrium, where rows of little force are pressed for it."""
-    data, mass = stand.data, np.zeros((stand.model.nv,) * 2)
+    data = stand.data
     mujoco.mj_forward(stand.model, data)
-    mujoco.mj_fullM(stand.model, data, mass)
+    mass = mass_matrix(stand.model, data)
     J = np.array(data.efc_J).reshape(-1, stand.model.nv)[np.isin(data.efc_type, ONE_WAY)]
     if not len(J):
         return slope()

@@ -16,6 +16,7 @@ from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import captured, hooked
 from crossbody.engines.mujoco._maze_charts import Charts
 from crossbody.engines.mujoco._maze_model import PHI, RHO, THETA, X, Y
+from crossbody.engines.mujoco._observe import mass_matrix
 
 FLYING = [THETA, X, Y, PHI]
 """The case's coordinates among the model's."""
@@ -66,9 +67,7 @@ def _shown(
 
     def M(q: Floats) -> Floats:
         look(q, np.zeros(4))
-        full = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, full)
-        return full[np.ix_(rows, rows)]
+        return mass_matrix(model, data)[np.ix_(rows, rows)]
 
     def bias(q: Floats, v: Floats) -> Floats:
         look(q, v)

@@ -31,3 +31,10 @@ def of_equalities(model: Any) -> Observe:
         return np.array(gaps), energy
 
     return observe
+
+
+def mass_matrix(model: Any, data: Any) -> Floats:
+    """Return the dense M (nv, nv) at the state that was looked at last."""
+    full: Floats = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    return full

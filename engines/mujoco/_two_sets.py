@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +22,7 @@ from crossbody.engines._log import Modes
 from crossbody.engines._machines import elastic_part
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._globals import Hook
+from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._pairs import FAR, FREE, Pairs
 
 CONTACT, COLLISION = int(Mode.CONTACT), int(Mode.COLLISION)
@@ -99,8 +99,7 @@ class TwoSets(Pairs):
         d, nv = self.data, self.model.nv
         rows, at = self._there()
         where = np.array(at)[np.argsort(rows)]
-        H, M = np.array(d.efc_J).reshape(-1, nv)[where], np.zeros((nv, nv))
-        mujoco.mj_fullM(self.model, d, M)
+        H, M = np.array(d.efc_J).reshape(-1, nv)[where], mass_matrix(self.model, d)
         lam: Floats = np.linalg.solve(H @ np.linalg.solve(M, H.T), d.efc_aref[where] - H @ d.qacc_smooth)
         return H, lam
 

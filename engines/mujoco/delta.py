@@ -22,7 +22,7 @@ from crossbody.engines.mujoco._delta_model import compiled
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
 from crossbody.engines.mujoco._linear import Stand
-from crossbody.engines.mujoco._observe import of_equalities
+from crossbody.engines.mujoco._observe import mass_matrix, of_equalities
 from crossbody.engines.mujoco._scene import Scene
 
 HELD = (int(Mode.BILATERAL),) * 6
@@ -121,8 +121,7 @@ def _audit(case: Case, scene: Scene, matched: bool) -> dict[str, Any]:
 
     def terms(r: Floats, rd: Floats) -> tuple[Floats, Floats, Floats]:
         look(r, rd)
-        M = np.zeros((9, 9))
-        mujoco.mj_fullM(model, data, M)
+        M = mass_matrix(model, data)
         return M, data.qfrc_bias - data.qfrc_passive - data.qfrc_applied, np.array(data.efc_J).reshape(6, 9)
 
     def lam(q: Floats, v: Floats) -> Floats:

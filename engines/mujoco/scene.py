@@ -20,6 +20,7 @@ from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces, tendons
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
+from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._scene import Scene as Prepared
 
 SLOWEST, OF_RATE = 1e-3, 0.02
@@ -57,8 +58,7 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = q, v
     mujoco.mj_forward(model, data)
-    M, n, forces, step = np.zeros((model.nv, model.nv)), model.nv, Forces(scene), 1e-6
-    mujoco.mj_fullM(model, data, M)
+    M, n, forces, step = mass_matrix(model, data), model.nv, Forces(scene), 1e-6
     lift = step * np.eye(n)
 
     def moved(d: Floats) -> Floats:
@@ -259,9 +259,7 @@ def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
 
     def M(q: Floats) -> Floats:
         look(q, np.zeros(model.nv))
-        full = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, full)
-        return full
+        return mass_matrix(model, data)
 
     def bias(q: Floats, v: Floats) -> Floats:
         look(q, v)

@@ -22,6 +22,7 @@ from crossbody.engines._soft_contact import NAMES, SoftContact
 from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
 from crossbody.engines.mujoco._linear import Stand
+from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._pairs import add_pairs
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._two_sets import TwoSets
@@ -232,9 +233,7 @@ def _listed(scene: Scene, own: SoftContact, case: Case, tree: Floats) -> dict[st
 
     def M(q: Floats) -> Floats:
         look(q, np.zeros(n))
-        full = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, full)
-        found: Floats = (back.T @ full @ back)[:n, :n]
+        found: Floats = (back.T @ mass_matrix(model, data) @ back)[:n, :n]
         return found
 
     def bias(q: Floats, v: Floats) -> Floats:

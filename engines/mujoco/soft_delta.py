@@ -35,6 +35,7 @@ from crossbody.engines.mujoco._delta_model import FLAGS, text
 from crossbody.engines.mujoco._direct import law_of, without_regularisation
 from crossbody.engines.mujoco._globals import Hook, captured, hooked
 from crossbody.engines.mujoco._linear import Stand
+from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._pairs import Pairs, add_pairs
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._two_sets import TwoSets
@@ -183,9 +184,8 @@ def _listed(scene: Scene, own: SoftDelta, case: Case) -> dict[str, Any]:
     model, data, still = scene.model, scene.data, np.zeros(len(case.q0))
 
     def terms(q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        at, M = _look(scene, q, v), np.zeros((NV, NV))
-        mujoco.mj_fullM(model, data, M)
-        return linear(*at, M, data.qfrc_bias - data.qfrc_passive - data.qfrc_applied)
+        at = _look(scene, q, v)
+        return linear(*at, mass_matrix(model, data), data.qfrc_bias - data.qfrc_passive - data.qfrc_applied)
 
     def lam(q: Floats, v: Floats) -> Floats:
         _look(scene, q, v)

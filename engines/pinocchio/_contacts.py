@@ -11,6 +11,7 @@ import pinocchio as pin
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.engines._contacts import Contacts, Pose, Touch, gradient
+from crossbody.engines.pinocchio._rows import point_jacobian
 
 TURN = 1e-3
 """Angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it."""
@@ -67,11 +68,4 @@ class ContactRows:
         return world.rotation, world.translation
 
     def _velocity(self, body: str, point: Floats) -> Floats:
-        """Return the Jacobian (3, nv) of a point's velocity."""
-        carrier = self.placed[body][0]
-        if carrier == 0:
-            return np.zeros((3, self.model.nv))
-        J = pin.getJointJacobian(self.model, self.data, carrier, pin.LOCAL_WORLD_ALIGNED)
-        arm = pin.skew(point - self.data.oMi[carrier].translation)
-        linear: Floats = J[:3] - arm @ J[3:]
-        return linear
+        return point_jacobian(self.model, self.data, self.placed[body][0], point)

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Loop
-from crossbody.engines.pinocchio._rows import Solve, mass_matrix
+from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian
 
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
 AXES = pin.LOCAL_WORLD_ALIGNED
@@ -44,16 +44,11 @@ class Joined:
     def jacobian(self, q: Floats) -> Floats:
         """Return H (3 loops, nv)."""
         pin.computeJointJacobians(self.model, self.data, q)
-        found = [[self._moved(joint, point) for joint, point in ends] for ends in self.ends]
+        found = [
+            [point_jacobian(self.model, self.data, joint, self.data.oMi[joint].act(point)) for joint, point in ends]
+            for ends in self.ends
+        ]
         return np.array([one - other for one, other in found]).reshape(-1, self.model.nv)
-
-    def _moved(self, joint: int, point: Floats) -> Floats:
-        if joint == 0:
-            return np.zeros((3, self.model.nv))
-        J = pin.getJointJacobian(self.model, self.data, joint, AXES)
-        arm = self.data.oMi[joint].rotation @ point
-        moved: Floats = J[:3] - pin.skew(arm) @ J[3:]
-        return moved
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (3 loops,)."""

@@ -61,6 +61,15 @@ def mass_matrix(model: Any, data: Any, q: Floats) -> Floats:
     return full
 
 
+def point_jacobian(model: Any, data: Any, joint: int, point: Floats) -> Floats:
+    """Jacobian (3, nv) of the velocity of a point in the world that a joint carries, after computeJointJacobians."""
+    if joint == 0:
+        return np.zeros((3, model.nv))
+    J = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
+    linear: Floats = J[:3] - pin.skew(point - data.oMi[joint].translation) @ J[3:]
+    return linear
+
+
 class PinRows:
     """Rows of a mechanism; see `crossbody.engines._machines.Rows`.
 

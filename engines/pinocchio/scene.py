@@ -15,7 +15,7 @@ from crossbody.engines import _scene as parts
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, by_least_norm
-from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix
+from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 
@@ -69,7 +69,8 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
     start = to.theirs(case.q0)
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, forces, heights, to), sizes=(np.ones(to.nq), np.ones(to.nv)),
+        rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
+        sizes=(np.ones(to.nq), np.ones(to.nv)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
@@ -132,18 +133,17 @@ def lifted(scene: Scene, model: Any, data: Any, placed: Placed, q: Floats) -> Fl
     pin.computeJointJacobians(model, data, q)
     for body in spared:
         carrier, pose = placed[body.name]
-        world = data.oMi[carrier] * pose
-        J = pin.getJointJacobian(model, data, carrier, pin.LOCAL_WORLD_ALIGNED)
-        arm = world.act(np.array(body.com)) - data.oMi[carrier].translation
+        centre = (data.oMi[carrier] * pose).act(np.array(body.com))
         force = -body.weightless * body.mass * np.array(scene.gravity)
-        total += J[:3].T @ force + J[3:].T @ np.cross(arm, force)
+        total += point_jacobian(model, data, carrier, centre).T @ force
     return total
 
 
-def _observe(scene: Scene, model: Any, forces: parts.Forces, heights: Heights, to: Coordinates) -> Any:
+def _observe(
+    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, heights: Heights, to: Coordinates
+) -> Any:  # fmt: skip
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
-    placed = tree(scene)[1]
 
     def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
         energy: Floats = np.empty((len(q), 2))

@@ -15,6 +15,8 @@ Jet = Any
 """(x, x', x'')."""
 Vector = Any
 """Three jets."""
+Point = Any
+"""Three numbers."""
 
 
 @kernels.helper
@@ -88,6 +90,6 @@ def moved(x: Vector, c: float, y: Vector) -> Vector:
 
 
 @kernels.helper
-def value(x: Vector) -> tuple[Any, Any, Any]:
+def value(x: Vector) -> Point:
     """Return what a vector is now."""
     return x[0][0], x[1][0], x[2][0]

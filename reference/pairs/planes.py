@@ -10,6 +10,7 @@ from typing import Any
 
 from crossbody.reference import kernels
 from crossbody.reference.pairs.jets import (
+    Point,
     Vector,
     add,
     apart,
@@ -23,8 +24,6 @@ from crossbody.reference.pairs.jets import (
     value,
 )
 
-Point = Any
-"""Three numbers."""
 Gap = Any
 """A jet, the normal and the lowest point."""
 

@@ -12,56 +12,21 @@ from crossbody.reference import kernels
 from crossbody.reference._kinds import Array
 from crossbody.reference.pairs import layout, planes, solids
 from crossbody.reference.pairs.jets import moved, shifted, value
-from crossbody.reference.tree import layout as tree
-from crossbody.reference.tree.sweeps import cross
+from crossbody.reference.tree.points import direction, point, pull
 
 
 @kernels.helper
 def _point(p: Array, w: Array, o: int) -> Any:
     """Return the origin of the shape at p[o:] and its motion."""
-    node, k = int(p[o + layout.NODE].real), o + layout.POSE
-    zero = 0.0 * w[0]
-    if node < 0:
-        return (p[k + 9] + zero, zero, zero), (p[k + 10] + zero, zero, zero), (p[k + 11] + zero, zero, zero)
-    x = tree.NODE_SCRATCH * node
-    a, b, c = p[k + 9], p[k + 10], p[k + 11]
-    r = (
-        w[x] * a + w[x + 1] * b + w[x + 2] * c + w[x + 9],
-        w[x + 3] * a + w[x + 4] * b + w[x + 5] * c + w[x + 10],
-        w[x + 6] * a + w[x + 7] * b + w[x + 8] * c + w[x + 11],
-    )
-    root = tree.NODE_SCRATCH * int(p[int(p[tree.AT_NODE].real) + tree.NODE * node + tree.ROOT].real)
-    d0, d1, d2 = r[0] - w[root + 9], r[1] - w[root + 10], r[2] - w[root + 11]
-    y, z, g = x + tree.V_AT, x + tree.A_AT, tree.GRAVITY
-    u = cross(w[y], w[y + 1], w[y + 2], d0, d1, d2)
-    u0, u1, u2 = u[0] + w[y + 3], u[1] + w[y + 4], u[2] + w[y + 5]
-    e = cross(w[z], w[z + 1], w[z + 2], d0, d1, d2)
-    f = cross(w[y], w[y + 1], w[y + 2], u0, u1, u2)
-    # The sweep holds the weight as an acceleration of the world; here it is taken out again.
-    return (
-        (r[0], u0, w[z + 3] + p[g] + e[0] + f[0]),
-        (r[1], u1, w[z + 4] + p[g + 1] + e[1] + f[1]),
-        (r[2], u2, w[z + 5] + p[g + 2] + e[2] + f[2]),
-    )
+    k = o + layout.POSE + 9
+    return point(p, w, int(p[o + layout.NODE].real), p[k], p[k + 1], p[k + 2])
 
 
 @kernels.helper
 def _axis(p: Array, w: Array, o: int, column: int) -> Any:
     """Return an axis of the shape at p[o:] and its motion."""
-    node, k = int(p[o + layout.NODE].real), o + layout.POSE + column
-    zero = 0.0 * w[0]
-    if node < 0:
-        return (p[k] + zero, zero, zero), (p[k + 3] + zero, zero, zero), (p[k + 6] + zero, zero, zero)
-    x = tree.NODE_SCRATCH * node
-    a, b, c = p[k], p[k + 3], p[k + 6]
-    r0 = w[x] * a + w[x + 1] * b + w[x + 2] * c
-    r1 = w[x + 3] * a + w[x + 4] * b + w[x + 5] * c
-    r2 = w[x + 6] * a + w[x + 7] * b + w[x + 8] * c
-    y, z = x + tree.V_AT, x + tree.A_AT
-    u = cross(w[y], w[y + 1], w[y + 2], r0, r1, r2)
-    e = cross(w[z], w[z + 1], w[z + 2], r0, r1, r2)
-    f = cross(w[y], w[y + 1], w[y + 2], u[0], u[1], u[2])
-    return (r0, u[0], e[0] + f[0]), (r1, u[1], e[1] + f[1]), (r2, u[2], e[2] + f[2])
+    k = o + layout.POSE + column
+    return direction(w, int(p[o + layout.NODE].real), p[k], p[k + 3], p[k + 6])
 
 
 @kernels.helper
@@ -137,25 +102,7 @@ def touch(p: Array, w: Array, o: int, place: int) -> Any:
 
 
 @kernels.helper
-def _pull(p: Array, w: Array, node: int, sign: float, n: Any, at: Any, H: Array) -> None:
-    """Add what a unit force along n at a point of a node is in the velocities on the way to the world."""
-    if node < 0:
-        return
-    o = int(p[tree.AT_NODE].real) + tree.NODE * node
-    root = tree.NODE_SCRATCH * int(p[o + tree.ROOT].real)
-    m0, m1, m2 = cross(at[0] - w[root + 9], at[1] - w[root + 10], at[2] - w[root + 11], n[0], n[1], n[2])
-    kind, j = int(p[o + tree.TYPE].real), int(p[o + tree.V].real)
-    j += 0 if kind >= tree.SLIDE else (5 if kind == tree.FREE else 2)
-    spaces, at_dof = tree.NODE_SCRATCH * int(p[tree.NODES].real), int(p[tree.AT_DOF].real)
-    while j >= 0:
-        s = spaces + tree.DOF_SCRATCH * j
-        along_n = w[s + 3] * n[0] + w[s + 4] * n[1] + w[s + 5] * n[2]
-        H[j] += sign * (w[s] * m0 + w[s + 1] * m1 + w[s + 2] * m2 + along_n)
-        j = int(p[at_dof + tree.DOF * j].real)
-
-
-@kernels.helper
 def gradient(p: Array, w: Array, o: int, n: Any, at: Any, H: Array) -> None:
     """Add H of the pair at p[o:] whose shapes would meet at a point with normal n."""
-    _pull(p, w, int(p[o + layout.FIRST + layout.NODE].real), -1.0, n, at, H)
-    _pull(p, w, int(p[o + layout.SECOND + layout.NODE].real), 1.0, n, at, H)
+    pull(p, w, int(p[o + layout.FIRST + layout.NODE].real), -1.0, n, at, H)
+    pull(p, w, int(p[o + layout.SECOND + layout.NODE].real), 1.0, n, at, H)

@@ -14,6 +14,7 @@ import numpy as np
 from crossbody.reference import kernels
 from crossbody.reference.pairs.jets import (
     Jet,
+    Point,
     Vector,
     add,
     along,
@@ -28,8 +29,6 @@ from crossbody.reference.pairs.jets import (
     value,
 )
 
-Point = Any
-"""Three numbers."""
 PARALLEL = 1e-8
 """Square of the sine below which two segments have no nearest points to more than half of the digits."""
 Distance = Any

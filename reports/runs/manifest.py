@@ -27,7 +27,6 @@ JUDGED = frozenset({"run", "replay", "identify"})
 ASSETS = frozenset({"plotly.min.js", "crossbody.css", "crossbody.js"})
 _TABLE = re.compile(r"[a-z][a-z_-]*\.(json|csv|parquet)")
 _MOTION = re.compile(r"traces/[0-9]{4,}\.parquet")
-_GIVEN = re.compile(r"(verdicts|audit|provenance)\.(json|csv|parquet)|traces/[0-9]{4,}\.parquet|index\.html")
 _BASE = re.compile(r"(verdicts|audit|provenance)\.(json|csv|parquet)")
 
 
@@ -39,6 +38,11 @@ def is_page(name: str) -> bool:
 def is_table(name: str) -> bool:
     """Whether a file may be a table of a study."""
     return _TABLE.fullmatch(name) is not None
+
+
+def _is_given(name: str) -> bool:
+    """Whether only crossbody gives this name."""
+    return is_base(name) or _MOTION.fullmatch(name) is not None or name in ASSETS or name == "index.html"
 
 
 def is_base(name: str) -> bool:
@@ -130,7 +134,7 @@ def _unchanged(folder: Path, sums: Mapping[str, str]) -> Iterator[str]:
     known = {name for name in plain if os.path.lexists(folder / name) and _is_generated(folder, name)}
     for name, told in sums.items():
         try:
-            if _GIVEN.fullmatch(name) or name in ASSETS or name in known or files.digest(folder, name) == told:
+            if _is_given(name) or name in known or files.digest(folder, name) == told:
                 yield name
         except FileNotFoundError:
             yield name

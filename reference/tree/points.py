@@ -1,0 +1,78 @@
+"""Points and directions that a node carries: how they move, and what a force there is along the joints.
+
+With the motion (w, l) and acceleration (c, b) of a node about the reference point O of its tree, a point at r from
+O has
+
+    x' = l + w x r,    x'' = b + c x r + w x x'        and columns  S_lin + S_ang x r  along its joints.
+
+The world's acceleration -g, which stands for the weight, is in b of every node: it is taken off.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference import kernels
+from crossbody.reference._kinds import Array
+from crossbody.reference.tree import layout
+from crossbody.reference.tree.sweeps import cross, turned
+
+
+@kernels.helper
+def _root(p: Array, node: int) -> int:
+    """Return where the pose of the root of a node's tree stands in the scratch."""
+    return layout.NODE_SCRATCH * int(p[int(p[layout.AT_NODE].real) + layout.NODE * node + layout.ROOT].real)
+
+
+@kernels.helper
+def point(p: Array, w: Array, node: int, a: Any, b: Any, c: Any) -> Any:
+    """Return three times place, velocity and acceleration at v' = 0 of a point in a node's frame; node -1 rests."""
+    zero = 0.0 * w[0]
+    if node < 0:
+        return (a + zero, zero, zero), (b + zero, zero, zero), (c + zero, zero, zero)
+    x, root, g = layout.NODE_SCRATCH * node, _root(p, node), layout.GRAVITY
+    y, z = x + layout.V_AT, x + layout.A_AT
+    r0, r1, r2 = turned(w, x, a, b, c)
+    r0, r1, r2 = r0 + w[x + 9], r1 + w[x + 10], r2 + w[x + 11]
+    d0, d1, d2 = r0 - w[root + 9], r1 - w[root + 10], r2 - w[root + 11]
+    u0, u1, u2 = cross(w[y], w[y + 1], w[y + 2], d0, d1, d2)
+    u0, u1, u2 = u0 + w[y + 3], u1 + w[y + 4], u2 + w[y + 5]
+    e = cross(w[z], w[z + 1], w[z + 2], d0, d1, d2)
+    f = cross(w[y], w[y + 1], w[y + 2], u0, u1, u2)
+    return (
+        (r0, u0, w[z + 3] + p[g] + e[0] + f[0]),
+        (r1, u1, w[z + 4] + p[g + 1] + e[1] + f[1]),
+        (r2, u2, w[z + 5] + p[g + 2] + e[2] + f[2]),
+    )
+
+
+@kernels.helper
+def direction(w: Array, node: int, a: Any, b: Any, c: Any) -> Any:
+    """Return the same of a direction in a node's frame."""
+    zero = 0.0 * w[0]
+    if node < 0:
+        return (a + zero, zero, zero), (b + zero, zero, zero), (c + zero, zero, zero)
+    x = layout.NODE_SCRATCH * node
+    y, z = x + layout.V_AT, x + layout.A_AT
+    r0, r1, r2 = turned(w, x, a, b, c)
+    u = cross(w[y], w[y + 1], w[y + 2], r0, r1, r2)
+    e = cross(w[z], w[z + 1], w[z + 2], r0, r1, r2)
+    f = cross(w[y], w[y + 1], w[y + 2], u[0], u[1], u[2])
+    return (r0, u[0], e[0] + f[0]), (r1, u[1], e[1] + f[1]), (r2, u[2], e[2] + f[2])
+
+
+@kernels.helper
+def pull(p: Array, w: Array, node: int, sign: float, n: Any, at: Any, H: Array) -> None:
+    """Add what a force of size `sign` along n at a place of a node is in the velocities on the way to the world."""
+    if node < 0:
+        return
+    o, root = int(p[layout.AT_NODE].real) + layout.NODE * node, _root(p, node)
+    m0, m1, m2 = cross(at[0] - w[root + 9], at[1] - w[root + 10], at[2] - w[root + 11], n[0], n[1], n[2])
+    kind, j = int(p[o + layout.TYPE].real), int(p[o + layout.V].real)
+    j += 5 if kind == layout.FREE else (2 if kind == layout.BALL else 0)
+    spaces, at_dof = layout.NODE_SCRATCH * int(p[layout.NODES].real), int(p[layout.AT_DOF].real)
+    while j >= 0:
+        s = spaces + layout.DOF_SCRATCH * j
+        along = w[s + 3] * n[0] + w[s + 4] * n[1] + w[s + 5] * n[2]
+        H[j] += sign * (w[s] * m0 + w[s + 1] * m1 + w[s + 2] * m2 + along)
+        j = int(p[at_dof + layout.DOF * j].real)
