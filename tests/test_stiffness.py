@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from mechanisms import ball, flyby
 
+from crossbody import cases, engines
 from crossbody.cases import Mode
 from crossbody.reference import System, kernels, simulate
-from crossbody.reference.core import esdirk
+from crossbody.reference.core import algebra, esdirk
 from crossbody.reference.systems import ball as ball_kernels
 
 
@@ -29,6 +30,27 @@ def test_order_conditions():
         assert value == pytest.approx(wanted, abs=1e-15)
     far = 1.0 - 1e8 * b @ np.linalg.solve(np.eye(6) + 1e8 * A, np.ones(6))
     assert abs(far) < 1e-6, "L-stable"
+
+
+def test_a_linear_system_is_solved_whatever_rows_are_exchanged():
+    """Rows of sizes that differ make the factors exchange some that hold parts of earlier columns."""
+    rng = np.random.default_rng(31)
+    for _ in range(300):
+        n = int(rng.integers(1, 9))
+        A, x = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-2.0, 2.0, (n, 1)), rng.normal(size=n)
+        factors, pivot, solution = A.copy(), np.zeros(n, dtype=np.int64), A @ x
+        assert algebra.factor_lu.py_func(factors, n, pivot) == 0
+        algebra.solve_lu.py_func(factors, n, pivot, solution)
+        assert solution == pytest.approx(x, abs=1e-13 * np.linalg.cond(A))
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_a_rest_that_is_held_by_many_rows_is_walked_through_in_long_steps(rtol):
+    """Newton's method arrives at once in what is all but linear: an implicit step is seldom refused, or taken anew."""
+    run = engines.load("reference").prepare(cases.load("ball_maze", variant="inside"), "compiled", rtol=rtol).run()
+    assert run.counts["implicit_steps"] > 0.9 * run.steps
+    assert run.counts["rejected"] < 0.25 * run.steps
+    assert run.counts["rhs"] < 30 * run.steps
 
 
 @pytest.mark.parametrize("a0", [1e4, 1e6, 1e8, 1e10, 1e12])

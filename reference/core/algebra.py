@@ -138,9 +138,10 @@ def factor_lu(A: Floats, n: int, pivot: Index) -> int:
 
 @compiled
 def solve_lu(A: Floats, n: int, pivot: Index, x: Array) -> None:
-    """X := A^-1 x, in place."""
+    """X := A^-1 x, in place; rows were exchanged with all that stood in them, so that every exchange comes first."""
     for c in range(n):
         x[c], x[pivot[c]] = x[pivot[c]], x[c]
+    for c in range(n):
         for i in range(c + 1, n):
             x[i] -= A[i, c] * x[c]
     for i in range(n - 1, -1, -1):
