@@ -116,7 +116,7 @@ def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 def _land(K: Any, s: Any, m: Model, w: Work) -> None:
     """End the step where the first guard fired."""
     dense.state(s, m, w, s.theta, w.y1)
-    dense.put_on_rows(K, s, m, w, s.theta, w.y1)
+    dense.put_on_rows(K, s, m, w, s.theta, w.y1, dense.ARRIVED)
     if s.ledger and s.method != EXACT:
         dense.ledger(s, w, s.theta, w.z1)
 

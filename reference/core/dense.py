@@ -15,7 +15,7 @@ CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one
 RESOLVED = 2.0  # |p| h of the rows' fastest pole p, above which a step tells a gap worse than its law does
 BEND_PART = 1e-3  # of the step, along which the slope of q' is taken
 ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's: rounding,
-ARRIVED_PART = 0.1  # or this part of the relative tolerance
+ARRIVED_PART = 0.1  # or this part of the relative tolerance, where nothing is switched
 
 
 @compiled
@@ -118,14 +118,21 @@ def _shift(K: Any, s: Any, m: Model, w: Work, t: float, q: Array) -> None:
         q[i] += w.turn[i] - w.place[i]
 
 
+@inlined
+def tolerated(s: Any) -> float:
+    """What may be left of the rows' law where a motion is watched or written down."""
+    return float(max(ARRIVED, ARRIVED_PART * s.rtol))
+
+
 @compiled
-def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> bool:
+def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array, left: float) -> bool:
     """Move out = (q, v), at the part theta of a step that is long for the rows, to where their law has their gaps.
 
     A gap under a linear law is known in closed form whatever the masses do. A long step knows it to the tolerance only,
     and the interpolant across curved rows no better: times a0 that drowns the multiplier of a stiff row, and its root
     is the rate of a row that is let go from rest and falls back. The correction is the least one in the metric of M.
-    Rows with a cubic term that counts are left as they are.
+    Rows with a cubic term that counts are left as they are. `left` is the part of the terms behind a multiplier that
+    the law may still be off by.
 
     Returns:
         Whether the workspace holds the acceleration and the multipliers there, so that they need not be evaluated.
@@ -145,7 +152,7 @@ def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> 
             # A law without a0 has no memory of a position: its gap may be anything, and only its rate is the law's.
             w.r[j], w.rate[j] = h - w.ha[j] if a0 > 0.0 else 0.0, hd - w.hda[j]
             missing = max(missing, (a0 * abs(w.r[j]) + a1 * abs(w.rate[j])) / max(w.scale[j], 1e-300))
-        if missing <= max(ARRIVED, ARRIVED_PART * s.rtol):
+        if missing <= left:
             return not s.has_solve
         solve_schur(w.G, s.na, w.reach, w.r, w.la)
         if s.has_velocity:

@@ -104,7 +104,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     """Gaps and rates, and the multipliers if asked, at the inner nodes; at the end as well where the rows move it."""
     for node in range(1, NODES if s.method == EXPLICIT and dense.long_for_rows(s) else NODES - 1):
         dense.state(s, m, w, at_node(node), w.ys)
-        known = dense.put_on_rows(K, s, m, w, at_node(node), w.ys)
+        known = dense.put_on_rows(K, s, m, w, at_node(node), w.ys, dense.tolerated(s))
         t = s.t_old + at_node(node) * s.hs
         q, v = w.ys[: s.nq], w.ys[s.nq :]
         K.gaps(t, q, v, m.p, w.gaps[node], w.rates[node])
@@ -206,7 +206,11 @@ def _tie(s: Any, w: Work) -> None:
 
 @inlined
 def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
-    """The mode that the fired guard of row i leads to."""
+    """The mode that the fired guard of row i leads to.
+
+    A gap that opens where it touches has dipped below zero in the interpolant alone, as one may that was let go from
+    rest: the instant tells whether it presses.
+    """
     kind = w.kind[i]
     if kind == RELEASE:
         return BALLISTIC if s.fsm != LEVEL else released_mode(mode[i], h)
@@ -214,6 +218,8 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return FREE
     if kind == HANDOVER:
         return CONTACT
+    if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
+        return int(mode[i])
     if s.frozen and m.beta[i, 0] > 0.0:
         return int(mode[i])  # a frozen collision settles it
     return active_mode(s, m, i)

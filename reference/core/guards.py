@@ -79,7 +79,7 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
     q, v = w.ys[: s.nq], w.ys[s.nq :]
-    known = kind in (RELEASE, HANDOVER) and dense.put_on_rows(K, s, m, w, theta, w.ys)
+    known = kind in (RELEASE, HANDOVER) and dense.put_on_rows(K, s, m, w, theta, w.ys, dense.ARRIVED)
     if kind == RELEASE:
         w.parts[0] = _multiplier(K, s, m, w, i, t, known)
     elif kind == HANDOVER:

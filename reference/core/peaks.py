@@ -141,7 +141,7 @@ def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, theta: float) -> floa
         return float(w.lams[NODES - 1, i])
     dense.state(s, m, w, theta, w.ys)
     t = s.t_old + theta * s.hs
-    known = dense.put_on_rows(K, s, m, w, theta, w.ys)
+    known = dense.put_on_rows(K, s, m, w, theta, w.ys, dense.tolerated(s))
     if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
         return -np.inf
     for j in range(s.na):

@@ -53,7 +53,7 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     theta = min(max((t - s.t_old) / s.hs, 0.0), 1.0)
     dense.prepare(K, s, m, w)
     dense.state(s, m, w, theta, w.ys)
-    if s.na > 0 and not dense.put_on_rows(K, s, m, w, theta, w.ys):
+    if s.na > 0 and not dense.put_on_rows(K, s, m, w, theta, w.ys, dense.tolerated(s)):
         accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN)
     scatter(s, w, w.lam)
     z = w.z

@@ -68,7 +68,7 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
     if s.method == IMPLICIT:
         s.t_old = s.t
-        known = dense.put_on_rows(K, s, m, w, 1.0, w.y1)
+        known = dense.put_on_rows(K, s, m, w, 1.0, w.y1, dense.tolerated(s))
         if known:
             dop853.keep(K, s, m, w, t, w.y1, end)
     if not known and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
