@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -117,12 +118,15 @@ def _loops(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Loop, ...
 
 
 def _joined(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Loop, ...]:
-    """Points of two bodies, or of one and the world, that are to meet."""
+    """Points of two bodies, or of one and the world, that are to meet; or their axes too."""
     if rng.random() < 0.5:
         return ()
     ends = (made[-1].name, str(rng.choice(["", *(body.name for body in made[:-1])])))
-    return (Loop(name="joined", type="connect", first=ends[0], second=ends[1], first_position=tuple(rng.normal(size=3)),
-                 second_position=tuple(rng.normal(size=3))),)  # fmt: skip
+    loop = Loop(name="joined", type="connect", first=ends[0], second=ends[1], first_position=tuple(rng.normal(size=3)),
+                second_position=tuple(rng.normal(size=3)))  # fmt: skip
+    if rng.random() < 0.5:
+        loop = replace(loop, type="weld", orientation=_unit(rng, 4), torque_scale=float(rng.uniform(0.1, 3.0)))
+    return (loop,)
 
 
 def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actuator, ...]:

@@ -214,13 +214,33 @@ def test_a_loop_given_twice_moves_as_once(tmp_path: Path) -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
+WELDED = """
+<mujoco><option timestep="1e-3"/>
+  <default><joint axis="0 1 0" damping=".01"/><geom type="capsule" size=".02" contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <body pos="0 0 1"><joint/><geom fromto="0 0 0 0 0 -.4"/>
+      <body name="left" pos="0 0 -.4"><joint/><geom fromto="0 0 0 .22 0 0"/></body></body>
+    <body pos=".5 0 1"><joint/><geom fromto="0 0 0 0 0 -.35"/>
+      <body name="right" pos="0 0 -.35"><joint/><geom fromto="0 0 0 -.22 0 0"/></body></body>
+  </worldbody>
+  <equality><weld name="coupler" body1="left" body2="right" relpose=".2 0 0 1 0 .3 0" anchor="-.25 0 0"
+    torquescale=".3" solref="-1 -2"/></equality>
+</mujoco>
+"""
+"""A four-bar whose coupler is two halves that are welded: six rows of which three hold."""
+
+
 def test_loops_move_alike_in_three_engines(tmp_path: Path) -> None:
     """A four-bar in MuJoCo and in Pinocchio, whose rows are its own; and a robot with redundant loops in both."""
     path = tmp_path / "bar.xml"
     loop = '<connect name="loop" body1="last" anchor="0 0 -.4" solref="-1 -2"/>'
     path.write_text(FOUR_BAR.format(loops=loop), encoding="utf-8")
     bar = cases.load(str(path), t_end=0.3, without="contacts", assemble=True)
-    for case in (bar, robot("agility_cassie/cassie", assemble=True, t_end=0.004)):
+    path = tmp_path / "welded.xml"
+    path.write_text(WELDED, encoding="utf-8")
+    welded = cases.load(str(path), t_end=0.3, assemble=True)
+    assert len(welded.contacts) == 6
+    for case in (bar, welded, robot("agility_cassie/cassie", assemble=True, t_end=0.004)):
         runs = [
             engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
             engines.load("mujoco").prepare(case, "matched", dt=2e-4).run(),

@@ -204,12 +204,16 @@ def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
     return Inputs(names=names, times=np.zeros(1), values=values)
 
 
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+"""Of a loop in space: its points, then its axes."""
+
+
 def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
     """Return names, laws and whether they can open, of the rows in the order of all engines."""
     names, laws, unilateral = [], [], []
     for loop in scene.loops:
         for k in range(loop.width):
-            names.append(loop.name if loop.width == 1 else f"{loop.name} {'xyz'[k]}")
+            names.append(loop.name if loop.width == 1 else f"{loop.name} {COMPONENTS[k]}")
             laws.append(loop.law)
             unilateral.append(False)
     for part in scene.bounded:

@@ -13,6 +13,7 @@ from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
 from crossbody.cases.scene import (
     UNBOUNDED,
+    UPRIGHT,
     Actuator,
     Body,
     Joint,
@@ -186,12 +187,29 @@ def _loop(model: Any, i: int) -> Loop:
         return Loop(
             name=name, type="joint", first=joints(one), second=second, polynomial=_floats(data[:5]), law=given
         )  # fmt: skip
-    if kind == mujoco.mjtEq.mjEQ_CONNECT and model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_BODY:
-        return Loop(
-            name=name, type="connect", first=bodies(one), second=bodies(two),
-            first_position=_floats(data[:3]), second_position=_floats(data[3:6]), law=given,
-        )  # fmt: skip
-    raise SceneError(f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: connect by bodies, joint.")
+    types = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
+    if kind not in types:
+        raise SceneError(f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: connect, weld, joint.")
+    welded = types[kind] == "weld"
+    turn, points = data[6:10], (data[3:6], data[:3]) if welded else (data[:3], data[3:6])
+    if model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:
+        turn, points = _between(model, one, two), (model.site_pos[one], model.site_pos[two])
+        one, two = int(model.site_bodyid[one]), int(model.site_bodyid[two])
+    return Loop(
+        name=name, type=types[kind], first=bodies(one), second=bodies(two), first_position=_floats(points[0]),
+        second_position=_floats(points[1]), orientation=_floats(turn) if welded else UPRIGHT,
+        torque_scale=float(data[10]) if welded else 1.0, law=given,
+    )  # fmt: skip
+
+
+def _between(model: Any, one: int, two: int) -> Any:
+    """Return the orientation of the second body in the first with which the axes of two sites are the same."""
+    import mujoco
+
+    back, turn = np.zeros(4), np.zeros(4)
+    mujoco.mju_negQuat(back, model.site_quat[two])
+    mujoco.mju_mulQuat(turn, model.site_quat[one], back)
+    return turn
 
 
 def _tendon(model: Any, i: int) -> Tendon:

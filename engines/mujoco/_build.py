@@ -8,7 +8,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases import CaseUnsupported
 from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Tendon
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
@@ -17,12 +16,14 @@ from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
 def compiled(spec: Any, scene: Scene) -> Any:
     """Return the compiled model, with what no element of the format says.
 
-    That is where the springs of ball joints rest, and the second point of a `connect`, which is computed there.
+    That is where the springs of ball joints rest, and the points of loops, which are computed there from the pose.
     """
     model = spec.compile()
     for i, loop in enumerate(scene.loops):
         if loop.type == "connect":
-            model.eq_data[i, 3:6] = loop.second_position
+            model.eq_data[i, :6] = *loop.first_position, *loop.second_position
+        if loop.type == "weld":
+            model.eq_data[i, :6] = *loop.second_position, *loop.first_position
     for joint in scene.joints:
         if joint.type == "ball":
             at = int(model.joint(joint.name).qposadr[0])
@@ -91,17 +92,15 @@ def _add_tendon(spec: Any, tendon: Tendon) -> None:
 
 
 def _add_loop(spec: Any, loop: Loop) -> None:
-    if loop.type == "weld":
-        raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
-    kind = mujoco.mjtEq.mjEQ_JOINT if loop.type == "joint" else mujoco.mjtEq.mjEQ_CONNECT
-    added = spec.add_equality(name=loop.name, type=kind, active=True)
+    added = spec.add_equality(name=loop.name, type=getattr(mujoco.mjtEq, f"mjEQ_{loop.type.upper()}"), active=True)
     added.objtype = mujoco.mjtObj.mjOBJ_JOINT if loop.type == "joint" else mujoco.mjtObj.mjOBJ_BODY
     added.name1, added.name2 = loop.first, loop.second
     if loop.type == "joint":
         added.data[:5] = loop.polynomial
     else:
         added.name1, added.name2 = loop.first or "world", loop.second or "world"
-        added.data[:3] = loop.first_position
+    if loop.type == "weld":
+        added.data[6:11] = *loop.orientation, loop.torque_scale
     added.solref, added.solimp = _solref(loop.law), IMPEDANCE
 
 

@@ -37,7 +37,7 @@ def build(case: Case, algebra: str) -> Prepared:
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     forces = parts.Forces(scene)
-    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if loop.type != "connect")), forces)
+    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if loop.type == "joint")), forces)
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
@@ -48,7 +48,7 @@ def build(case: Case, algebra: str) -> Prepared:
         ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
         tau[:] = to.back(q, ours) + lifted(scene, model, data, placed, q)
 
-    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type == "connect"))
+    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type != "joint"))
     touching = ContactRows(scene, model, placed)
     order = _order(scene)
 
@@ -78,8 +78,8 @@ def build(case: Case, algebra: str) -> Prepared:
 
 
 def _order(scene: Scene) -> list[int]:
-    """Return where each row of a scene stands where all of `connect` come last."""
-    wide = np.repeat([loop.type == "connect" for loop in scene.loops], [loop.width for loop in scene.loops])
+    """Return where each row of a scene stands where the loops in space come last."""
+    wide = np.repeat([loop.type != "joint" for loop in scene.loops], [loop.width for loop in scene.loops])
     bounds = np.isfinite([part.range for part in scene.bounded]).sum()
     last = np.concatenate([wide, np.zeros(bounds)]).astype(bool)
     stands = np.empty(len(last), dtype=int)

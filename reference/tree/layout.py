@@ -24,7 +24,8 @@ ON_JOINT, ON_TENDON = 0, 1
 COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
-LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT = range(5)
+LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN = range(6)
+OF_POSES = (CONNECT, CONTACT, TURN)
 
 # What is kept of a node while it is computed: pose (rotation by rows, position), velocity, acceleration without v',
 # force, inertia; of a degree of freedom: its motion subspace (angular, linear).

@@ -90,6 +90,8 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
         kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real)
         if kind == layout.CONNECT:
             h[i], hd[i], _ = loops.connect(p, i, w)
+        elif kind == layout.TURN:
+            h[i], hd[i], _ = loops.turn(p, i, w)
         elif kind == layout.CONTACT:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
@@ -106,6 +108,9 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
         if kind == layout.CONNECT:
             h[j], _, Hdv[j] = loops.connect(p, idx[j], w)
             loops.connect_columns(p, idx[j], w, H[j])
+        elif kind == layout.TURN:
+            h[j], _, Hdv[j] = loops.turn(p, idx[j], w)
+            loops.turn_columns(p, idx[j], w, H[j])
         elif kind == layout.CONTACT:
             at, (gap, n, place) = _contact(p, w, idx[j])
             h[j], Hdv[j] = gap[0], gap[2]

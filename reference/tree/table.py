@@ -203,7 +203,7 @@ class _Builder:
         )  # fmt: skip
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
         head[layout.RESTING] = self.resting
-        head[layout.POSED] = sum(row[layout.KIND] in (layout.CONNECT, layout.CONTACT) for row in rows)
+        head[layout.POSED] = sum(row[layout.KIND] in layout.OF_POSES for row in rows)
         parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places)]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         where = [layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR]
@@ -332,11 +332,13 @@ def _loop(loop: Loop, builder: _Builder) -> list[Floats]:
             joint = next(joint for joint in builder.scene.joints if joint.name == name)
             where += [builder.coordinates[name], builder.dofs[name], joint.reference]
         return [_row(layout.JOINT_LOOP, *where, *loop.polynomial)]
-    if loop.type == "connect":
-        one, two = (builder.places[name] for name in (loop.first, loop.second))
-        points = [one.p + one.R @ np.array(loop.first_position), two.p + two.R @ np.array(loop.second_position)]
-        return [_row(layout.CONNECT, k, one.node, *points[0], two.node, *points[1]) for k in range(3)]
-    raise SceneError(f"Loop {loop.name!r}: a {loop.type} is not done.")
+    one, two = (builder.places[name] for name in (loop.first, loop.second))
+    points = [one.p + one.R @ np.array(loop.first_position), two.p + two.R @ np.array(loop.second_position)]
+    rows = [_row(layout.CONNECT, k, one.node, *points[0], two.node, *points[1]) for k in range(3)]
+    if loop.type == "weld":
+        turns = (one.R @ rotation(loop.orientation)).ravel(), two.R.ravel()
+        rows += [_row(layout.TURN, k, one.node, *turns[0], two.node, *turns[1], loop.torque_scale) for k in range(3)]
+    return rows
 
 
 def dof_parents(table: Table) -> Index:
