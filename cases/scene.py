@@ -302,13 +302,24 @@ class Actuator(_Named):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Push(_Named):
+    """A force in world axes at the centre of mass of a body; its x, y and z, N, are inputs behind the controls.
+
+    Attributes:
+        body: whose.
+    """
+
+    body: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """Bodies on joints and what acts between them; see the module.
 
     Attributes:
         bodies: depth-first: behind its parent, and no other branch in between. Engines number them so.
         joints: those of one body stand together, in the order of the bodies.
-        shapes, pairs, loops, tendons, actuators: what else there is.
+        shapes, pairs, loops, tendons, actuators, pushes: what else there is.
         gravity: m/s^2.
     """
 
@@ -319,12 +330,13 @@ class Scene:
     loops: tuple[Loop, ...] = ()
     tendons: tuple[Tendon, ...] = ()
     actuators: tuple[Actuator, ...] = ()
+    pushes: tuple[Push, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
 
     def __post_init__(self) -> None:
         """Check that names are unique, that every name which is spoken of is there, and the order of the parts."""
         object.__setattr__(self, "gravity", _vector("Scene.gravity", self.gravity, 3))
-        for group in ("bodies", "joints", "shapes", "pairs", "loops", "tendons", "actuators"):
+        for group in ("bodies", "joints", "shapes", "pairs", "loops", "tendons", "actuators", "pushes"):
             object.__setattr__(self, group, tuple(getattr(self, group)))
             _unique(group, getattr(self, group))
         if len(self.bodies) > LARGEST:
@@ -348,6 +360,8 @@ class Scene:
         for actuator in self.actuators:
             _known(actuator, "joint", actuator.joint, joints | {""})
             _known(actuator, "tendon", actuator.tendon, tendons | {""})
+        for push in self.pushes:
+            _known(push, "body", push.body, bodies - {""})
 
     def _check_order(self) -> None:
         seen: dict[str, int] = {"": -1}
@@ -379,6 +393,11 @@ class Scene:
     def bounded(self) -> tuple[Joint | Tendon, ...]:
         """What may have bounds, in the order of their rows."""
         return (*self.joints, *self.tendons)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of its inputs: the controls, then the components of the pushes."""
+        return (*(part.name for part in self.actuators), *(f"{push.name} {k}" for push in self.pushes for k in "xyz"))
 
     @property
     def nq(self) -> int:

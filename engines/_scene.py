@@ -70,7 +70,7 @@ class Forces:
         at: joint -> its first position.
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
-        u (nu,): controls in force.
+        u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N.
         T (nt, nv): dl/dx of the tendons.
         A (nu, nv): dl/dx of the actuators, gear included.
     """
@@ -80,6 +80,7 @@ class Forces:
     place: dict[str, int] = field(init=False)
     single: Any = field(init=False)
     u: Floats = field(init=False)
+    pushes: Floats = field(init=False)
     T: Floats = field(init=False)
     A: Floats = field(init=False)
 
@@ -89,7 +90,8 @@ class Forces:
         self.at, self.place = places(scene)
         single = [joint.name for joint in scene.joints if joint.type in ("slide", "hinge")]
         self.single = np.array([(self.at[name], self.place[name]) for name in single], dtype=int).reshape(-1, 2).T
-        self.u, self.T = np.zeros(len(scene.actuators)), tendons(scene)
+        self.u, self.pushes = np.zeros(len(scene.actuators)), np.zeros((len(scene.pushes), 3))
+        self.T = tendons(scene)
         named = {tendon.name: row for tendon, row in zip(scene.tendons, self.T, strict=True)}
         self.A = np.zeros((len(scene.actuators), n))
         for row, actuator in zip(self.A, scene.actuators, strict=True):
@@ -128,8 +130,13 @@ class Forces:
         return turned(q[..., first : first + 4], rest)
 
     def change(self, values: Floats) -> None:
-        """Put controls (nu,) in force."""
-        self.u[:] = values
+        """Put inputs of the scene in force: controls, then pushes."""
+        count = len(self.u)
+        self.u[:], self.pushes[:] = values[:count], values[count:].reshape(-1, 3)
+
+    def still(self) -> None:
+        """Put no input in force."""
+        self.u[:], self.pushes[:] = 0.0, 0.0
 
     def __call__(self, q: Floats, v: Floats) -> Floats:
         """Return the generalised forces (nv,) at a state."""

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Pair, Scene, Shape, Tendon
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Pair, Push, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import PLACES
 
 ALL = ("hinge", "slide", "ball", "free")
@@ -34,7 +34,7 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
     return Scene(
         bodies=tuple(made), joints=tuple(joints), tendons=_tendons(rng, single), actuators=_actuators(rng, joints),
         loops=(*_loops(rng, single), *_joined(rng, made)), **_contacts(rng, made, joints),
-        gravity=tuple(rng.normal(size=3) * 5.0),
+        gravity=tuple(rng.normal(size=3) * 5.0), pushes=_pushes(rng, joints),
     )  # fmt: skip
 
 
@@ -46,7 +46,7 @@ def random_state(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, np
         if joint.type in ("ball", "free"):
             part[-4:] /= np.linalg.norm(part[-4:])
         q += part.tolist()
-    return np.array(q), rng.normal(size=scene.nv) * 2.0, rng.normal(size=len(scene.actuators)) * 3.0
+    return np.array(q), rng.normal(size=scene.nv) * 2.0, rng.normal(size=len(scene.inputs)) * 3.0
 
 
 def _branch(made: Sequence[Body]) -> list[str]:
@@ -141,6 +141,12 @@ def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actua
             control_range=(-1.0, 2.0), force_range=(-4.0, 4.0),
         ))  # fmt: skip
     return tuple(made)
+
+
+def _pushes(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Push, ...]:
+    """On two bodies that move, or twice on one."""
+    bodies = rng.choice([joint.body for joint in joints], size=2 if rng.random() < 0.5 else 0)
+    return tuple(Push(name=f"push {i}", body=str(body)) for i, body in enumerate(bodies))
 
 
 def _contacts(rng: np.random.Generator, made: Sequence[Body], joints: Sequence[Joint]) -> dict[str, tuple]:

@@ -347,6 +347,52 @@ def test_wrong_controls_are_refused(tmp_path: Path, text: str, said: str) -> Non
         cases.load(write(tmp_path), "raised", ctrl=str(table))
 
 
+def test_a_push_moves_every_engine_alike(tmp_path: Path) -> None:
+    """Two pushes at once on one body, and one that never ends."""
+    path = write(tmp_path)
+    pushes = "body2 3 -2 1 .05 .12; body2 -1 0 4 .1 .2; body1 0 0 .5 .15 inf"
+    case, plain = (cases.load(path, "raised", t_end=0.3, push=text) for text in (pushes, ""))
+    assert case.inputs is not None
+    assert case.inputs.names[-3:] == ("push 2 x", "push 2 y", "push 2 z")
+    runs = [
+        engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
+        engines.load("mujoco").prepare(case, "matched", dt=1e-4).run(),
+        engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
+    ]
+    still = engines.load("reference").prepare(plain, "compiled", rtol=1e-11).run()
+    assert np.abs(runs[0].q[-1] - still.q[-1]).max() > 1e-2
+    for run in runs:
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() < 1e-8
+
+
+def test_a_push_gives_a_floating_body_its_momentum(tmp_path: Path) -> None:
+    """F dt / m, whatever the body does besides; in the file as it stands too."""
+    path = tmp_path / "box.xml"
+    path.write_text(
+        '<mujoco><option gravity="0 0 0"/><worldbody><body name="box"><freejoint/>'
+        '<geom type="box" size=".1 .2 .3" mass="2"/></body></worldbody></mujoco>', encoding="utf-8",
+    )  # fmt: skip
+    case = cases.load(str(path), t_end=0.5, push="box 1 -2 3 .1 .3")
+    for engine, profile in (("reference", "compiled"), ("mujoco", "default"), ("pinocchio", "law")):
+        run = engines.load(engine).prepare(case, profile).run()
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(run.v[-1] - [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]).max() < 1e-9, engine
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("body2 1 2 3 .1", "is no push"), ("body2 1 2 nan 0 1", "is no push"), ("body2 1 2 3 .2 .1", "is no push"),
+        ("body2 1 2 3 -1 1", "is no push"), ("leg 1 2 3 0 1", "no body 'leg'; valid: "),
+        ("body2 a b c d e", "is no push"), ("1", "is no push"),
+    ],
+)  # fmt: skip
+def test_wrong_pushes_are_refused(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InvalidValue, match=said):
+        cases.load(write(tmp_path), "raised", push=text)
+
+
 def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
     """A contact that no row stands for is told, and can be left out of every engine."""
     wall = '<geom name="wall" type="box" pos=".25 0 -.55" size=".1 .5 .02"/>'

@@ -59,13 +59,17 @@ def test_mass_matrix_forces_and_energy_are_those_of_mujoco(seed: int) -> None:
     data = mujoco.MjData(model)
     for _ in range(3):
         q, v, u = random_state(scene, rng)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u[: model.nu]
         mujoco.mj_forward(model, data)
+        pushed = np.zeros(model.nv)
+        for push, force in zip(scene.pushes, u[model.nu :].reshape(-1, 3), strict=True):
+            i = model.body(push.body).id
+            mujoco.mj_applyFT(model, data, force, np.zeros(3), data.xipos[i], i, pushed)
         full = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, full)
         M, f, e = ours(scene, q, v, u)
         assert close(M, full)
-        assert close(f, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
+        assert close(f, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias + pushed)
         spared = (model.body_gravcomp * model.body_mass * (data.xipos @ model.opt.gravity)).sum()
         assert close(e, [data.energy[1], data.energy[0] + spared])
 
@@ -95,7 +99,7 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     q, v, _ = random_state(scene, rng)
     H, h, Hdv = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count)
     w = np.zeros(table.scratch)
-    still = np.zeros(len(scene.actuators))
+    still = np.zeros(len(scene.inputs))
     mechanism.dynamics(0.0, q, v, still, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
     mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
@@ -240,7 +244,7 @@ def test_coordinates_of_pinocchio_lead_there_and_back(seed: int) -> None:
     assert close(to.back(r, tau) @ u, tau @ v)
     free = tuple(int(Mode.FREE) for _ in range(rows.nc))
     vd = to.velocities(r, rows.accelerate(r, u, free)[0]) + to.bend(r, u)
-    M, f, _ = ours(scene, q, v, np.zeros(len(scene.actuators)))
+    M, f, _ = ours(scene, q, v, np.zeros(len(scene.inputs)))
     assert np.abs(vd - np.linalg.solve(M, f)).max() <= 1e-10 * np.abs(vd).max()
     ahead, behind, step = r.copy(), r.copy(), 1e-6
     for place, sign in ((ahead, 1.0), (behind, -1.0)):

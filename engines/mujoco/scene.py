@@ -128,11 +128,17 @@ def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
 
 
 def _change(case: Case, data: Any) -> Callable[[float], None]:
-    given = case.inputs
+    given, scene = case.inputs, _scene(case)
+    numbers = {body.name: i for i, body in enumerate(scene.bodies, start=1)}  # a file need not name them
+    pushed = [numbers[push.body] for push in scene.pushes]
 
     def change(t: float) -> None:
-        if given is not None:
-            data.ctrl[:] = given.values[np.searchsorted(given.times, t)]
+        if given is None:
+            return
+        controls, pushes = np.split(given.values[np.searchsorted(given.times, t)], [len(scene.actuators)])
+        data.ctrl[:] = controls
+        data.xfrc_applied[:] = 0.0
+        np.add.at(data.xfrc_applied[:, :3], pushed, pushes.reshape(-1, 3))
 
     return change
 

@@ -46,7 +46,7 @@ def build(case: Case, algebra: str) -> Prepared:
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
         ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + lifted(scene, model, data, placed, q)
+        tau[:] = to.back(q, ours) + at_centres(scene, forces, model, data, placed, q)
 
     joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type != "joint"))
     touching = ContactRows(scene, model, placed)
@@ -124,17 +124,18 @@ def _inertia(body: Body) -> Any:
     return pin.Inertia(body.mass, np.array(body.com), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def lifted(scene: Scene, model: Any, data: Any, placed: Placed, q: Floats) -> Floats:
-    """Return the generalised force (nv,) of the weight that bodies are spared."""
+def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed: Placed, q: Floats) -> Floats:
+    """Return the generalised force (nv,) of the weight that bodies are spared, and of pushes."""
     total: Floats = np.zeros(model.nv)
-    spared = [body for body in scene.bodies if body.weightless]
-    if not spared:
-        return total
-    pin.computeJointJacobians(model, data, q)
-    for body in spared:
+    acting = {body.name: -body.weightless * body.mass * np.array(scene.gravity) for body in scene.bodies}
+    for push, force in zip(scene.pushes, forces.pushes, strict=True):
+        acting[push.body] = acting[push.body] + force
+    found = [(body, acting[body.name]) for body in scene.bodies if acting[body.name].any()]
+    if found:
+        pin.computeJointJacobians(model, data, q)
+    for body, force in found:
         carrier, pose = placed[body.name]
         centre = (data.oMi[carrier] * pose).act(np.array(body.com))
-        force = -body.weightless * body.mass * np.array(scene.gravity)
         total += point_jacobian(model, data, carrier, centre).T @ force
     return total
 
@@ -163,7 +164,7 @@ def _observe(
 
 
 def _world(case: Case, forces: parts.Forces) -> World:
-    """The controls, from one change to the next."""
+    """The inputs, from one change to the next."""
     given = case.inputs
     if given is None:
         return World()
@@ -171,7 +172,7 @@ def _world(case: Case, forces: parts.Forces) -> World:
     def change(t: float, _q: Floats, _v: Floats) -> None:
         forces.change(given.values[np.searchsorted(given.times, t)])
 
-    return World(instants=given.times.tolist(), change=change, reset=lambda: forces.change(0.0 * forces.u))
+    return World(instants=given.times.tolist(), change=change, reset=forces.still)
 
 
 def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:
@@ -180,7 +181,7 @@ def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to:
     on = rows_on(rows)
 
     def bias(q: Floats, v: Floats) -> Floats:
-        forces.change(0.0 * forces.u)
+        forces.still()
         r = to.theirs(q)
         u = to.back(r, v)
         apply(r, u, rows.tau)
@@ -194,7 +195,7 @@ def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to:
         return to.velocities(r, half.T)
 
     def lam(q: Floats, v: Floats) -> Floats:
-        forces.change(0.0 * forces.u)
+        forces.still()
         r = to.theirs(q)
         return rows.accelerate(r, to.back(r, v), on)[1]
 

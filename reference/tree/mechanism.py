@@ -11,8 +11,17 @@ from crossbody.reference._kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import gradient, touch
 from crossbody.reference.tree import forces, layout, loops, sweeps
+from crossbody.reference.tree.points import point, pull
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
+
+
+@kernels.helper
+def _pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
+    """Return which node push i acts on, the motion of the point there, and the force."""
+    o, k = int(p[layout.AT_PUSH].real) + layout.PUSH * i, int(p[layout.ACTUATORS].real) + 3 * i
+    node = int(p[o + layout.PUSHED].real)
+    return node, point(p, w, node, p[o + 1], p[o + 2], p[o + 3]), (u[k], u[k + 1], u[k + 2])
 
 
 @kernels.dynamics
@@ -29,6 +38,9 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
             f[j] += forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
     sweeps.outwards(q, v, p, w)
     sweeps.inwards(p, w, M, f)
+    for i in range(int(p[layout.PUSHES].real)):
+        node, x, force = _pushed(u, p, w, i)
+        pull(p, w, node, 1.0, force, (x[0][0], x[1][0], x[2][0]), f)
 
 
 @kernels.helper
@@ -165,7 +177,7 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
 
 @kernels.power
 def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
-    """Of the actuators, and what dampers take."""
+    """Of the actuators and pushes, and what dampers take."""
     n, at_dof = len(v), int(p[layout.AT_DOF].real)
     given, taken = 0.0 * v[0], 0.0 * v[0]
     if len(u) > 0:
@@ -180,6 +192,12 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         o = forces.tendon(p, i)
         speed = forces.rate(v, p, o)
         taken += speed * forces.damper(p, o + layout.DAMP, speed)
+    if p[layout.PUSHES].real > 0.0:
+        w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * n, dtype=q.dtype)
+        sweeps.outwards(q, v, p, w)
+        for i in range(int(p[layout.PUSHES].real)):
+            _, x, force = _pushed(u, p, w, i)
+            given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]
     e[0], e[1] = given, taken
 
 

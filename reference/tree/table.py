@@ -13,7 +13,7 @@ import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Scene, Shape, Tendon
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Push, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import contacts
 from crossbody.reference._kinds import Index
 from crossbody.reference.pairs import layout as pairs
@@ -204,13 +204,24 @@ class _Builder:
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
         head[layout.RESTING] = self.resting
         head[layout.POSED] = sum(row[layout.KIND] in layout.OF_POSES for row in rows)
-        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places)]
+        pushes = [self._push(push) for push in scene.pushes]
+        head[layout.PUSHES] = len(pushes)
+        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places), pushes]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
-        where = [layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR]
-        head[where] = starts[:6]
+        head[[
+            layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR,
+            layout.AT_PUSH,
+        ]] = starts[:-1]  # fmt: skip
         packed = np.concatenate([head, *(row for part in parts for row in part)])
         finite: Floats = np.clip(packed, -1e300, 1e300)
         return finite  # a bound that is not there: parameters are finite
+
+    def _push(self, push: Push) -> Floats:
+        place = self.places[push.body]
+        if place.node < 0:
+            raise SceneError(f"Push {push.name!r}: body {push.body!r} does not move.")
+        com = next(body.com for body in self.scene.bodies if body.name == push.body)
+        return np.array([place.node, *(place.p + place.R @ np.array(com))])
 
     def _actuator(self, actuator: Actuator) -> Floats:
         row = np.zeros(layout.ACTUATOR)
