@@ -204,16 +204,21 @@ class Pair(_Named):
     sizes: ClassVar[dict[str, int]] = {"friction": 5}
 
 
+ROWS = {"connect": 3, "weld": 6, "joint": 1, "tendon": 1}
+"""Of every type of loop."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop(_Named):
     """Rows that are always on.
 
     Attributes:
-        type: connect (two points stay together), weld (two frames do) or joint (coordinates follow a polynomial).
-        first, second: names of two bodies (the second may be empty: the world) or two joints (the second may be empty).
+        type: connect (two points stay together), weld (two frames do), joint or tendon (the first's coordinate or length
+            follows the second's by a polynomial).
+        first, second: names of two bodies (the second may be empty: the world), joints or tendons (it may be empty).
         first_position, second_position: of the points in body axes, m.
         orientation: of the second body in the first, for a weld.
-        polynomial: x1 - x1ref = c0 + c1 y + ... + c4 y^4, y = x2 - x2ref, for a joint loop.
+        polynomial: x1 - x1ref = c0 + c1 y + ... + c4 y^4, y = x2 - x2ref, for joints and tendons.
         torque_scale: of a weld's rotational rows, m.
         law: of its rows.
     """
@@ -234,13 +239,18 @@ class Loop(_Named):
     def __post_init__(self) -> None:
         """Check the type."""
         _Named.__post_init__(self)
-        if self.type not in ("connect", "weld", "joint"):
-            raise SceneError(f"Loop {self.name!r}: type is {shown(self.type)}; valid: connect, weld, joint.")
+        if self.type not in ROWS:
+            raise SceneError(f"Loop {self.name!r}: type is {shown(self.type)}; valid: {', '.join(ROWS)}.")
 
     @property
     def width(self) -> int:
         """Number of its rows."""
-        return {"connect": 3, "weld": 6, "joint": 1}[self.type]
+        return ROWS[self.type]
+
+    @property
+    def in_space(self) -> bool:
+        """Whether it joins bodies."""
+        return self.width > 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -351,7 +361,7 @@ class Scene:
             _known(pair, "first", pair.first, shapes)
             _known(pair, "second", pair.second, shapes)
         for loop in self.loops:
-            among = joints | {""} if loop.type == "joint" else bodies
+            among = bodies if loop.in_space else {"", *(tendons if loop.type == "tendon" else joints)}
             _known(loop, "first", loop.first, among - {""})
             _known(loop, "second", loop.second, among)
         for tendon in self.tendons:
@@ -393,6 +403,11 @@ class Scene:
     def bounded(self) -> tuple[Joint | Tendon, ...]:
         """What may have bounds, in the order of their rows."""
         return (*self.joints, *self.tendons)
+
+    def rest_length(self, tendon: Tendon) -> float:
+        """Return the length of a tendon at the reference pose."""
+        rest = {joint.name: joint.reference for joint in self.joints}
+        return sum(c * rest[name] for name, c in zip(tendon.joints, tendon.coefficients, strict=True))
 
     @property
     def inputs(self) -> tuple[str, ...]:

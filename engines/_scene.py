@@ -200,7 +200,7 @@ class Rows:
     def __post_init__(self) -> None:
         """Refuse loops in space, which an engine's own kinematics must give."""
         for loop in self.scene.loops:
-            if loop.type != "joint":
+            if loop.in_space:
                 raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
 
     def heights(self, q: Floats) -> Floats:
@@ -226,7 +226,7 @@ class Rows:
         x = self.forces.x(q)
         drift = np.zeros(len(self.heights(q)))
         for i, loop in enumerate(self.scene.loops):
-            drift[i] = -self._loop(loop, x)[2] * (v[self.forces.place[loop.second]] ** 2 if loop.second else 0.0)
+            drift[i] = -self._loop(loop, x)[2] * (self._end(loop.type, loop.second)[0] @ v) ** 2
         return drift
 
     def _bounded(self) -> list[tuple[Joint | Tendon, Floats]]:
@@ -235,13 +235,18 @@ class Rows:
         rows = [*(unit[place[joint.name]] for joint in self.scene.joints), *self.forces.T]
         return list(zip(self.scene.bounded, rows, strict=True))
 
+    def _end(self, kind: str, name: str) -> tuple[Floats, float]:
+        """Return the derivative (nv,) of a coordinate or a length, zero without a name, and what it is at rest."""
+        if not name:
+            return np.zeros(self.scene.nv), 0.0
+        if kind == "tendon":
+            i = [tendon.name for tendon in self.scene.tendons].index(name)
+            return self.forces.T[i], self.scene.rest_length(self.scene.tendons[i])
+        reference = next(joint.reference for joint in self.scene.joints if joint.name == name)
+        return np.eye(self.scene.nv)[self.forces.place[name]], reference
+
     def _loop(self, loop: Loop, x: Floats) -> tuple[float, Floats, float]:
         """Return h, H and the second derivative of the polynomial."""
-        place, reference = self.forces.place, {joint.name: joint.reference for joint in self.scene.joints}
-        y = x[place[loop.second]] - reference[loop.second] if loop.second else 0.0
-        P = np.polynomial.Polynomial(loop.polynomial)
-        H = np.zeros(len(x))
-        H[place[loop.first]] = 1.0
-        if loop.second:
-            H[place[loop.second]] -= P.deriv()(y)
-        return x[place[loop.first]] - reference[loop.first] - P(y), H, P.deriv(2)(y)
+        (first, rest), (second, other) = (self._end(loop.type, name) for name in (loop.first, loop.second))
+        P, y = np.polynomial.Polynomial(loop.polynomial), second @ x - other
+        return first @ x - rest - P(y), first - P.deriv()(y) * second, P.deriv(2)(y)

@@ -107,14 +107,19 @@ def _tendons(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Tendon,
             name="tendon", joints=(single[0].name, single[-1].name), coefficients=(0.7, -1.3),
             stiffness=(3.0, 0.0, 0.0), damping=(0.4, 0.0, 0.0), rest=(-0.2, 0.1), range=(-30.0, 40.0),
         ),
+        Tendon(name="string", joints=(single[1].name, single[0].name), coefficients=(-0.4, 1.1)),
     )  # fmt: skip
 
 
 def _loops(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Loop, ...]:
     if len(single) < 3 or rng.random() < 0.5:
         return ()
-    return (Loop(name="coupling", type="joint", first=single[1].name, second=single[2].name,
-                 polynomial=(0.1, 0.8, 0.05, -0.02, 0.01)),)  # fmt: skip
+    polynomial = (0.1, 0.8, 0.05, -0.02, 0.01)
+    second = "tendon" if rng.random() < 0.5 else ""
+    return (
+        Loop(name="coupling", type="joint", first=single[1].name, second=single[2].name, polynomial=polynomial),
+        Loop(name="lengths", type="tendon", first="string", second=second, polynomial=polynomial),
+    )
 
 
 def _joined(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Loop, ...]:

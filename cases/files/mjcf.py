@@ -179,17 +179,21 @@ def _loop(model: Any, i: int) -> Loop:
     import mujoco
 
     kind, data, name = int(model.eq_type[i]), model.eq_data[i], _name(model, "eq", i)
-    bodies, joints = names(model, "body"), names(model, "jnt")
+    bodies = names(model, "body")
     one, two = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     given = law(model, model.eq_solref[i], model.eq_solimp[i])
-    if kind == mujoco.mjtEq.mjEQ_JOINT:
-        second = joints(two) if two >= 0 else ""
+    coupled = {mujoco.mjtEq.mjEQ_JOINT: ("joint", "jnt"), mujoco.mjtEq.mjEQ_TENDON: ("tendon", "tendon")}
+    if kind in coupled:
+        kind, parts = coupled[kind][0], names(model, coupled[kind][1])
         return Loop(
-            name=name, type="joint", first=joints(one), second=second, polynomial=_floats(data[:5]), law=given
+            name=name, type=kind, first=parts(one), second=parts(two) if two >= 0 else "",
+            polynomial=_floats(data[:5]), law=given,
         )  # fmt: skip
     types = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
     if kind not in types:
-        raise SceneError(f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: connect, weld, joint.")
+        raise SceneError(
+            f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: connect, weld, joint, tendon."
+        )
     welded = types[kind] == "weld"
     turn, points = data[6:10], (data[3:6], data[:3]) if welded else (data[:3], data[3:6])
     if model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:

@@ -93,12 +93,13 @@ def _add_tendon(spec: Any, tendon: Tendon) -> None:
 
 def _add_loop(spec: Any, loop: Loop) -> None:
     added = spec.add_equality(name=loop.name, type=getattr(mujoco.mjtEq, f"mjEQ_{loop.type.upper()}"), active=True)
-    added.objtype = mujoco.mjtObj.mjOBJ_JOINT if loop.type == "joint" else mujoco.mjtObj.mjOBJ_BODY
+    kind = "body" if loop.in_space else loop.type
+    added.objtype = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
     added.name1, added.name2 = loop.first, loop.second
-    if loop.type == "joint":
-        added.data[:5] = loop.polynomial
-    else:
+    if loop.in_space:
         added.name1, added.name2 = loop.first or "world", loop.second or "world"
+    else:
+        added.data[:5] = loop.polynomial
     if loop.type == "weld":
         added.data[6:11] = *loop.orientation, loop.torque_scale
     added.solref, added.solimp = _solref(loop.law), IMPEDANCE

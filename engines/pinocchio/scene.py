@@ -37,7 +37,7 @@ def build(case: Case, algebra: str) -> Prepared:
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     forces = parts.Forces(scene)
-    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if loop.type == "joint")), forces)
+    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space)), forces)
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
@@ -48,7 +48,7 @@ def build(case: Case, algebra: str) -> Prepared:
         ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
         tau[:] = to.back(q, ours) + at_centres(scene, forces, model, data, placed, q)
 
-    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type != "joint"))
+    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.in_space))
     touching = ContactRows(scene, model, placed)
     order = _order(scene)
 
@@ -79,7 +79,7 @@ def build(case: Case, algebra: str) -> Prepared:
 
 def _order(scene: Scene) -> list[int]:
     """Return where each row of a scene stands where the loops in space come last."""
-    wide = np.repeat([loop.type != "joint" for loop in scene.loops], [loop.width for loop in scene.loops])
+    wide = np.repeat([loop.in_space for loop in scene.loops], [loop.width for loop in scene.loops])
     bounds = np.isfinite([part.range for part in scene.bounded]).sum()
     last = np.concatenate([wide, np.zeros(bounds)]).astype(bool)
     stands = np.empty(len(last), dtype=int)

@@ -26,7 +26,7 @@ PUSHED, PUSH = 0, 4
 COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
-LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN = range(6)
+LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP = range(7)
 OF_POSES = (CONNECT, CONTACT, TURN)
 
 # What is kept of a node while it is computed: pose (rotation by rows, position), velocity, acceleration without v',

@@ -44,6 +44,14 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
 
 
 @kernels.helper
+def _polynomial(p: Array, c: int, y: Any) -> tuple[Any, Any, Any]:
+    """Return the polynomial with the coefficients p[c:] at y, and its first and second derivative."""
+    value = p[c] + y * (p[c + 1] + y * (p[c + 2] + y * (p[c + 3] + y * p[c + 4])))
+    slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
+    return value, slope, 2.0 * p[c + 2] + y * (6.0 * p[c + 3] + y * 12.0 * p[c + 4])
+
+
+@kernels.helper
 def _row(q: Array, v: Array, p: Array, i: int) -> tuple[Any, Any, Any]:
     """Return gap, rate and H' v of row i."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
@@ -54,12 +62,16 @@ def _row(q: Array, v: Array, p: Array, i: int) -> tuple[Any, Any, Any]:
         at = forces.tendon(p, int(p[o + 2].real))
         return p[o + 1] * (forces.length(q, p, at) - p[o + 3]), p[o + 1] * forces.rate(v, p, at), 0.0 * v[0]
     y, yd = 0.0 * q[0], 0.0 * v[0]
+    if kind == layout.TENDON_LOOP:
+        at, second = forces.tendon(p, int(p[o + 1].real)), int(p[o + 4].real)
+        if second >= 0:
+            other = forces.tendon(p, second)
+            y, yd = forces.length(q, p, other) - p[o + 6], forces.rate(v, p, other)
+        value, slope, curve = _polynomial(p, o + 7, y)
+        return forces.length(q, p, at) - p[o + 3] - value, forces.rate(v, p, at) - slope * yd, -curve * yd * yd
     if p[o + 4].real >= 0.0:
         y, yd = q[int(p[o + 4].real)] - p[o + 6], v[int(p[o + 5].real)]
-    c = o + 7
-    value = p[c] + y * (p[c + 1] + y * (p[c + 2] + y * (p[c + 3] + y * p[c + 4])))
-    slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
-    curve = 2.0 * p[c + 2] + y * (6.0 * p[c + 3] + y * 12.0 * p[c + 4])
+    value, slope, curve = _polynomial(p, o + 7, y)
     h = q[int(p[o + 1].real)] - p[o + 3] - value
     return h, v[int(p[o + 2].real)] - slope * yd, -curve * yd * yd
 
@@ -73,12 +85,15 @@ def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
         H[int(p[o + 3].real)] = p[o + 1]
     elif kind == layout.TENDON_LIMIT:
         forces.pull(p, forces.tendon(p, int(p[o + 2].real)), p[o + 1] + 0.0 * q[0], H)
+    elif kind == layout.TENDON_LOOP:
+        forces.pull(p, forces.tendon(p, int(p[o + 1].real)), 1.0 + 0.0 * q[0], H)
+        if p[o + 4].real >= 0.0:
+            other = forces.tendon(p, int(p[o + 4].real))
+            forces.pull(p, other, -_polynomial(p, o + 7, forces.length(q, p, other) - p[o + 6])[1], H)
     else:
         H[int(p[o + 2].real)] = 1.0
         if p[o + 4].real >= 0.0:
-            y, c = q[int(p[o + 4].real)] - p[o + 6], o + 7
-            slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
-            H[int(p[o + 5].real)] -= slope
+            H[int(p[o + 5].real)] -= _polynomial(p, o + 7, q[int(p[o + 4].real)] - p[o + 6])[1]
 
 
 @kernels.helper

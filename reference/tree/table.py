@@ -334,6 +334,13 @@ def _limit(joint: Joint, builder: _Builder, sign: float) -> Floats:
 
 
 def _loop(loop: Loop, builder: _Builder) -> list[Floats]:
+    if loop.type == "tendon":
+        tendons = {tendon.name: i for i, tendon in enumerate(builder.scene.tendons)}
+        ends: list[float] = []
+        for name in (loop.first, loop.second):
+            i = tendons.get(name, -1)
+            ends += [i, 0, builder.scene.rest_length(builder.scene.tendons[i]) if i >= 0 else 0.0]
+        return [_row(layout.TENDON_LOOP, *ends, *loop.polynomial)]
     if loop.type == "joint":
         where: list[float] = []
         for name in (loop.first, loop.second):
