@@ -213,8 +213,8 @@ class Loop(_Named):
     """Rows that are always on.
 
     Attributes:
-        type: connect (two points stay together), weld (two frames do), joint or tendon (the first's coordinate or length
-            follows the second's by a polynomial).
+        type: connect (two points stay together), weld (two frames do), joint or tendon (the first's coordinate or
+            length follows the second's by a polynomial).
         first, second: names of two bodies (the second may be empty: the world), joints or tendons (it may be empty).
         first_position, second_position: of the points in body axes, m.
         orientation: of the second body in the first, for a weld.

@@ -248,5 +248,6 @@ class Rows:
     def _loop(self, loop: Loop, x: Floats) -> tuple[float, Floats, float]:
         """Return h, H and the second derivative of the polynomial."""
         (first, rest), (second, other) = (self._end(loop.type, name) for name in (loop.first, loop.second))
-        P, y = np.polynomial.Polynomial(loop.polynomial), second @ x - other
-        return first @ x - rest - P(y), first - P.deriv()(y) * second, P.deriv(2)(y)
+        P, y = np.polynomial.Polynomial(loop.polynomial), float(second @ x) - other
+        slope, curve = float(P.deriv()(y)), float(P.deriv(2)(y))
+        return float(first @ x) - rest - float(P(y)), first - slope * second, curve

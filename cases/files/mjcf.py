@@ -12,6 +12,7 @@ from crossbody.cases._errors import SceneError
 from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
 from crossbody.cases.scene import (
+    ROWS,
     UNBOUNDED,
     UPRIGHT,
     Actuator,
@@ -184,16 +185,15 @@ def _loop(model: Any, i: int) -> Loop:
     given = law(model, model.eq_solref[i], model.eq_solimp[i])
     coupled = {mujoco.mjtEq.mjEQ_JOINT: ("joint", "jnt"), mujoco.mjtEq.mjEQ_TENDON: ("tendon", "tendon")}
     if kind in coupled:
-        kind, parts = coupled[kind][0], names(model, coupled[kind][1])
+        word, part = coupled[kind]
+        parts = names(model, part)
         return Loop(
-            name=name, type=kind, first=parts(one), second=parts(two) if two >= 0 else "",
+            name=name, type=word, first=parts(one), second=parts(two) if two >= 0 else "",
             polynomial=_floats(data[:5]), law=given,
         )  # fmt: skip
     types = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
     if kind not in types:
-        raise SceneError(
-            f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: connect, weld, joint, tendon."
-        )
+        raise SceneError(f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: {', '.join(ROWS)}.")
     welded = types[kind] == "weld"
     turn, points = data[6:10], (data[3:6], data[:3]) if welded else (data[:3], data[3:6])
     if model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:
