@@ -255,18 +255,21 @@ class Loop(_Named):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tendon(_Named):
-    """A length l = sum c_j q_j of joints.
+    """A length: l = sum c_j q_j of joints, or the distance of two points.
 
     Attributes:
-        joints, coefficients: what it adds up, hinges and slides alone.
+        joints, coefficients: what it adds up, hinges and slides alone; empty for two points.
+        bodies, positions: those of the two points, in body axes, m; the world is an empty name.
         damping, stiffness: as of a joint, of the length.
         rest: dead band of the spring, lowest and highest length.
         range, margin, law: as of a joint.
         friction_loss: as of a joint.
     """
 
-    joints: tuple[str, ...]
-    coefficients: Vector
+    joints: tuple[str, ...] = ()
+    coefficients: Vector = ()
+    bodies: tuple[str, ...] = ()
+    positions: tuple[Vector, ...] = ()
     damping: Vector = ZERO
     stiffness: Vector = ZERO
     rest: Vector = (0.0, 0.0)
@@ -279,10 +282,17 @@ class Tendon(_Named):
     }  # fmt: skip
 
     def __post_init__(self) -> None:
-        """Check that every joint has its coefficient."""
+        """Check that every joint has its coefficient, and that there are two points or none."""
         _Named.__post_init__(self)
-        what = f"Tendon {self.name!r}: coefficients"
-        object.__setattr__(self, "coefficients", _vector(what, self.coefficients, len(self.joints)))
+        what = f"Tendon {self.name!r}"
+        object.__setattr__(self, "coefficients", _vector(f"{what}: coefficients", self.coefficients, len(self.joints)))
+        if bool(self.joints) == bool(self.bodies) or len(self.bodies) not in (0, 2):
+            raise SceneError(f"{what} has joints {list(self.joints)} and bodies {list(self.bodies)}; it needs either, "
+                             "two of the latter.")  # fmt: skip
+        if len(self.positions) != len(self.bodies):
+            raise SceneError(f"{what}: positions is {shown(self.positions)}; it must be a point of each body.")
+        points = tuple(_vector(f"{what}: positions", point, 3) for point in self.positions)
+        object.__setattr__(self, "positions", points)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -367,6 +377,8 @@ class Scene:
         for tendon in self.tendons:
             for name in tendon.joints:
                 _known(tendon, "joints", name, joints)
+            for name in tendon.bodies:
+                _known(tendon, "bodies", name, bodies)
         for actuator in self.actuators:
             _known(actuator, "joint", actuator.joint, joints | {""})
             _known(actuator, "tendon", actuator.tendon, tendons | {""})

@@ -230,10 +230,11 @@ class Rows:
         return drift
 
     def _bounded(self) -> list[tuple[Joint | Tendon, Floats]]:
-        """What may have bounds, with the derivative (nv,) of its coordinate or length."""
+        """What may have bounds, with the derivative (nv,) of its coordinate or length, but distances of points."""
         unit, place = np.eye(self.scene.nv), self.forces.place
         rows = [*(unit[place[joint.name]] for joint in self.scene.joints), *self.forces.T]
-        return list(zip(self.scene.bounded, rows, strict=True))
+        found = zip(self.scene.bounded, rows, strict=True)
+        return [(part, row) for part, row in found if isinstance(part, Joint) or part.joints]
 
     def _end(self, kind: str, name: str) -> tuple[Floats, float]:
         """Return the derivative (nv,) of a coordinate or a length, zero without a name, and what it is at rest."""

@@ -32,7 +32,8 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
     joints.sort(key=lambda joint: [body.name for body in made].index(joint.body))
     single = [joint for joint in joints if joint.type in SINGLE]
     return Scene(
-        bodies=tuple(made), joints=tuple(joints), tendons=_tendons(rng, single), actuators=_actuators(rng, joints),
+        bodies=tuple(made), joints=tuple(joints), actuators=_actuators(rng, joints),
+        tendons=(*_tendons(rng, single), *_strings(rng, made)),
         loops=(*_loops(rng, single), *_joined(rng, made)), **_contacts(rng, made, joints),
         gravity=tuple(rng.normal(size=3) * 5.0), pushes=_pushes(rng, joints),
     )  # fmt: skip
@@ -97,6 +98,15 @@ def _joint(rng: np.random.Generator, name: str, body: str, kind: str) -> Joint:
         range=(-20.0, 25.0) if single and rng.random() < 0.3 else (-np.inf, np.inf), margin=0.01,
         force_range=(-2.0, 3.0) if single and rng.random() < 0.3 else (-np.inf, np.inf),
     )  # fmt: skip
+
+
+def _strings(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Tendon, ...]:
+    """A bounded distance of two bodies, or of one and the world."""
+    if rng.random() < 0.5:
+        return ()
+    ends = (made[-1].name, str(rng.choice(["", *(body.name for body in made[:-1])])))
+    points = tuple(tuple(rng.normal(size=3)) for _ in range(2))
+    return (Tendon(name="rope", bodies=ends, positions=points, range=(0.1, 0.2), margin=0.01),)
 
 
 def _tendons(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Tendon, ...]:

@@ -23,7 +23,6 @@ SAME = 1e-10
 """Of the largest entry: what two programs may make of the same numbers."""
 STATES = 100
 REFUSED = {
-    "dm_control/ball_in_cup": "tendon_type",
     "dm_control/dog": "activation",
     "dm_control/fish": "medium",
     "dm_control/lqr": "no joint",

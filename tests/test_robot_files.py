@@ -380,6 +380,47 @@ def test_a_push_gives_a_floating_body_its_momentum(tmp_path: Path) -> None:
         assert np.abs(run.v[-1] - [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]).max() < 1e-9, engine
 
 
+ROPE = """
+<mujoco><option timestep="1e-3" integrator="RK4"/><worldbody>
+  <body pos="0 0 1"><joint name="x" type="slide" axis="1 0 0" damping="3" stiffness="20"/>
+    <geom type="box" size=".05 .05 .05" contype="0" conaffinity="0"/><site name="cup" pos="0 0 -.1"/></body>
+  <body pos="0 0 .7"><freejoint/><geom size=".025" contype="0" conaffinity="0"/><site name="ball" pos=".02 0 0"/></body>
+</worldbody><tendon><spatial name="string" limited="true" range="0 .3" solreflimit="-4000 -20" solimplimit="1 1 .001">
+<site site="ball"/><site site="cup"/></spatial></tendon><actuator><motor name="a" joint="x"/></actuator>
+<keyframe><key name="thrown" qpos="0 .1 .05 .75 1 0 0 0" qvel="0 .6 -.2 .5 1 2 3" ctrl="1.5"/></keyframe></mujoco>
+"""
+
+
+def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> None:
+    """Its touches in the reference and Pinocchio; MuJoCo's steps meet them where they are."""
+    path = tmp_path / "rope.xml"
+    path.write_text(ROPE, encoding="utf-8")
+    case = cases.load(str(path), "thrown", t_end=0.5)  # errors grow some times from touch to touch
+    assert case.contacts == ("string low", "string high")
+    runs = [
+        engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
+        engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
+        engines.load("mujoco").prepare(case, "matched", dt=1e-4).run(),
+    ]
+    touches = [[event.t for event in run.events if event.contact == 1] for run in runs[:2]]
+    assert len(touches[0]) >= 2
+    assert len(touches[0]) == len(touches[1])
+    assert np.abs(np.subtract(*touches)).max() < 1e-9
+    for run, size in zip(runs, (0.0, 1e-8, 1e-3), strict=True):
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= size
+
+
+def test_what_a_string_cannot_do_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "rope.xml"
+    path.write_text(ROPE.replace("limited", 'stiffness="3" limited', 1), encoding="utf-8")
+    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+        cases.load(str(path))
+    path.write_text(ROPE.replace('<motor name="a" joint="x"/>', '<motor name="a" tendon="string"/>'), encoding="utf-8")
+    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+        cases.load(str(path))
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

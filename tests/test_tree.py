@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import mujoco
@@ -18,7 +19,7 @@ from crossbody.engines import load
 from crossbody.engines._scene import Forces, Rows
 from crossbody.engines.mujoco import _build as build
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined
+from crossbody.engines.pinocchio._joined import Joined, Strings
 from crossbody.engines.pinocchio.scene import tree
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
@@ -116,8 +117,8 @@ def in_space(scene: Scene) -> Scene:
 
 
 def rows_at(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
-    """Return H, h and H' v of the loops of a scene."""
-    count, table = sum(loop.width for loop in scene.loops), tabulate(scene)
+    """Return H, h and H' v of the loops of a scene, or of all rows where there are none."""
+    count, table = sum(loop.width for loop in scene.loops) or len(rows_of(scene)[0]), tabulate(scene)
     H, h, Hdv, w = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count), np.zeros(table.scratch)
     mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
     mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
@@ -186,6 +187,29 @@ def test_loops_in_space_are_those_of_pinocchio(seed: int) -> None:
     # Their H' v is at rest of their velocities, of which those of free joints turn with the body.
     their = to.back(r, v)
     assert close(joined.drift(r, their) - H @ to.bend(r, their), Hdv)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_distances_of_points_are_those_of_the_engines(seed: int) -> None:
+    scene = random_scene(seed)
+    ropes = tuple(tendon for tendon in scene.tendons if tendon.bodies)
+    if not ropes:
+        return
+    scene = scene.replace(tendons=ropes, loops=(), pairs=(), shapes=(), actuators=(), joints=tuple(
+        dataclasses.replace(joint, range=(-np.inf, np.inf)) for joint in scene.joints))  # fmt: skip
+    q, v, u = random_state(scene, np.random.default_rng(seed))
+    H, h, Hdv = rows_at(scene, q, v, u)
+    to, (carried, placed) = Coordinates(scene), tree(scene)
+    strings, r = Strings(carried, placed, ropes), to.theirs(q)
+    their = to.back(r, v)
+    assert close(strings.heights(r), h)
+    assert close(to.velocities(r, strings.jacobian(r)), H)
+    assert close(strings.drift(r, their) - H @ to.bend(r, their), Hdv)
+    model = build.compiled(build.spec_of(scene), scene)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = q, v
+    mujoco.mj_forward(model, data)
+    assert close(h, [data.ten_length[0] - 0.11, 0.19 - data.ten_length[0]])
 
 
 SITES = """

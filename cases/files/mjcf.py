@@ -33,7 +33,7 @@ JOINTS = ("free", "ball", "slide", "hinge")
 SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
 WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 """MuJoCo's word for a kind of part, and ours."""
-JOINT_WRAP = 1
+JOINT_WRAP, SITE_WRAP = 1, 3
 
 
 def compiled(path: Path) -> mujoco.MjModel:
@@ -222,14 +222,22 @@ def _tendon(model: Any, i: int) -> Tendon:
     first, count = int(model.tendon_adr[i]), int(model.tendon_num[i])
     where = slice(first, first + count)
     name = _name(model, "tendon", i)
-    if np.any(model.wrap_type[where] != JOINT_WRAP):
-        raise SceneError(f"Tendon {name!r} runs over sites or shapes; a scene has sums of joints.")
+    kinds, parts = model.wrap_type[where].tolist(), model.wrap_objid[where].tolist()
+    joined: dict[str, Any] = {
+        "joints": tuple(_name(model, "jnt", j) for j in parts), "coefficients": _floats(model.wrap_prm[where]),
+    }  # fmt: skip
+    if kinds == [SITE_WRAP, SITE_WRAP]:
+        joined = {
+            "bodies": tuple(_name(model, "body", int(model.site_bodyid[j])) for j in parts),
+            "positions": tuple(_floats(model.site_pos[j]) for j in parts),
+        }
+    elif set(kinds) != {JOINT_WRAP}:
+        raise SceneError(f"Tendon {name!r} runs over shapes or more than two sites; a scene has two points, or joints.")
     if model.tendon_armature[i] != 0.0:
         raise SceneError(f"Tendon {name!r} has armature, which a scene does not have.")
     return Tendon(
         name=name,
-        joints=tuple(_name(model, "jnt", int(j)) for j in model.wrap_objid[where]),
-        coefficients=_floats(model.wrap_prm[where]),
+        **joined,
         damping=_poly(model.tendon_damping[i], model.tendon_dampingpoly[i]),
         stiffness=_poly(model.tendon_stiffness[i], model.tendon_stiffnesspoly[i]),
         rest=_floats(model.tendon_lengthspring[i]),

@@ -51,7 +51,7 @@ def spec_of(scene: Scene) -> Any:
             if joint.body == body.name:
                 _add_joint(added, joint)
     for tendon in scene.tendons:
-        _add_tendon(spec, tendon)
+        _add_tendon(spec, bodies, tendon)
     for loop in scene.loops:
         _add_loop(spec, loop)
     for actuator in scene.actuators:
@@ -82,13 +82,15 @@ def _add_joint(body: Any, joint: Joint) -> None:
     added.solref_limit, added.solimp_limit = _solref(joint.law), IMPEDANCE
 
 
-def _add_tendon(spec: Any, tendon: Tendon) -> None:
+def _add_tendon(spec: Any, bodies: Mapping[str, Any], tendon: Tendon) -> None:
     added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
     added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
     added.limited, added.range = _bounds(tendon.range)
     added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE
     for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
         added.wrap_joint(name, c)
+    for k, (name, position) in enumerate(zip(tendon.bodies, tendon.positions, strict=True)):
+        added.wrap_site(bodies[name].add_site(name=f"{tendon.name} end {k}", pos=position).name)
 
 
 def _add_loop(spec: Any, loop: Loop) -> None:

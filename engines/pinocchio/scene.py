@@ -10,11 +10,11 @@ import pinocchio as pin
 
 from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Body, Joint, Scene
+from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.engines import _scene as parts
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, by_least_norm
+from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -49,19 +49,22 @@ def build(case: Case, algebra: str) -> Prepared:
         tau[:] = to.back(q, ours) + at_centres(scene, forces, model, data, placed, q)
 
     joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.in_space))
+    strings = Strings(model, placed, tuple(tendon for tendon in scene.tendons if tendon.bodies))
     touching = ContactRows(scene, model, placed)
     order = _order(scene)
 
     def heights(q: Floats) -> Floats:
-        own = np.concatenate([rows.heights(to.ours(q)), joined.heights(q)])[order]
+        own = np.concatenate([rows.heights(to.ours(q)), joined.heights(q), strings.heights(q)])[order]
         return np.concatenate([own, touching.heights(q)])
 
     def jacobian(q: Floats) -> Floats:
-        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q)])[order]
+        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q), strings.jacobian(q)])[order]
         return np.concatenate([own, touching.jacobian(q)])
 
     def drift(q: Floats, v: Floats) -> Floats:
-        own = np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v)])[order]
+        own = np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v), strings.drift(q, v)])[
+            order
+        ]
         return np.concatenate([own, touching.drift(q, v)])
 
     pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
@@ -78,12 +81,12 @@ def build(case: Case, algebra: str) -> Prepared:
 
 
 def _order(scene: Scene) -> list[int]:
-    """Return where each row of a scene stands where the loops in space come last."""
-    wide = np.repeat([loop.in_space for loop in scene.loops], [loop.width for loop in scene.loops])
-    bounds = np.isfinite([part.range for part in scene.bounded]).sum()
-    last = np.concatenate([wide, np.zeros(bounds)]).astype(bool)
-    stands = np.empty(len(last), dtype=int)
-    stands[np.concatenate([np.flatnonzero(~last), np.flatnonzero(last)])] = np.arange(len(last))
+    """Return where each row of a scene stands where loops in space come last but one, and distances of points last."""
+    kinds = [1 * loop.in_space for loop in scene.loops for _ in range(loop.width)]
+    for part in scene.bounded:
+        kinds += [2 * (isinstance(part, Tendon) and bool(part.bodies))] * int(np.isfinite(part.range).sum())
+    stands = np.empty(len(kinds), dtype=int)
+    stands[np.argsort(kinds, kind="stable")] = np.arange(len(kinds))
     return list(stands.tolist())
 
 

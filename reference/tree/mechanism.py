@@ -10,7 +10,7 @@ from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import gradient, touch
-from crossbody.reference.tree import forces, layout, loops, sweeps
+from crossbody.reference.tree import forces, layout, loops, strings, sweeps
 from crossbody.reference.tree.points import point, pull
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
@@ -119,6 +119,8 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
             h[i], hd[i], _ = loops.connect(p, i, w)
         elif kind == layout.TURN:
             h[i], hd[i], _ = loops.turn(p, i, w)
+        elif kind == layout.STRING:
+            h[i], hd[i], _ = strings.string(p, i, w)
         elif kind == layout.CONTACT:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
@@ -138,6 +140,9 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
         elif kind == layout.TURN:
             h[j], _, Hdv[j] = loops.turn(p, idx[j], w)
             loops.turn_columns(p, idx[j], w, H[j])
+        elif kind == layout.STRING:
+            h[j], _, Hdv[j] = strings.string(p, idx[j], w)
+            strings.string_columns(p, idx[j], w, H[j])
         elif kind == layout.CONTACT:
             at, (gap, n, place) = _contact(p, w, idx[j])
             h[j], Hdv[j] = gap[0], gap[2]
