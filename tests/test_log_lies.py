@@ -305,6 +305,18 @@ def test_text_of_two_bytes_a_letter_is_read(encoding: str, tmp_path: Path) -> No
     assert hw.survey(tmp_path / "log.csv").groups[0].rows == 3000
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8", "ascii", "shift_jis"])
+def test_text_that_its_encoding_does_not_hold_is_told(encoding: str, tmp_path: Path) -> None:
+    """Cut off within a letter, or with a byte of another encoding, far behind the first block."""
+    text = ("t,q\n" + "".join(f"{i},{i}\n" for i in range(120_000))).encode(encoding)
+    (tmp_path / "log.csv").write_bytes(text[:-1] if encoding == "utf-16" else text + b"120000,\xff\n")
+    columns = hw.parse_columns(f"options = {{encoding = '{encoding}'}}\n" + '[time]\ncolumn = "t"\n'
+                               '[sensors.q]\ncolumn = "q"\nunit = "rad"\n')  # fmt: skip
+    for go_through in (hw.read, hw.survey):
+        with pytest.raises(LogFormatError, match=r"log\.csv"):
+            go_through(tmp_path / "log.csv", columns)
+
+
 def test_units_below_the_header_are_read_or_told(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,q\n[ms],(deg)\n" + "".join(f"{i},{i}\n" for i in range(300)))
