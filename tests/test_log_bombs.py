@@ -213,6 +213,16 @@ def test_chunks_of_messages_are_decoded_once(tmp_path: Path, monkeypatch: pytest
     assert len(count) == len(summary.chunk_indexes) > 10
 
 
+def test_what_a_library_prints_about_a_file_is_dropped(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """It shows the line that it cannot read, which may hold what a terminal obeys."""
+    pytest.importorskip("mcap")
+    definition = log_bombs.schema(1, "float64 a\nint32 \x1b]0;title\x07 b\n")
+    path = log_bombs.mcap(tmp_path, definition, log_bombs.channel(1, "/rig"), log_bombs.message(1, bytes(20)))
+    with pytest.raises(LogFormatError):
+        hw.survey(path)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_tdms_file_looks_at_the_clock_before_every_channel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nptdms = pytest.importorskip("nptdms")
     count: list[int] = []
