@@ -438,7 +438,7 @@ ROPE = """
 
 
 def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> None:
-    """Its touches in the reference and Pinocchio; MuJoCo's steps meet them where they are."""
+    """Its touches in the reference and Pinocchio; MuJoCo as far as a row that stops pushing is gone for both."""
     path = tmp_path / "rope.xml"
     path.write_text(ROPE, encoding="utf-8")
     case = cases.load(str(path), "thrown", t_end=0.5)  # errors grow some times from touch to touch
@@ -446,15 +446,18 @@ def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> 
     runs = [
         engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
         engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
-        engines.load("mujoco").prepare(case, "matched", dt=1e-4).run(),
     ]
-    touches = [[event.t for event in run.events if event.contact == 1] for run in runs[:2]]
+    touches = [[event.t for event in run.events if event.contact == 1] for run in runs]
     assert len(touches[0]) >= 2
     assert len(touches[0]) == len(touches[1])
     assert np.abs(np.subtract(*touches)).max() < 1e-9
-    for run, size in zip(runs, (0.0, 1e-8, 1e-3), strict=True):
-        assert run.outcome is Outcome.FINISHED
-        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= size
+    assert np.abs(runs[1].q[-1] - runs[0].q[-1]).max() <= 1e-8
+    case = cases.load(str(path), "thrown", t_end=0.2)
+    run = engines.load("mujoco").prepare(case, "matched", dt=2e-5).run()
+    first = engines.load("reference").prepare(case, "compiled").run()
+    assert run.outcome is Outcome.FINISHED
+    # A step is first order where it meets the end of the string: 2e-5 s of the difference that it makes to speeds.
+    assert np.abs(run.q[-1, :4] - first.q[-1, :4]).max() <= 2e-5
 
 
 def test_what_a_string_cannot_do_is_refused(tmp_path: Path) -> None:
@@ -642,8 +645,9 @@ def test_engines_agree_on_what_bounces(tmp_path: Path) -> None:
         engines.load(name).prepare(case, profile, **settings).run().q[-1]
         for name, profile, settings in (
             ("reference", "compiled", {"rtol": 1e-10}), ("reference", "cvode", {"rtol": 1e-10}),
-            ("pinocchio", "law", {}),
+            ("pinocchio", "law", {}), ("mujoco", "matched", {"dt": 1e-4}),
         )
     ]  # fmt: skip
     assert np.abs(ends[1] - ends[0]).max() < 1e-7
     assert np.abs(ends[2] - ends[0]).max() < 1e-6
+    assert np.abs(ends[3] - ends[0]).max() < 1e-4  # first order in the step where it touches, at a few m/s
