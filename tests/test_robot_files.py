@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import random
+import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
@@ -345,6 +351,46 @@ def test_wrong_controls_are_refused(tmp_path: Path, text: str, said: str) -> Non
     table.write_text(text, encoding="utf-8")
     with pytest.raises(InvalidValue, match=said):
         cases.load(write(tmp_path), "raised", ctrl=str(table))
+
+
+@pytest.mark.parametrize("kind", ["npz", "parquet", "csv"])
+def test_damaged_controls_are_refused_in_a_sentence(kind: str, tmp_path: Path) -> None:
+    scene, table, rng = write(tmp_path), tmp_path / f"u.{kind}", random.Random(1)
+    held = pd.DataFrame({"t": np.arange(20.0), "m1": np.zeros(20), "m2": np.ones(20)})
+    match kind:
+        case "npz":
+            np.savez_compressed(table, t=held["t"], ctrl=held[["m1", "m2"]])
+        case "parquet":
+            held.to_parquet(table)
+        case _:
+            held.to_csv(table, index=False)
+    whole = table.read_bytes()
+    for i in range(60):
+        raw = bytearray(whole if i % 2 else whole[: rng.randrange(len(whole))])
+        for _ in range(rng.randrange(4) if raw else 0):
+            raw[rng.randrange(len(raw))] = rng.randrange(256)
+        table.write_bytes(raw)
+        with suppress(InvalidValue):
+            cases.load(scene, "raised", ctrl=str(table))
+
+
+def test_controls_that_unfold_to_gigabytes_are_refused(tmp_path: Path) -> None:
+    scene, zeros = write(tmp_path), np.zeros((1 << 20, 2))
+    with zipfile.ZipFile(tmp_path / "u.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
+        with file.open("t.npy", "w") as one:
+            np.save(one, zeros[:, 0])
+        with file.open("ctrl.npy", "w", force_zip64=True) as one:
+            one.write(b"\x93NUMPY\x01\x00\x76\x00")
+            shape = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({20 << 20}, 2), }}"
+            one.write(shape.ljust(0x75).encode() + b"\n")
+            for _ in range(20):
+                one.write(zeros.tobytes())
+    pq.write_table(pa.table({name: pa.nulls(12 << 20, pa.float64()) for name in ("t", "m1", "m2")}),
+                   tmp_path / "u.parquet")  # fmt: skip
+    assert max((tmp_path / name).stat().st_size for name in ("u.npz", "u.parquet")) < 3_000_000
+    for name in ("u.npz", "u.parquet"):
+        with pytest.raises(InvalidValue, match="MB in memory"):
+            cases.load(scene, "raised", ctrl=str(tmp_path / name))
 
 
 def test_a_push_moves_every_engine_alike(tmp_path: Path) -> None:
