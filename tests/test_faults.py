@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Claim, InvalidValue, Limit, Outcome, Tier, Trajectory, UnknownName, load
+from crossbody.cases import Case, Claim, InvalidValue, Limit, Mode, Outcome, Tier, Trajectory, UnknownName, load
 from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
@@ -47,7 +47,23 @@ def _one_touch_less(run: Trajectory) -> Trajectory:
     return replace(run, events=run.events[:last])
 
 
+def _stopped(run: Trajectory) -> Trajectory:
+    """A record that ends at nine tenths, of a run that says that it finished."""
+    n = int(np.searchsorted(run.t, 0.9 * run.t[-1])) or 1
+    columns = {name: getattr(run, name)[:n] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")}
+    if run.ledger is not None:
+        kept = {name: getattr(run.ledger, name)[:n] for name in ("contact", "input", "dissipated")}
+        columns["ledger"] = replace(run.ledger, **kept)
+    return replace(run, events=tuple(e for e in run.events if e.t <= columns["t"][-1]), **columns)
+
+
 FAULTS: dict[str, Fault] = {
+    "stops early": _stopped,
+    "modes of other events": lambda run: replace(run, mode=np.where(run.mode == Mode.FREE, Mode.BALLISTIC, run.mode)),
+    "an event less": lambda run: replace(run, events=(*run.events[:1], *run.events[2:])),
+    "an event without an instant": lambda run: replace(
+        run, events=(*run.events[:-1], replace(run.events[-1], t=np.nan))
+    ),
     "every force doubled": _forces,
     "force unknown": _silent,
     "velocity 10 % large": lambda run: replace(run, v=1.1 * run.v),

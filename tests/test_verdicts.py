@@ -298,7 +298,7 @@ def test_every_case_is_limited_in_all_that_it_has() -> None:
         "energy_residual",
         "rate_residual",
     }
-    rows = {"gap_residual", "law_residual", "lam_impulse_path"}
+    rows = {"gap_residual", "mode_residual", "law_residual", "lam_impulse_path"}
     opening = {"gap_error", "complementarity", "event_times", "touch_count", "release_count"}
     for name in cases_.names():
         for variant in cases_.variants(name):
