@@ -25,9 +25,9 @@ RTOL = 1e-9
 """Of the reference, if nothing is said."""
 ACCOUNT = 10.0
 """The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
-AFFORD, SHARE = 100, 0.2
+AFFORD, SHARE = 1_000, 0.2
 """The independent integrator is asked for every run of at most so many steps, and gets such a part of its time: it
-takes some ten times the steps, each through Python. Where that is not enough the energy account alone judges."""
+takes some ten times the steps. Where that is not enough the energy account alone judges."""
 REFUSED, SKIPPED, EXCEPTION, CRASHED = "refused", "skipped", "exception", "crashed"
 """Ends of a run that never began, or that should not be: the words beside those of `Outcome`."""
 
