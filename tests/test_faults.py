@@ -175,11 +175,13 @@ def test_a_claimed_number_that_is_missing_is_outside(recorded: Recorded) -> None
         assert "fifth_exit" in _outside(claimed, entry, truth)
 
 
-def test_a_claim_that_judged_nothing_is_reported(recorded: Recorded) -> None:
+@pytest.mark.parametrize("metric", ["ring_changes", "position (model)"])
+def test_a_claim_that_judged_nothing_is_reported(metric: str, recorded: Recorded) -> None:
     case, truth, entries = recorded["bouncing_ball", "listing"]
-    claim = Claim(metric="ring_changes", expected=4.0, tier=Tier.B, source="another mechanism")
-    rows = judged(replace(case, claims=(*case.claims, claim)), [entries["reference:compiled"]], truth, "")
-    assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == ["ring_changes"]
+    claim = Claim(metric=metric, expected=4.0, tier=Tier.B, source="another mechanism")
+    alone = replace(entries["reference:compiled"], refined=None)
+    rows = judged(replace(case, claims=(*case.claims, claim)), [alone], truth, "")
+    assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == [metric]
 
 
 @pytest.mark.parametrize(

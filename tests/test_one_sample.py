@@ -162,6 +162,8 @@ def test_every_sample_and_every_event_counts_in_the_residual_of_the_modes(
     assert measure("mode_residual", case, truth, replace(run, mode=mode)) == 1.0
     assert measure("mode_residual", case, truth, replace(run, events=(*events[:j], *events[j + 1 :]))) >= 1.0
     assert measure("mode_residual", case, truth, replace(run, events=events[::-1])) >= 1.0
+    other = replace(events[j], before=Mode.COLLISION)
+    assert measure("mode_residual", case, truth, replace(run, events=(*events[:j], other, *events[j + 1 :]))) == 1.0
 
 
 @pytest.mark.parametrize(("name", "left"), [("touch_count", Mode.CONTACT), ("release_count", Mode.BALLISTIC)])
