@@ -204,16 +204,21 @@ class Pair(_Named):
     sizes: ClassVar[dict[str, int]] = {"friction": 5}
 
 
+ROWS = {"connect": 3, "weld": 6, "joint": 1, "tendon": 1}
+"""Of every type of loop."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop(_Named):
     """Rows that are always on.
 
     Attributes:
-        type: connect (two points stay together), weld (two frames do) or joint (coordinates follow a polynomial).
-        first, second: names of two bodies (the second may be empty: the world) or two joints (the second may be empty).
+        type: connect (two points stay together), weld (two frames do), joint or tendon (the first's coordinate or
+            length follows the second's by a polynomial).
+        first, second: names of two bodies (the second may be empty: the world), joints or tendons (it may be empty).
         first_position, second_position: of the points in body axes, m.
         orientation: of the second body in the first, for a weld.
-        polynomial: x1 - x1ref = c0 + c1 y + ... + c4 y^4, y = x2 - x2ref, for a joint loop.
+        polynomial: x1 - x1ref = c0 + c1 y + ... + c4 y^4, y = x2 - x2ref, for joints and tendons.
         torque_scale: of a weld's rotational rows, m.
         law: of its rows.
     """
@@ -234,29 +239,37 @@ class Loop(_Named):
     def __post_init__(self) -> None:
         """Check the type."""
         _Named.__post_init__(self)
-        if self.type not in ("connect", "weld", "joint"):
-            raise SceneError(f"Loop {self.name!r}: type is {shown(self.type)}; valid: connect, weld, joint.")
+        if self.type not in ROWS:
+            raise SceneError(f"Loop {self.name!r}: type is {shown(self.type)}; valid: {', '.join(ROWS)}.")
 
     @property
     def width(self) -> int:
         """Number of its rows."""
-        return {"connect": 3, "weld": 6, "joint": 1}[self.type]
+        return ROWS[self.type]
+
+    @property
+    def in_space(self) -> bool:
+        """Whether it joins bodies."""
+        return self.width > 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tendon(_Named):
-    """A length l = sum c_j q_j of joints.
+    """A length: l = sum c_j q_j of joints, or the distance of two points.
 
     Attributes:
-        joints, coefficients: what it adds up, hinges and slides alone.
+        joints, coefficients: what it adds up, hinges and slides alone; empty for two points.
+        bodies, positions: those of the two points, in body axes, m; the world is an empty name.
         damping, stiffness: as of a joint, of the length.
         rest: dead band of the spring, lowest and highest length.
         range, margin, law: as of a joint.
         friction_loss: as of a joint.
     """
 
-    joints: tuple[str, ...]
-    coefficients: Vector
+    joints: tuple[str, ...] = ()
+    coefficients: Vector = ()
+    bodies: tuple[str, ...] = ()
+    positions: tuple[Vector, ...] = ()
     damping: Vector = ZERO
     stiffness: Vector = ZERO
     rest: Vector = (0.0, 0.0)
@@ -269,10 +282,17 @@ class Tendon(_Named):
     }  # fmt: skip
 
     def __post_init__(self) -> None:
-        """Check that every joint has its coefficient."""
+        """Check that every joint has its coefficient, and that there are two points or none."""
         _Named.__post_init__(self)
-        what = f"Tendon {self.name!r}: coefficients"
-        object.__setattr__(self, "coefficients", _vector(what, self.coefficients, len(self.joints)))
+        what = f"Tendon {self.name!r}"
+        object.__setattr__(self, "coefficients", _vector(f"{what}: coefficients", self.coefficients, len(self.joints)))
+        if bool(self.joints) == bool(self.bodies) or len(self.bodies) not in (0, 2):
+            raise SceneError(f"{what} has joints {list(self.joints)} and bodies {list(self.bodies)}; it needs either, "
+                             "two of the latter.")  # fmt: skip
+        if len(self.positions) != len(self.bodies):
+            raise SceneError(f"{what}: positions is {shown(self.positions)}; it must be a point of each body.")
+        points = tuple(_vector(f"{what}: positions", point, 3) for point in self.positions)
+        object.__setattr__(self, "positions", points)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -302,13 +322,24 @@ class Actuator(_Named):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Push(_Named):
+    """A force in world axes at the centre of mass of a body; its x, y and z, N, are inputs behind the controls.
+
+    Attributes:
+        body: whose.
+    """
+
+    body: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """Bodies on joints and what acts between them; see the module.
 
     Attributes:
         bodies: depth-first: behind its parent, and no other branch in between. Engines number them so.
         joints: those of one body stand together, in the order of the bodies.
-        shapes, pairs, loops, tendons, actuators: what else there is.
+        shapes, pairs, loops, tendons, actuators, pushes: what else there is.
         gravity: m/s^2.
     """
 
@@ -319,12 +350,13 @@ class Scene:
     loops: tuple[Loop, ...] = ()
     tendons: tuple[Tendon, ...] = ()
     actuators: tuple[Actuator, ...] = ()
+    pushes: tuple[Push, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
 
     def __post_init__(self) -> None:
         """Check that names are unique, that every name which is spoken of is there, and the order of the parts."""
         object.__setattr__(self, "gravity", _vector("Scene.gravity", self.gravity, 3))
-        for group in ("bodies", "joints", "shapes", "pairs", "loops", "tendons", "actuators"):
+        for group in ("bodies", "joints", "shapes", "pairs", "loops", "tendons", "actuators", "pushes"):
             object.__setattr__(self, group, tuple(getattr(self, group)))
             _unique(group, getattr(self, group))
         if len(self.bodies) > LARGEST:
@@ -339,15 +371,19 @@ class Scene:
             _known(pair, "first", pair.first, shapes)
             _known(pair, "second", pair.second, shapes)
         for loop in self.loops:
-            among = joints | {""} if loop.type == "joint" else bodies
+            among = bodies if loop.in_space else {"", *(tendons if loop.type == "tendon" else joints)}
             _known(loop, "first", loop.first, among - {""})
             _known(loop, "second", loop.second, among)
         for tendon in self.tendons:
             for name in tendon.joints:
                 _known(tendon, "joints", name, joints)
+            for name in tendon.bodies:
+                _known(tendon, "bodies", name, bodies)
         for actuator in self.actuators:
             _known(actuator, "joint", actuator.joint, joints | {""})
             _known(actuator, "tendon", actuator.tendon, tendons | {""})
+        for push in self.pushes:
+            _known(push, "body", push.body, bodies - {""})
 
     def _check_order(self) -> None:
         seen: dict[str, int] = {"": -1}
@@ -379,6 +415,16 @@ class Scene:
     def bounded(self) -> tuple[Joint | Tendon, ...]:
         """What may have bounds, in the order of their rows."""
         return (*self.joints, *self.tendons)
+
+    def rest_length(self, tendon: Tendon) -> float:
+        """Return the length of a tendon at the reference pose."""
+        rest = {joint.name: joint.reference for joint in self.joints}
+        return sum(c * rest[name] for name, c in zip(tendon.joints, tendon.coefficients, strict=True))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of its inputs: the controls, then the components of the pushes."""
+        return (*(part.name for part in self.actuators), *(f"{push.name} {k}" for push in self.pushes for k in "xyz"))
 
     @property
     def nq(self) -> int:

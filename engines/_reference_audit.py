@@ -42,7 +42,8 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
         inverse = np.linalg.solve(mass, np.column_stack([rows.T, f]))
         push = rows @ inverse[:, -1] + Hdv + a1 * (rows @ v) + a0 * h + a2 * h**3
         G = rows @ inverse[:, :-1]
-        if np.linalg.cond(G) > DEPENDENT:  # both bounds of one joint are dependent up to rounding, never exactly
+        # Both bounds of one joint are dependent up to rounding, never exactly; a system without rows has no condition.
+        if system.nc and np.linalg.cond(G) > DEPENDENT:
             return np.full(system.nc, np.nan)
         return np.asarray(np.linalg.solve(G, -push))
 

@@ -70,7 +70,7 @@ class Forces:
         at: joint -> its first position.
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
-        u (nu,): controls in force.
+        u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N.
         T (nt, nv): dl/dx of the tendons.
         A (nu, nv): dl/dx of the actuators, gear included.
     """
@@ -80,6 +80,7 @@ class Forces:
     place: dict[str, int] = field(init=False)
     single: Any = field(init=False)
     u: Floats = field(init=False)
+    pushes: Floats = field(init=False)
     T: Floats = field(init=False)
     A: Floats = field(init=False)
 
@@ -89,7 +90,8 @@ class Forces:
         self.at, self.place = places(scene)
         single = [joint.name for joint in scene.joints if joint.type in ("slide", "hinge")]
         self.single = np.array([(self.at[name], self.place[name]) for name in single], dtype=int).reshape(-1, 2).T
-        self.u, self.T = np.zeros(len(scene.actuators)), tendons(scene)
+        self.u, self.pushes = np.zeros(len(scene.actuators)), np.zeros((len(scene.pushes), 3))
+        self.T = tendons(scene)
         named = {tendon.name: row for tendon, row in zip(scene.tendons, self.T, strict=True)}
         self.A = np.zeros((len(scene.actuators), n))
         for row, actuator in zip(self.A, scene.actuators, strict=True):
@@ -128,8 +130,13 @@ class Forces:
         return turned(q[..., first : first + 4], rest)
 
     def change(self, values: Floats) -> None:
-        """Put controls (nu,) in force."""
-        self.u[:] = values
+        """Put inputs of the scene in force: controls, then pushes."""
+        count = len(self.u)
+        self.u[:], self.pushes[:] = values[:count], values[count:].reshape(-1, 3)
+
+    def still(self) -> None:
+        """Put no input in force."""
+        self.u[:], self.pushes[:] = 0.0, 0.0
 
     def __call__(self, q: Floats, v: Floats) -> Floats:
         """Return the generalised forces (nv,) at a state."""
@@ -193,7 +200,7 @@ class Rows:
     def __post_init__(self) -> None:
         """Refuse loops in space, which an engine's own kinematics must give."""
         for loop in self.scene.loops:
-            if loop.type != "joint":
+            if loop.in_space:
                 raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
 
     def heights(self, q: Floats) -> Floats:
@@ -219,22 +226,29 @@ class Rows:
         x = self.forces.x(q)
         drift = np.zeros(len(self.heights(q)))
         for i, loop in enumerate(self.scene.loops):
-            drift[i] = -self._loop(loop, x)[2] * (v[self.forces.place[loop.second]] ** 2 if loop.second else 0.0)
+            drift[i] = -self._loop(loop, x)[2] * (self._end(loop.type, loop.second)[0] @ v) ** 2
         return drift
 
     def _bounded(self) -> list[tuple[Joint | Tendon, Floats]]:
-        """What may have bounds, with the derivative (nv,) of its coordinate or length."""
+        """What may have bounds, with the derivative (nv,) of its coordinate or length, but distances of points."""
         unit, place = np.eye(self.scene.nv), self.forces.place
         rows = [*(unit[place[joint.name]] for joint in self.scene.joints), *self.forces.T]
-        return list(zip(self.scene.bounded, rows, strict=True))
+        found = zip(self.scene.bounded, rows, strict=True)
+        return [(part, row) for part, row in found if isinstance(part, Joint) or part.joints]
+
+    def _end(self, kind: str, name: str) -> tuple[Floats, float]:
+        """Return the derivative (nv,) of a coordinate or a length, zero without a name, and what it is at rest."""
+        if not name:
+            return np.zeros(self.scene.nv), 0.0
+        if kind == "tendon":
+            i = [tendon.name for tendon in self.scene.tendons].index(name)
+            return self.forces.T[i], self.scene.rest_length(self.scene.tendons[i])
+        reference = next(joint.reference for joint in self.scene.joints if joint.name == name)
+        return np.eye(self.scene.nv)[self.forces.place[name]], reference
 
     def _loop(self, loop: Loop, x: Floats) -> tuple[float, Floats, float]:
         """Return h, H and the second derivative of the polynomial."""
-        place, reference = self.forces.place, {joint.name: joint.reference for joint in self.scene.joints}
-        y = x[place[loop.second]] - reference[loop.second] if loop.second else 0.0
-        P = np.polynomial.Polynomial(loop.polynomial)
-        H = np.zeros(len(x))
-        H[place[loop.first]] = 1.0
-        if loop.second:
-            H[place[loop.second]] -= P.deriv()(y)
-        return x[place[loop.first]] - reference[loop.first] - P(y), H, P.deriv(2)(y)
+        (first, rest), (second, other) = (self._end(loop.type, name) for name in (loop.first, loop.second))
+        P, y = np.polynomial.Polynomial(loop.polynomial), float(second @ x) - other
+        slope, curve = float(P.deriv()(y)), float(P.deriv(2)(y))
+        return float(first @ x) - rest - float(P(y)), first - slope * second, curve

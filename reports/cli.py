@@ -70,9 +70,10 @@ def _parameters(command: _Work) -> _Work:
     @wraps(command)
     def gathered(
         *given: Any, pairs: tuple[str, ...], t_end: float | None, law: str | None, ctrl: str | None,
-        without: str | None, **others: Any,
+        without: str | None, push: tuple[tuple[Any, ...], ...], **others: Any,
     ) -> int:  # fmt: skip
-        named = {"t_end": t_end, "ctrl": ctrl, "without": without}
+        pushes = "; ".join(" ".join(map(str, one)) for one in push) or None
+        named = {"t_end": t_end, "ctrl": ctrl, "without": without, "push": pushes}
         own = [f"{name}={value}" for name, value in named.items() if value is not None]
         return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **others)
 
@@ -81,6 +82,13 @@ def _parameters(command: _Work) -> _Work:
         click.option("--t-end", type=float, metavar="S", help="Horizon, s; as --set t_end=S."),
         click.option("--law", metavar="a0=,a1=", help="Constants of the rows; as --set for each of them."),
         click.option("--ctrl", metavar="FILE", help="Of a robot's file: table of controls (CSV, Parquet, NPZ)."),
+        click.option(
+            "--push",
+            type=(str, *(float,) * 5),
+            multiple=True,
+            metavar="BODY FX FY FZ T0 T1",
+            help="Of a robot's file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
+        ),
         click.option("--without", metavar="PARTS", help="Of a robot's file: parts to leave out of every engine."),
     )
     told: Any = gathered

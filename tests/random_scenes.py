@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Pair, Scene, Shape, Tendon
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Pair, Push, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import PLACES
 
 ALL = ("hinge", "slide", "ball", "free")
@@ -31,9 +32,10 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
     joints.sort(key=lambda joint: [body.name for body in made].index(joint.body))
     single = [joint for joint in joints if joint.type in SINGLE]
     return Scene(
-        bodies=tuple(made), joints=tuple(joints), tendons=_tendons(rng, single), actuators=_actuators(rng, joints),
+        bodies=tuple(made), joints=tuple(joints), actuators=_actuators(rng, joints),
+        tendons=(*_tendons(rng, single), *_strings(rng, made)),
         loops=(*_loops(rng, single), *_joined(rng, made)), **_contacts(rng, made, joints),
-        gravity=tuple(rng.normal(size=3) * 5.0),
+        gravity=tuple(rng.normal(size=3) * 5.0), pushes=_pushes(rng, joints),
     )  # fmt: skip
 
 
@@ -45,7 +47,7 @@ def random_state(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, np
         if joint.type in ("ball", "free"):
             part[-4:] /= np.linalg.norm(part[-4:])
         q += part.tolist()
-    return np.array(q), rng.normal(size=scene.nv) * 2.0, rng.normal(size=len(scene.actuators)) * 3.0
+    return np.array(q), rng.normal(size=scene.nv) * 2.0, rng.normal(size=len(scene.inputs)) * 3.0
 
 
 def _branch(made: Sequence[Body]) -> list[str]:
@@ -98,6 +100,15 @@ def _joint(rng: np.random.Generator, name: str, body: str, kind: str) -> Joint:
     )  # fmt: skip
 
 
+def _strings(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Tendon, ...]:
+    """A bounded distance of two bodies, or of one and the world."""
+    if rng.random() < 0.5:
+        return ()
+    ends = (made[-1].name, str(rng.choice(["", *(body.name for body in made[:-1])])))
+    points = tuple(tuple(rng.normal(size=3)) for _ in range(2))
+    return (Tendon(name="rope", bodies=ends, positions=points, range=(0.1, 0.2), margin=0.01),)
+
+
 def _tendons(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Tendon, ...]:
     if len(single) < 2:
         return ()
@@ -106,23 +117,31 @@ def _tendons(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Tendon,
             name="tendon", joints=(single[0].name, single[-1].name), coefficients=(0.7, -1.3),
             stiffness=(3.0, 0.0, 0.0), damping=(0.4, 0.0, 0.0), rest=(-0.2, 0.1), range=(-30.0, 40.0),
         ),
+        Tendon(name="string", joints=(single[1].name, single[0].name), coefficients=(-0.4, 1.1)),
     )  # fmt: skip
 
 
 def _loops(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Loop, ...]:
     if len(single) < 3 or rng.random() < 0.5:
         return ()
-    return (Loop(name="coupling", type="joint", first=single[1].name, second=single[2].name,
-                 polynomial=(0.1, 0.8, 0.05, -0.02, 0.01)),)  # fmt: skip
+    polynomial = (0.1, 0.8, 0.05, -0.02, 0.01)
+    second = "tendon" if rng.random() < 0.5 else ""
+    return (
+        Loop(name="coupling", type="joint", first=single[1].name, second=single[2].name, polynomial=polynomial),
+        Loop(name="lengths", type="tendon", first="string", second=second, polynomial=polynomial),
+    )
 
 
 def _joined(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Loop, ...]:
-    """Points of two bodies, or of one and the world, that are to meet."""
+    """Points of two bodies, or of one and the world, that are to meet; or their axes too."""
     if rng.random() < 0.5:
         return ()
     ends = (made[-1].name, str(rng.choice(["", *(body.name for body in made[:-1])])))
-    return (Loop(name="joined", type="connect", first=ends[0], second=ends[1], first_position=tuple(rng.normal(size=3)),
-                 second_position=tuple(rng.normal(size=3))),)  # fmt: skip
+    loop = Loop(name="joined", type="connect", first=ends[0], second=ends[1], first_position=tuple(rng.normal(size=3)),
+                second_position=tuple(rng.normal(size=3)))  # fmt: skip
+    if rng.random() < 0.5:
+        loop = replace(loop, type="weld", orientation=_unit(rng, 4), torque_scale=float(rng.uniform(0.1, 3.0)))
+    return (loop,)
 
 
 def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
@@ -137,6 +156,12 @@ def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actua
             control_range=(-1.0, 2.0), force_range=(-4.0, 4.0),
         ))  # fmt: skip
     return tuple(made)
+
+
+def _pushes(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Push, ...]:
+    """On two bodies that move, or twice on one."""
+    bodies = rng.choice([joint.body for joint in joints], size=2 if rng.random() < 0.5 else 0)
+    return tuple(Push(name=f"push {i}", body=str(body)) for i, body in enumerate(bodies))
 
 
 def _contacts(rng: np.random.Generator, made: Sequence[Body], joints: Sequence[Joint]) -> dict[str, tuple]:

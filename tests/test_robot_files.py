@@ -214,13 +214,33 @@ def test_a_loop_given_twice_moves_as_once(tmp_path: Path) -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
+WELDED = """
+<mujoco><option timestep="1e-3"/>
+  <default><joint axis="0 1 0" damping=".01"/><geom type="capsule" size=".02" contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <body pos="0 0 1"><joint/><geom fromto="0 0 0 0 0 -.4"/>
+      <body name="left" pos="0 0 -.4"><joint/><geom fromto="0 0 0 .22 0 0"/></body></body>
+    <body pos=".5 0 1"><joint/><geom fromto="0 0 0 0 0 -.35"/>
+      <body name="right" pos="0 0 -.35"><joint/><geom fromto="0 0 0 -.22 0 0"/></body></body>
+  </worldbody>
+  <equality><weld name="coupler" body1="left" body2="right" relpose=".2 0 0 1 0 .3 0" anchor="-.25 0 0"
+    torquescale=".3" solref="-1 -2"/></equality>
+</mujoco>
+"""
+"""A four-bar whose coupler is two halves that are welded: six rows of which three hold."""
+
+
 def test_loops_move_alike_in_three_engines(tmp_path: Path) -> None:
     """A four-bar in MuJoCo and in Pinocchio, whose rows are its own; and a robot with redundant loops in both."""
     path = tmp_path / "bar.xml"
     loop = '<connect name="loop" body1="last" anchor="0 0 -.4" solref="-1 -2"/>'
     path.write_text(FOUR_BAR.format(loops=loop), encoding="utf-8")
     bar = cases.load(str(path), t_end=0.3, without="contacts", assemble=True)
-    for case in (bar, robot("agility_cassie/cassie", assemble=True, t_end=0.004)):
+    path = tmp_path / "welded.xml"
+    path.write_text(WELDED, encoding="utf-8")
+    welded = cases.load(str(path), t_end=0.3, assemble=True)
+    assert len(welded.contacts) == 6
+    for case in (bar, welded, robot("agility_cassie/cassie", assemble=True, t_end=0.004)):
         runs = [
             engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
             engines.load("mujoco").prepare(case, "matched", dt=2e-4).run(),
@@ -346,6 +366,93 @@ def test_wrong_controls_are_refused(tmp_path: Path, text: str, said: str) -> Non
     table.write_text(text, encoding="utf-8")
     with pytest.raises(InvalidValue, match=said):
         cases.load(write(tmp_path), "raised", ctrl=str(table))
+
+
+def test_a_push_moves_every_engine_alike(tmp_path: Path) -> None:
+    """Two pushes at once on one body, and one that never ends."""
+    path = write(tmp_path)
+    pushes = "body2 3 -2 1 .05 .12; body2 -1 0 4 .1 .2; body1 0 0 .5 .15 inf"
+    case, plain = (cases.load(path, "raised", t_end=0.3, push=text) for text in (pushes, ""))
+    assert case.inputs is not None
+    assert case.inputs.names[-3:] == ("push 2 x", "push 2 y", "push 2 z")
+    runs = [
+        engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
+        engines.load("mujoco").prepare(case, "matched", dt=1e-4).run(),
+        engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
+    ]
+    still = engines.load("reference").prepare(plain, "compiled", rtol=1e-11).run()
+    assert np.abs(runs[0].q[-1] - still.q[-1]).max() > 1e-2
+    for run in runs:
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() < 1e-8
+
+
+def test_a_push_gives_a_floating_body_its_momentum(tmp_path: Path) -> None:
+    """F dt / m, whatever the body does besides; in the file as it stands too."""
+    path = tmp_path / "box.xml"
+    path.write_text(
+        '<mujoco><option gravity="0 0 0"/><worldbody><body name="box"><freejoint/>'
+        '<geom type="box" size=".1 .2 .3" mass="2"/></body></worldbody></mujoco>', encoding="utf-8",
+    )  # fmt: skip
+    case = cases.load(str(path), t_end=0.5, push="box 1 -2 3 .1 .3")
+    for engine, profile in (("reference", "compiled"), ("mujoco", "default"), ("pinocchio", "law")):
+        run = engines.load(engine).prepare(case, profile).run()
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(run.v[-1] - [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]).max() < 1e-9, engine
+
+
+ROPE = """
+<mujoco><option timestep="1e-3" integrator="RK4"/><worldbody>
+  <body pos="0 0 1"><joint name="x" type="slide" axis="1 0 0" damping="3" stiffness="20"/>
+    <geom type="box" size=".05 .05 .05" contype="0" conaffinity="0"/><site name="cup" pos="0 0 -.1"/></body>
+  <body pos="0 0 .7"><freejoint/><geom size=".025" contype="0" conaffinity="0"/><site name="ball" pos=".02 0 0"/></body>
+</worldbody><tendon><spatial name="string" limited="true" range="0 .3" solreflimit="-4000 -20" solimplimit="1 1 .001">
+<site site="ball"/><site site="cup"/></spatial></tendon><actuator><motor name="a" joint="x"/></actuator>
+<keyframe><key name="thrown" qpos="0 .1 .05 .75 1 0 0 0" qvel="0 .6 -.2 .5 1 2 3" ctrl="1.5"/></keyframe></mujoco>
+"""
+
+
+def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> None:
+    """Its touches in the reference and Pinocchio; MuJoCo's steps meet them where they are."""
+    path = tmp_path / "rope.xml"
+    path.write_text(ROPE, encoding="utf-8")
+    case = cases.load(str(path), "thrown", t_end=0.5)  # errors grow some times from touch to touch
+    assert case.contacts == ("string low", "string high")
+    runs = [
+        engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
+        engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
+        engines.load("mujoco").prepare(case, "matched", dt=1e-4).run(),
+    ]
+    touches = [[event.t for event in run.events if event.contact == 1] for run in runs[:2]]
+    assert len(touches[0]) >= 2
+    assert len(touches[0]) == len(touches[1])
+    assert np.abs(np.subtract(*touches)).max() < 1e-9
+    for run, size in zip(runs, (0.0, 1e-8, 1e-3), strict=True):
+        assert run.outcome is Outcome.FINISHED
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= size
+
+
+def test_what_a_string_cannot_do_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "rope.xml"
+    path.write_text(ROPE.replace("limited", 'stiffness="3" limited', 1), encoding="utf-8")
+    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+        cases.load(str(path))
+    path.write_text(ROPE.replace('<motor name="a" joint="x"/>', '<motor name="a" tendon="string"/>'), encoding="utf-8")
+    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+        cases.load(str(path))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("body2 1 2 3 .1", "is no push"), ("body2 1 2 nan 0 1", "is no push"), ("body2 1 2 3 .2 .1", "is no push"),
+        ("body2 1 2 3 -1 1", "is no push"), ("leg 1 2 3 0 1", "no body 'leg'; valid: "),
+        ("body2 a b c d e", "is no push"), ("1", "is no push"),
+    ],
+)  # fmt: skip
+def test_wrong_pushes_are_refused(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InvalidValue, match=said):
+        cases.load(write(tmp_path), "raised", push=text)
 
 
 def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:

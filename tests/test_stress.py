@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -386,6 +388,30 @@ def test_what_a_library_writes_to_the_process_is_heard(capfd: pytest.CaptureFixt
         os.write(2, b"from below\n")
     assert heard == ["from below"]
     assert capfd.readouterr().err == ""
+
+
+TRACED = """
+import cProfile, contextlib, sys, time
+from crossbody.reports.sweep.bounds import Overdue, bounded
+
+def spin(seconds):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        pass
+
+for seconds, spent in ((60.0, 0.0), (0.02, 5.0), (0.01, 0.01), (0.002, 0.002)):
+    for _ in range(20 if spent < 1.0 else 1):
+        with contextlib.suppress(Overdue), bounded(seconds):
+            spin(spent)
+        cProfile.Profile().runcall(spin, 0.0)
+print("through")
+"""
+
+
+def test_a_bound_on_time_leaves_the_interpreter_as_it_was() -> None:
+    """Where a mark of an exception stays that never comes, CPython 3.11 hangs at the next call that is traced."""
+    ended = subprocess.run([sys.executable, "-c", TRACED], capture_output=True, text=True, timeout=60)
+    assert ended.stdout == "through\n", ended.stderr
 
 
 def test_a_bound_on_time_leaves_nothing_behind() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import mujoco
@@ -12,10 +13,14 @@ from random_scenes import random_scene, random_state
 
 from crossbody.cases import CaseUnsupported, Mode, SceneError
 from crossbody.cases.files.case import case_of, rows_of
+from crossbody.cases.files.mjcf import scene_of
 from crossbody.cases.scene import Actuator, Body, Joint, Scene
 from crossbody.engines import load
+from crossbody.engines._scene import Forces, Rows
 from crossbody.engines.mujoco import _build as build
 from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio._joined import Joined, Strings
+from crossbody.engines.pinocchio.scene import tree
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 
@@ -56,13 +61,17 @@ def test_mass_matrix_forces_and_energy_are_those_of_mujoco(seed: int) -> None:
     data = mujoco.MjData(model)
     for _ in range(3):
         q, v, u = random_state(scene, rng)
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u[: model.nu]
         mujoco.mj_forward(model, data)
+        pushed = np.zeros(model.nv)
+        for push, force in zip(scene.pushes, u[model.nu :].reshape(-1, 3), strict=True):
+            i = model.body(push.body).id
+            mujoco.mj_applyFT(model, data, force, np.zeros(3), data.xipos[i], i, pushed)
         full = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, full)
         M, f, e = ours(scene, q, v, u)
         assert close(M, full)
-        assert close(f, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
+        assert close(f, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias + pushed)
         spared = (model.body_gravcomp * model.body_mass * (data.xipos @ model.opt.gravity)).sum()
         assert close(e, [data.energy[1], data.energy[0] + spared])
 
@@ -92,7 +101,7 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     q, v, _ = random_state(scene, rng)
     H, h, Hdv = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count)
     w = np.zeros(table.scratch)
-    still = np.zeros(len(scene.actuators))
+    still = np.zeros(len(scene.inputs))
     mechanism.dynamics(0.0, q, v, still, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
     mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
@@ -102,29 +111,45 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     assert close(moved[1].imag / step, Hdv)
 
 
+def in_space(scene: Scene) -> Scene:
+    """The scene with its loops in space alone."""
+    return scene.replace(loops=tuple(loop for loop in scene.loops if loop.in_space))
+
+
+def rows_at(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
+    """Return H, h and H' v of the loops of a scene, or of all rows where there are none."""
+    count, table = sum(loop.width for loop in scene.loops) or len(rows_of(scene)[0]), tabulate(scene)
+    H, h, Hdv, w = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count), np.zeros(table.scratch)
+    mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
+    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
+    return H, h, Hdv
+
+
 @pytest.mark.parametrize("seed", SEEDS)
-def test_points_that_meet_are_those_of_mujoco(seed: int) -> None:
-    """Gaps, rows and their rates of `connect`; H'v by what MuJoCo's rows are at two instants of a motion."""
+def test_loops_are_those_of_mujoco(seed: int) -> None:
+    """Gaps and rows; H'v by what MuJoCo's rows are at two instants of a motion."""
     scene = random_scene(seed)
-    joined = [loop for loop in scene.loops if loop.type == "connect"]
-    if not joined:
+    if not scene.loops:
         return
-    scene = scene.replace(loops=tuple(joined))
     model = build.compiled(build.spec_of(scene), scene)
-    data, table, rng = mujoco.MjData(model), tabulate(scene), np.random.default_rng(seed)
+    data, count = mujoco.MjData(model), sum(loop.width for loop in scene.loops)
+    turns = np.concatenate([np.arange(loop.width) >= 3 for loop in scene.loops])
 
     def look(q: Any, v: Any) -> tuple[Any, Any]:
         data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_forward(model, data)
-        return np.array(data.efc_pos[:3]), np.array(data.efc_J).reshape(-1, model.nv)[:3]
+        h, J = np.array(data.efc_pos[:count]), np.array(data.efc_J).reshape(-1, model.nv)[:count]
+        # Of the two quaternions of a turn MuJoCo takes the one that those of the bodies give.
+        signs = np.where(turns & (h[turns] @ mine[turns] < 0.0), -1.0, 1.0)
+        return signs * h, signs[:, None] * J
 
-    q, v, u = random_state(scene, rng)
-    h, J = look(q, v)
-    if not len(h):
+    q, v, u = random_state(scene, np.random.default_rng(seed))
+    H, mine, Hdv = rows_at(scene, q, v, u)
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    if data.ne < count:
         return  # MuJoCo leaves out rows that nothing moves
-    H, mine, Hdv, w = np.zeros((3, scene.nv)), np.zeros(3), np.zeros(3), np.zeros(table.scratch)
-    mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
-    mechanism.rows(0.0, q, v, table.p, w, np.arange(3), 3, H, mine, Hdv)
+    h, J = look(q, v)
     assert close(mine, h)
     assert close(H, J)
     step, ends = 1e-6, [np.array(q), np.array(q)]
@@ -132,6 +157,85 @@ def test_points_that_meet_are_those_of_mujoco(seed: int) -> None:
     mujoco.mj_integratePos(model, ends[1], v, -step)
     moved = (look(ends[0], v)[1] - look(ends[1], v)[1]) @ v / (2.0 * step)
     assert np.abs(moved - Hdv).max() <= 1e-7 * max(1.0, np.abs(Hdv).max())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_couplings_are_those_of_the_engines(seed: int) -> None:
+    scene = random_scene(seed)
+    scene = scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space), pairs=(), shapes=())
+    if not scene.loops:
+        return
+    rows = Rows(scene, Forces(scene))
+    q, v, u = random_state(scene, np.random.default_rng(seed))
+    H, h, Hdv = rows_at(scene, q, v, u)
+    for mine, theirs in ((h, rows.heights(q)), (H, rows.jacobian(q)), (Hdv, rows.drift(q, v))):
+        assert close(mine, theirs[: len(mine)])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_loops_in_space_are_those_of_pinocchio(seed: int) -> None:
+    scene = in_space(random_scene(seed))
+    if not scene.loops:
+        return
+    to, (model, placed) = Coordinates(scene), tree(scene)
+    joined = Joined(model, placed, scene.loops)
+    q, v, u = random_state(scene, np.random.default_rng(seed))
+    r = to.theirs(q)
+    H, h, Hdv = rows_at(scene, q, v, u)
+    assert close(joined.heights(r), h)
+    assert close(to.velocities(r, joined.jacobian(r)), H)
+    # Their H' v is at rest of their velocities, of which those of free joints turn with the body.
+    their = to.back(r, v)
+    assert close(joined.drift(r, their) - H @ to.bend(r, their), Hdv)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_distances_of_points_are_those_of_the_engines(seed: int) -> None:
+    scene = random_scene(seed)
+    ropes = tuple(tendon for tendon in scene.tendons if tendon.bodies)
+    if not ropes:
+        return
+    scene = scene.replace(tendons=ropes, loops=(), pairs=(), shapes=(), actuators=(), joints=tuple(
+        dataclasses.replace(joint, range=(-np.inf, np.inf)) for joint in scene.joints))  # fmt: skip
+    q, v, u = random_state(scene, np.random.default_rng(seed))
+    H, h, Hdv = rows_at(scene, q, v, u)
+    to, (carried, placed) = Coordinates(scene), tree(scene)
+    strings, r = Strings(carried, placed, ropes), to.theirs(q)
+    their = to.back(r, v)
+    assert close(strings.heights(r), h)
+    assert close(to.velocities(r, strings.jacobian(r)), H)
+    assert close(strings.drift(r, their) - H @ to.bend(r, their), Hdv)
+    model = build.compiled(build.spec_of(scene), scene)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = q, v
+    mujoco.mj_forward(model, data)
+    assert close(h, [data.ten_length[0] - 0.11, 0.19 - data.ten_length[0]])
+
+
+SITES = """
+<mujoco><worldbody>
+  <body pos="0 0 1"><freejoint/><geom size=".1"/><site name="a" pos=".1 .2 .3" euler="20 30 40"/></body>
+  <body pos="0 1 1"><joint type="ball"/><geom size=".1" pos=".1 0 0"/><site name="b" pos="0 .2 -.3" euler="50 -30 10"/>
+  </body>
+</worldbody><equality><{kind} site1="a" site2="b"/></equality></mujoco>
+"""
+
+
+@pytest.mark.parametrize("kind", ["connect", "weld"])
+def test_loops_of_sites_are_those_of_their_bodies(kind: str) -> None:
+    """The same gap and the same rows, but for the axes in which the turn between the sites is said."""
+    model = mujoco.MjModel.from_xml_string(SITES.format(kind=kind))
+    data, scene, rng = mujoco.MjData(model), scene_of(model), np.random.default_rng(3)
+    for _ in range(5):
+        q, v, u = random_state(scene, rng)
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        J, their = np.array(data.efc_J).reshape(-1, model.nv)[: data.ne], np.array(data.efc_pos[: data.ne])
+        H, h, _ = rows_at(scene, q, v, u)
+        assert close(H[:3], J[:3])
+        assert close(h[:3], their[:3])
+        assert close(H[3:].T @ H[3:], J[3:].T @ J[3:])
+        assert close(H[3:].T @ h[3:], J[3:].T @ their[3:])
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -178,7 +282,7 @@ def test_coordinates_of_pinocchio_lead_there_and_back(seed: int) -> None:
     assert close(to.back(r, tau) @ u, tau @ v)
     free = tuple(int(Mode.FREE) for _ in range(rows.nc))
     vd = to.velocities(r, rows.accelerate(r, u, free)[0]) + to.bend(r, u)
-    M, f, _ = ours(scene, q, v, np.zeros(len(scene.actuators)))
+    M, f, _ = ours(scene, q, v, np.zeros(len(scene.inputs)))
     assert np.abs(vd - np.linalg.solve(M, f)).max() <= 1e-10 * np.abs(vd).max()
     ahead, behind, step = r.copy(), r.copy(), 1e-6
     for place, sign in ((ahead, 1.0), (behind, -1.0)):

@@ -15,7 +15,7 @@ from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Valu
 from crossbody.cases._errors import SceneError, UnknownName
 from crossbody.cases._rotations import normalised
 from crossbody.cases.files.assemble import assembled
-from crossbody.cases.files.controls import read_controls
+from crossbody.cases.files.controls import pushed, read_controls
 from crossbody.cases.files.reading import findings_of, model_of, scene_of
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import contacts
@@ -27,6 +27,7 @@ PARAMETERS = {
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
     "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
+    "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
     "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
@@ -64,12 +65,12 @@ class FileCase:
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
-        table = Path(str(p["ctrl"])) if p["ctrl"] else None
+        inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
+        scene, inputs = pushed(scene, inputs, str(p["push"]))
         return case_of(
             scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),
             findings=findings_of(self.path),
-            inputs=read_controls(table, scene) if table else held(scene, ctrl),
-            parameters=p, file=str(self.path.resolve()),
+            inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
 
 
@@ -120,7 +121,7 @@ def case_of(
         variant: of the case.
         q0: start (nq,); the reference pose if not given.
         v0: velocities there (nv,); at rest if not given.
-        inputs: controls of the actuators; zero if not given.
+        inputs: controls of the actuators, then the components of the pushes; zero if not given.
         t_end: horizon, s.
         parameters: of the case.
         file: where the scene comes from.
@@ -155,6 +156,14 @@ def check_runnable(scene: Scene) -> None:
     for part in scene.bounded:
         if part.friction_loss:
             raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
+    strings = {tendon.name: tendon for tendon in scene.tendons if tendon.bodies}
+    used = {*(part.tendon for part in scene.actuators), *(n for part in scene.loops for n in (part.first, part.second)
+            if part.type == "tendon")}  # fmt: skip
+    for name, tendon in strings.items():
+        if any(tendon.stiffness) or any(tendon.damping) or name in used:
+            raise SceneError(
+                f"Tendon {name!r} runs between two points: it can have a range, and nothing acts along it."
+            )
 
 
 ENTRIES = {
@@ -196,12 +205,17 @@ def reference_pose(scene: Scene) -> Floats:
 
 
 def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
-    """Return controls that are held from the start on; None for a scene without actuators."""
-    if not scene.actuators:
+    """Return controls that are held from the start on, with pushes of 0 N; None for a scene without inputs."""
+    if not scene.inputs:
         return None
-    values = np.zeros((1, len(scene.actuators))) if ctrl is None else np.atleast_2d(np.asarray(ctrl, dtype=float))
-    names = tuple(actuator.name for actuator in scene.actuators)
-    return Inputs(names=names, times=np.zeros(1), values=values)
+    values = np.zeros((1, len(scene.inputs)))
+    if ctrl is not None:
+        values[0, : len(scene.actuators)] = ctrl
+    return Inputs(names=scene.inputs, times=np.zeros(1), values=values)
+
+
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+"""Of a loop in space: its points, then its axes."""
 
 
 def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
@@ -209,7 +223,7 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
     names, laws, unilateral = [], [], []
     for loop in scene.loops:
         for k in range(loop.width):
-            names.append(loop.name if loop.width == 1 else f"{loop.name} {'xyz'[k]}")
+            names.append(loop.name if loop.width == 1 else f"{loop.name} {COMPONENTS[k]}")
             laws.append(loop.law)
             unilateral.append(False)
     for part in scene.bounded:

@@ -1,4 +1,7 @@
-"""Controls of a robot's file, from a table: a column t in s, and one for every actuator by its name."""
+"""What acts on a robot's file from outside: controls from a table, and pushes.
+
+A table has a column t in s, and one for every actuator by its name.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Inputs
 from crossbody.cases._errors import InvalidValue
 from crossbody.cases._regular import open_regular
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import Push, Scene
 
 
 def read_controls(path: Path, scene: Scene) -> Inputs:
@@ -49,3 +53,51 @@ def _from_table(path: Path, names: list[str]) -> tuple[Floats, Floats]:
     if missing:
         raise ValueError(f"there is no column {missing[0]!r}; it has: {', '.join(map(str, table.columns))}.")
     return table["t"].to_numpy(dtype=float), table[names].to_numpy(dtype=float)
+
+
+def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Inputs | None]:
+    """Return a scene with pushes, and what acts on it with them.
+
+    Args:
+        scene: without pushes.
+        inputs: its controls.
+        text: BODY FX FY FZ T0 T1, in N and s, of every push; they are parted by a semicolon.
+
+    Raises:
+        InvalidValue: naming what is wrong with a push.
+    """
+    given = [_push(part, scene) for part in text.split(";") if part.strip()]
+    if not given:
+        return scene, inputs
+    scene = scene.replace(pushes=[Push(name=f"push {i}", body=body) for i, (body, _, _) in enumerate(given)])
+    own = [] if inputs is None else inputs.times.tolist()
+    times = np.unique([*own, *(t for _, _, span in given for t in span if np.isfinite(t))])
+    values = np.zeros((len(times), len(scene.inputs)))
+    if inputs is not None:
+        last = np.searchsorted(inputs.times, times, side="right") - 1
+        values[last >= 0, : len(inputs.names)] = inputs.values[last[last >= 0]]
+    for (_, force, (start, end)), columns in zip(given, _columns(scene), strict=True):
+        values[(times >= start) & (times < end), columns] = force
+    return scene, Inputs(names=scene.inputs, times=times, values=values)
+
+
+def _columns(scene: Scene) -> list[slice]:
+    """Return which inputs each push is."""
+    first = len(scene.actuators)
+    return [slice(first + 3 * i, first + 3 * i + 3) for i in range(len(scene.pushes))]
+
+
+def _push(text: str, scene: Scene) -> tuple[str, Floats, tuple[float, float]]:
+    """Return body, force and times of a push."""
+    body, *numbers = text.rsplit(maxsplit=5)
+    try:
+        *force, start, end = (float(number) for number in numbers)
+    except ValueError:
+        force, start, end = [], 0.0, 0.0
+    if len(force) != 3 or not (np.isfinite(force).all() and 0.0 <= start < end):
+        valid = "BODY FX FY FZ T0 T1 with finite forces and 0 <= T0 < T1"
+        raise InvalidValue(f"push: {shown(text.strip())} is no push; valid: {valid}.")
+    names = [one.name for one in scene.bodies]
+    if body.strip() not in names:
+        raise InvalidValue(f"push: there is no body {shown(body.strip())}; valid: {', '.join(names)}.")
+    return body.strip(), np.array(force), (start, end)

@@ -12,7 +12,9 @@ from crossbody.cases._errors import SceneError
 from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
 from crossbody.cases.scene import (
+    ROWS,
     UNBOUNDED,
+    UPRIGHT,
     Actuator,
     Body,
     Joint,
@@ -31,7 +33,7 @@ JOINTS = ("free", "ball", "slide", "hinge")
 SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
 WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 """MuJoCo's word for a kind of part, and ours."""
-JOINT_WRAP = 1
+JOINT_WRAP, SITE_WRAP = 1, 3
 
 
 def compiled(path: Path) -> mujoco.MjModel:
@@ -178,20 +180,40 @@ def _loop(model: Any, i: int) -> Loop:
     import mujoco
 
     kind, data, name = int(model.eq_type[i]), model.eq_data[i], _name(model, "eq", i)
-    bodies, joints = names(model, "body"), names(model, "jnt")
+    bodies = names(model, "body")
     one, two = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     given = law(model, model.eq_solref[i], model.eq_solimp[i])
-    if kind == mujoco.mjtEq.mjEQ_JOINT:
-        second = joints(two) if two >= 0 else ""
+    coupled = {mujoco.mjtEq.mjEQ_JOINT: ("joint", "jnt"), mujoco.mjtEq.mjEQ_TENDON: ("tendon", "tendon")}
+    if kind in coupled:
+        word, part = coupled[kind]
+        parts = names(model, part)
         return Loop(
-            name=name, type="joint", first=joints(one), second=second, polynomial=_floats(data[:5]), law=given
+            name=name, type=word, first=parts(one), second=parts(two) if two >= 0 else "",
+            polynomial=_floats(data[:5]), law=given,
         )  # fmt: skip
-    if kind == mujoco.mjtEq.mjEQ_CONNECT and model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_BODY:
-        return Loop(
-            name=name, type="connect", first=bodies(one), second=bodies(two),
-            first_position=_floats(data[:3]), second_position=_floats(data[3:6]), law=given,
-        )  # fmt: skip
-    raise SceneError(f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: connect by bodies, joint.")
+    types = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
+    if kind not in types:
+        raise SceneError(f"Equality {name!r} is of type {mujoco.mjtEq(kind).name}; valid: {', '.join(ROWS)}.")
+    welded = types[kind] == "weld"
+    turn, points = data[6:10], (data[3:6], data[:3]) if welded else (data[:3], data[3:6])
+    if model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:
+        turn, points = _between(model, one, two), (model.site_pos[one], model.site_pos[two])
+        one, two = int(model.site_bodyid[one]), int(model.site_bodyid[two])
+    return Loop(
+        name=name, type=types[kind], first=bodies(one), second=bodies(two), first_position=_floats(points[0]),
+        second_position=_floats(points[1]), orientation=_floats(turn) if welded else UPRIGHT,
+        torque_scale=float(data[10]) if welded else 1.0, law=given,
+    )  # fmt: skip
+
+
+def _between(model: Any, one: int, two: int) -> Any:
+    """Return the orientation of the second body in the first with which the axes of two sites are the same."""
+    import mujoco
+
+    back, turn = np.zeros(4), np.zeros(4)
+    mujoco.mju_negQuat(back, model.site_quat[two])
+    mujoco.mju_mulQuat(turn, model.site_quat[one], back)
+    return turn
 
 
 def _tendon(model: Any, i: int) -> Tendon:
@@ -200,14 +222,22 @@ def _tendon(model: Any, i: int) -> Tendon:
     first, count = int(model.tendon_adr[i]), int(model.tendon_num[i])
     where = slice(first, first + count)
     name = _name(model, "tendon", i)
-    if np.any(model.wrap_type[where] != JOINT_WRAP):
-        raise SceneError(f"Tendon {name!r} runs over sites or shapes; a scene has sums of joints.")
+    kinds, parts = model.wrap_type[where].tolist(), model.wrap_objid[where].tolist()
+    joined: dict[str, Any] = {
+        "joints": tuple(_name(model, "jnt", j) for j in parts), "coefficients": _floats(model.wrap_prm[where]),
+    }  # fmt: skip
+    if kinds == [SITE_WRAP, SITE_WRAP]:
+        joined = {
+            "bodies": tuple(_name(model, "body", int(model.site_bodyid[j])) for j in parts),
+            "positions": tuple(_floats(model.site_pos[j]) for j in parts),
+        }
+    elif set(kinds) != {JOINT_WRAP}:
+        raise SceneError(f"Tendon {name!r} runs over shapes or more than two sites; a scene has two points, or joints.")
     if model.tendon_armature[i] != 0.0:
         raise SceneError(f"Tendon {name!r} has armature, which a scene does not have.")
     return Tendon(
         name=name,
-        joints=tuple(_name(model, "jnt", int(j)) for j in model.wrap_objid[where]),
-        coefficients=_floats(model.wrap_prm[where]),
+        **joined,
         damping=_poly(model.tendon_damping[i], model.tendon_dampingpoly[i]),
         stiffness=_poly(model.tendon_stiffness[i], model.tendon_stiffnesspoly[i]),
         rest=_floats(model.tendon_lengthspring[i]),

@@ -19,7 +19,7 @@ READ = frozenset(
     pair_solimp pair_solreffriction exclude_signature eq_type eq_obj1id eq_obj2id eq_objtype eq_active0 eq_data
     eq_solref eq_solimp tendon_adr tendon_num tendon_damping tendon_dampingpoly tendon_stiffness
     tendon_stiffnesspoly tendon_lengthspring tendon_range tendon_limited tendon_margin tendon_solref_lim
-    tendon_solimp_lim tendon_frictionloss tendon_armature tendon_actfrcrange tendon_actfrclimited wrap_type
+    tendon_solimp_lim tendon_frictionloss tendon_armature tendon_actfrcrange tendon_actfrclimited tendon_type wrap_type
     wrap_objid wrap_prm actuator_trntype actuator_trnid actuator_gear actuator_gaintype actuator_gainprm
     actuator_biastype actuator_biasprm actuator_dyntype actuator_dynprm actuator_ctrlrange actuator_ctrllimited
     actuator_forcerange actuator_forcelimited actuator_armature actuator_damping key_qpos key_qvel key_ctrl

@@ -8,7 +8,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases import CaseUnsupported
 from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Tendon
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
@@ -17,12 +16,14 @@ from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
 def compiled(spec: Any, scene: Scene) -> Any:
     """Return the compiled model, with what no element of the format says.
 
-    That is where the springs of ball joints rest, and the second point of a `connect`, which is computed there.
+    That is where the springs of ball joints rest, and the points of loops, which are computed there from the pose.
     """
     model = spec.compile()
     for i, loop in enumerate(scene.loops):
         if loop.type == "connect":
-            model.eq_data[i, 3:6] = loop.second_position
+            model.eq_data[i, :6] = *loop.first_position, *loop.second_position
+        if loop.type == "weld":
+            model.eq_data[i, :6] = *loop.second_position, *loop.first_position
     for joint in scene.joints:
         if joint.type == "ball":
             at = int(model.joint(joint.name).qposadr[0])
@@ -50,7 +51,7 @@ def spec_of(scene: Scene) -> Any:
             if joint.body == body.name:
                 _add_joint(added, joint)
     for tendon in scene.tendons:
-        _add_tendon(spec, tendon)
+        _add_tendon(spec, bodies, tendon)
     for loop in scene.loops:
         _add_loop(spec, loop)
     for actuator in scene.actuators:
@@ -81,27 +82,28 @@ def _add_joint(body: Any, joint: Joint) -> None:
     added.solref_limit, added.solimp_limit = _solref(joint.law), IMPEDANCE
 
 
-def _add_tendon(spec: Any, tendon: Tendon) -> None:
+def _add_tendon(spec: Any, bodies: Mapping[str, Any], tendon: Tendon) -> None:
     added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
     added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
     added.limited, added.range = _bounds(tendon.range)
     added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE
     for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
         added.wrap_joint(name, c)
+    for k, (name, position) in enumerate(zip(tendon.bodies, tendon.positions, strict=True)):
+        added.wrap_site(bodies[name].add_site(name=f"{tendon.name} end {k}", pos=position).name)
 
 
 def _add_loop(spec: Any, loop: Loop) -> None:
-    if loop.type == "weld":
-        raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
-    kind = mujoco.mjtEq.mjEQ_JOINT if loop.type == "joint" else mujoco.mjtEq.mjEQ_CONNECT
-    added = spec.add_equality(name=loop.name, type=kind, active=True)
-    added.objtype = mujoco.mjtObj.mjOBJ_JOINT if loop.type == "joint" else mujoco.mjtObj.mjOBJ_BODY
+    added = spec.add_equality(name=loop.name, type=getattr(mujoco.mjtEq, f"mjEQ_{loop.type.upper()}"), active=True)
+    kind = "body" if loop.in_space else loop.type
+    added.objtype = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
     added.name1, added.name2 = loop.first, loop.second
-    if loop.type == "joint":
-        added.data[:5] = loop.polynomial
-    else:
+    if loop.in_space:
         added.name1, added.name2 = loop.first or "world", loop.second or "world"
-        added.data[:3] = loop.first_position
+    else:
+        added.data[:5] = loop.polynomial
+    if loop.type == "weld":
+        added.data[6:11] = *loop.orientation, loop.torque_scale
     added.solref, added.solimp = _solref(loop.law), IMPEDANCE
 
 

@@ -17,7 +17,7 @@ from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Modes, Observe
-from crossbody.engines._scene import Forces, tendons
+from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._observe import mass_matrix
@@ -128,11 +128,17 @@ def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
 
 
 def _change(case: Case, data: Any) -> Callable[[float], None]:
-    given = case.inputs
+    given, scene = case.inputs, _scene(case)
+    numbers = {body.name: i for i, body in enumerate(scene.bodies, start=1)}  # a file need not name them
+    pushed = [numbers[push.body] for push in scene.pushes]
 
     def change(t: float) -> None:
-        if given is not None:
-            data.ctrl[:] = given.values[np.searchsorted(given.times, t)]
+        if given is None:
+            return
+        controls, pushes = np.split(given.values[np.searchsorted(given.times, t)], [len(scene.actuators)])
+        data.ctrl[:] = controls
+        data.xfrc_applied[:] = 0.0
+        np.add.at(data.xfrc_applied[:, :3], pushed, pushes.reshape(-1, 3))
 
     return change
 
@@ -200,12 +206,13 @@ class Rows:
         return row + sum(int(bit) << k for k, bit in enumerate(bits))
 
     def _place(self, j: int, kind: int, part: int) -> int:
-        """Return which bound an active row is: the upper one has a falling gap."""
+        """Return which bound an active row is: of a joint the upper one has a falling gap, of a tendon it is nearer."""
         J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
         if kind == LIMITS[0]:
             return self.places[kind, part, bool(J.sum() < 0.0)]
-        slope = J @ tendons(self.scene)[part]
-        return self.places[kind, part, bool(slope < 0.0)]
+        (low, high), length = self.scene.tendons[part].range, self.data.ten_length[part]
+        off = abs(self.data.efc_pos[j] - (length - low)), abs(self.data.efc_pos[j] - (high - length))
+        return self.places[kind, part, bool(off[1] < off[0])]
 
     def modes(self) -> Modes:
         """Return the mode of every row: a bound is in contact where it pushes."""
@@ -224,7 +231,7 @@ class Rows:
         def heights(q: Floats) -> list[float]:
             h: list[float] = []
             x_all = forces.x(q)
-            lengths = [*(x_all[forces.place[joint.name]] for joint in self.scene.joints), *(forces.T @ x_all)]
+            lengths = [*(x_all[forces.place[joint.name]] for joint in self.scene.joints), *data.ten_length]
             for part, x in zip(self.scene.bounded, lengths, strict=True):
                 low, high = part.range
                 h += [x - low - part.margin] if np.isfinite(low) else []

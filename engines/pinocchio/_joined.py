@@ -1,74 +1,201 @@
-"""Points of two bodies that are to meet, by Pinocchio's own kinematics; and equations with dependent rows.
+"""Points, and axes, of two bodies that meet or stay within a distance, by Pinocchio's own kinematics; dependent rows.
 
-h = x1 - x2,    H = J1 - J2 of the points,    H' v = their accelerations at v' = 0
+Points: h = x1 - x2, H = J1 - J2, H' v = their accelerations at v' = 0. Axes: with the quaternion (e0, e) of R2' R1 and
+A = s/2 (e0 1 - [e]x) R2', h = s e, H = A (J1 - J2) of the angular velocities w1, w2, and at v' = 0
+
+    H' v = A (w1' - w2' - w2 x w1) - s/4 |w1 - w2|^2 e
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Loop
+from crossbody.cases.scene import Loop, Tendon
 from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian
 
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
 AXES = pin.LOCAL_WORLD_ALIGNED
 
 
+@dataclass(frozen=True, slots=True)
+class End:
+    """One end of a loop: the joint that carries it, and its pose in that joint's frame."""
+
+    joint: int
+    pose: Any
+
+
 class Joined:
-    """Rows of the loops that join points, three a loop.
+    """Rows of the loops in space: three of points, and three of axes where it is a weld.
 
     Args:
         model: Pinocchio's.
         placed: body -> joint that carries it, and its pose in that joint's frame.
-        loops: of type connect.
+        loops: of type connect or weld.
     """
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], loops: tuple[Loop, ...]) -> None:
         self.model, self.data = model, model.createData()
-        self.none = np.zeros(model.nv)
+        self.none, self.loops = np.zeros(model.nv), loops
         self.ends = [
-            [_point(placed[loop.first], loop.first_position), _point(placed[loop.second], loop.second_position)]
+            (
+                _end(placed[loop.first], loop.first_position, loop.orientation),
+                _end(placed[loop.second], loop.second_position, (1.0, 0.0, 0.0, 0.0)),
+            )
             for loop in loops
         ]
 
     def heights(self, q: Floats) -> Floats:
-        """Return h (3 loops,)."""
+        """Return h (rows,)."""
         pin.forwardKinematics(self.model, self.data, q)
-        at = [[self.data.oMi[joint].act(point) for joint, point in ends] for ends in self.ends]
-        return np.array([one - other for one, other in at]).ravel()
+        return self._stacked(
+            lambda one, two: at(self.data, one).translation - at(self.data, two).translation,
+            lambda one, two, scale: scale * self._between(one, two)[1],
+        )
 
     def jacobian(self, q: Floats) -> Floats:
-        """Return H (3 loops, nv)."""
+        """Return H (rows, nv)."""
         pin.computeJointJacobians(self.model, self.data, q)
-        found = [
-            [point_jacobian(self.model, self.data, joint, self.data.oMi[joint].act(point)) for joint, point in ends]
-            for ends in self.ends
-        ]
-        return np.array([one - other for one, other in found]).reshape(-1, self.model.nv)
+
+        def carried(end: End) -> Floats:
+            return point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation)
+
+        def turned(end: End) -> Floats:
+            none: Floats = np.zeros((3, self.model.nv))
+            return pin.getJointJacobian(self.model, self.data, end.joint, AXES)[3:] if end.joint else none
+
+        return self._stacked(
+            lambda one, two: carried(one) - carried(two),
+            lambda one, two, scale: scale * self._map(one, two) @ (turned(one) - turned(two)),
+        ).reshape(-1, self.model.nv)
 
     def drift(self, q: Floats, v: Floats) -> Floats:
-        """Return H' v (3 loops,)."""
+        """Return H' v (rows,)."""
         pin.forwardKinematics(self.model, self.data, q, v, self.none)
-        found = [[self._pulled(joint, point) for joint, point in ends] for ends in self.ends]
-        return np.array([one - other for one, other in found]).ravel()
 
-    def _pulled(self, joint: int, point: Floats) -> Floats:
-        if joint == 0:
-            return np.zeros(3)
-        arm = self.data.oMi[joint].rotation @ point
-        turn = pin.getVelocity(self.model, self.data, joint, AXES).angular
-        a = pin.getClassicalAcceleration(self.model, self.data, joint, AXES)
-        pulled: Floats = a.linear + np.cross(a.angular, arm) + np.cross(turn, np.cross(turn, arm))
-        return pulled
+        def bent(one: End, two: End, scale: float) -> Floats:
+            (w1, c1), (w2, c2) = (angular(self.model, self.data, end) for end in (one, two))
+            own: Floats = self._map(one, two) @ (c1 - c2 - np.cross(w2, w1))
+            return scale * (own - 0.25 * (w1 - w2) @ (w1 - w2) * self._between(one, two)[1])
+
+        def pulled(end: End) -> Floats:
+            return moved(self.model, self.data, end)[1]
+
+        return self._stacked(lambda one, two: pulled(one) - pulled(two), bent)
+
+    def _stacked(
+        self, points: Callable[[End, End], Floats], axes: Callable[[End, End, float], Floats]
+    ) -> Floats:  # fmt: skip
+        """Return what each loop's rows are, one below the other."""
+        parts: list[Floats] = []
+        for loop, (one, two) in zip(self.loops, self.ends, strict=True):
+            parts += [points(one, two)] + ([axes(one, two, loop.torque_scale)] if loop.type == "weld" else [])
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def _between(self, one: End, two: End) -> tuple[float, Floats]:
+        """Return e0 and e of the first's axes seen from the second's."""
+        x, y, z, w = pin.Quaternion(at(self.data, two).rotation.T @ at(self.data, one).rotation).coeffs()
+        sign = 1.0 if w >= 0.0 else -1.0
+        return sign * w, sign * np.array([x, y, z])
+
+    def _map(self, one: End, two: End) -> Floats:
+        """Return A over the torque scale."""
+        e0, e = self._between(one, two)
+        found: Floats = 0.5 * (e0 * np.eye(3) - pin.skew(e)) @ at(self.data, two).rotation.T
+        return found
 
 
-def _point(placed: tuple[int, Any], position: Any) -> tuple[int, Floats]:
+def at(data: Any, end: End) -> Any:
+    """Return the pose of an end in the world."""
+    return data.oMi[end.joint] * end.pose
+
+
+def angular(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
+    """Return its angular velocity and acceleration."""
+    if end.joint == 0:
+        return np.zeros(3), np.zeros(3)
+    rate = pin.getVelocity(model, data, end.joint, AXES)
+    return rate.angular, pin.getClassicalAcceleration(model, data, end.joint, AXES).angular
+
+
+def moved(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
+    """Return velocity and acceleration of its point."""
+    if end.joint == 0:
+        return np.zeros(3), np.zeros(3)
+    arm = data.oMi[end.joint].rotation @ end.pose.translation
+    turn, spin = angular(model, data, end)
+    rate = pin.getVelocity(model, data, end.joint, AXES).linear
+    own = pin.getClassicalAcceleration(model, data, end.joint, AXES).linear
+    return rate + np.cross(turn, arm), own + np.cross(spin, arm) + np.cross(turn, np.cross(turn, arm))
+
+
+class Strings:
+    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
+
+    With W = v2 - v1 of the points and n from the first to the second, W_t what of W is not along n:
+
+        d' = n.W,    d'' at v' = 0 = n.(a2 - a1) + |W_t|^2 / d
+
+    Args:
+        model, placed: as of `Joined`.
+        tendons: those between points.
+    """
+
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: tuple[Tendon, ...]) -> None:
+        self.model, self.data, self.none = model, model.createData(), np.zeros(model.nv)
+        self.rows: list[tuple[float, float, End, End]] = []  # sign, bound, ends
+        for tendon in tendons:
+            ends = [
+                _end(placed[body], place, (1.0, 0.0, 0.0, 0.0))
+                for body, place in zip(tendon.bodies, tendon.positions, strict=True)
+            ]
+            for sign, bound in zip((1.0, -1.0), tendon.range, strict=True):
+                if np.isfinite(bound):
+                    self.rows.append((sign, bound + sign * tendon.margin, ends[0], ends[1]))
+
+    def heights(self, q: Floats) -> Floats:
+        """Return h (rows,)."""
+        pin.forwardKinematics(self.model, self.data, q)
+        return np.array([sign * (self._along(one, two)[0] - bound) for sign, bound, one, two in self.rows])
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Return H (rows, nv)."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        found = []
+        for sign, _, one, two in self.rows:
+            J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
+            found.append(sign * self._along(one, two)[1] @ (J[1] - J[0]))
+        return np.array(found).reshape(-1, self.model.nv)
+
+    def drift(self, q: Floats, v: Floats) -> Floats:
+        """Return H' v (rows,)."""
+        pin.forwardKinematics(self.model, self.data, q, v, self.none)
+        found = []
+        for sign, _, one, two in self.rows:
+            (v1, a1), (v2, a2) = (moved(self.model, self.data, end) for end in (one, two))
+            d, n = self._along(one, two)
+            across = (v2 - v1) - n @ (v2 - v1) * n
+            found.append(sign * (n @ (a2 - a1) + across @ across / d))
+        return np.array(found)
+
+    def _along(self, one: End, two: End) -> tuple[float, Floats]:
+        """Return the distance, and the direction from the first to the second."""
+        apart = at(self.data, two).translation - at(self.data, one).translation
+        d = float(np.linalg.norm(apart))
+        return d, apart / d
+
+
+def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:
     joint, pose = placed
-    return joint, pose.act(np.array(position))
+    w, x, y, z = orientation
+    turned = pin.Quaternion(w, x, y, z).normalized().matrix()
+    return End(joint, pose * pin.SE3(turned, np.array(position)))
 
 
 def by_least_norm(model: Any, data: Any, tau: Floats) -> Solve:

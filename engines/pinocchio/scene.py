@@ -10,11 +10,11 @@ import pinocchio as pin
 
 from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Body, Joint, Scene
+from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.engines import _scene as parts
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, by_least_norm
+from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -37,7 +37,7 @@ def build(case: Case, algebra: str) -> Prepared:
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     forces = parts.Forces(scene)
-    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if loop.type != "connect")), forces)
+    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space)), forces)
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
@@ -46,22 +46,25 @@ def build(case: Case, algebra: str) -> Prepared:
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
         ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + lifted(scene, model, data, placed, q)
+        tau[:] = to.back(q, ours) + at_centres(scene, forces, model, data, placed, q)
 
-    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.type == "connect"))
+    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.in_space))
+    strings = Strings(model, placed, tuple(tendon for tendon in scene.tendons if tendon.bodies))
     touching = ContactRows(scene, model, placed)
     order = _order(scene)
 
     def heights(q: Floats) -> Floats:
-        own = np.concatenate([rows.heights(to.ours(q)), joined.heights(q)])[order]
+        own = np.concatenate([rows.heights(to.ours(q)), joined.heights(q), strings.heights(q)])[order]
         return np.concatenate([own, touching.heights(q)])
 
     def jacobian(q: Floats) -> Floats:
-        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q)])[order]
+        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q), strings.jacobian(q)])[order]
         return np.concatenate([own, touching.jacobian(q)])
 
     def drift(q: Floats, v: Floats) -> Floats:
-        own = np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v)])[order]
+        own = np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v), strings.drift(q, v)])[
+            order
+        ]
         return np.concatenate([own, touching.drift(q, v)])
 
     pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
@@ -78,12 +81,12 @@ def build(case: Case, algebra: str) -> Prepared:
 
 
 def _order(scene: Scene) -> list[int]:
-    """Return where each row of a scene stands where all of `connect` come last."""
-    wide = np.repeat([loop.type == "connect" for loop in scene.loops], [loop.width for loop in scene.loops])
-    bounds = np.isfinite([part.range for part in scene.bounded]).sum()
-    last = np.concatenate([wide, np.zeros(bounds)]).astype(bool)
-    stands = np.empty(len(last), dtype=int)
-    stands[np.concatenate([np.flatnonzero(~last), np.flatnonzero(last)])] = np.arange(len(last))
+    """Return where each row of a scene stands where loops in space come last but one, and distances of points last."""
+    kinds = [1 * loop.in_space for loop in scene.loops for _ in range(loop.width)]
+    for part in scene.bounded:
+        kinds += [2 * (isinstance(part, Tendon) and bool(part.bodies))] * int(np.isfinite(part.range).sum())
+    stands = np.empty(len(kinds), dtype=int)
+    stands[np.argsort(kinds, kind="stable")] = np.arange(len(kinds))
     return list(stands.tolist())
 
 
@@ -124,17 +127,18 @@ def _inertia(body: Body) -> Any:
     return pin.Inertia(body.mass, np.array(body.com), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def lifted(scene: Scene, model: Any, data: Any, placed: Placed, q: Floats) -> Floats:
-    """Return the generalised force (nv,) of the weight that bodies are spared."""
+def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed: Placed, q: Floats) -> Floats:
+    """Return the generalised force (nv,) of the weight that bodies are spared, and of pushes."""
     total: Floats = np.zeros(model.nv)
-    spared = [body for body in scene.bodies if body.weightless]
-    if not spared:
-        return total
-    pin.computeJointJacobians(model, data, q)
-    for body in spared:
+    acting = {body.name: -body.weightless * body.mass * np.array(scene.gravity) for body in scene.bodies}
+    for push, force in zip(scene.pushes, forces.pushes, strict=True):
+        acting[push.body] = acting[push.body] + force
+    found = [(body, acting[body.name]) for body in scene.bodies if acting[body.name].any()]
+    if found:
+        pin.computeJointJacobians(model, data, q)
+    for body, force in found:
         carrier, pose = placed[body.name]
         centre = (data.oMi[carrier] * pose).act(np.array(body.com))
-        force = -body.weightless * body.mass * np.array(scene.gravity)
         total += point_jacobian(model, data, carrier, centre).T @ force
     return total
 
@@ -163,7 +167,7 @@ def _observe(
 
 
 def _world(case: Case, forces: parts.Forces) -> World:
-    """The controls, from one change to the next."""
+    """The inputs, from one change to the next."""
     given = case.inputs
     if given is None:
         return World()
@@ -171,7 +175,7 @@ def _world(case: Case, forces: parts.Forces) -> World:
     def change(t: float, _q: Floats, _v: Floats) -> None:
         forces.change(given.values[np.searchsorted(given.times, t)])
 
-    return World(instants=given.times.tolist(), change=change, reset=lambda: forces.change(0.0 * forces.u))
+    return World(instants=given.times.tolist(), change=change, reset=forces.still)
 
 
 def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:
@@ -180,7 +184,7 @@ def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to:
     on = rows_on(rows)
 
     def bias(q: Floats, v: Floats) -> Floats:
-        forces.change(0.0 * forces.u)
+        forces.still()
         r = to.theirs(q)
         u = to.back(r, v)
         apply(r, u, rows.tau)
@@ -194,7 +198,7 @@ def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to:
         return to.velocities(r, half.T)
 
     def lam(q: Floats, v: Floats) -> Floats:
-        forces.change(0.0 * forces.u)
+        forces.still()
         r = to.theirs(q)
         return rows.accelerate(r, to.back(r, v), on)[1]
 

@@ -9,7 +9,7 @@ FREE, BALL, SLIDE, HINGE = range(4)
 NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, AT_PAIR = (
     0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13,
 )  # fmt: skip
-RESTING, POSED, HEAD = 14, 15, 16
+RESTING, POSED, PUSHES, AT_PUSH, HEAD = 14, 15, 16, 17, 18
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (
@@ -20,11 +20,14 @@ BEFORE, ARMATURE, DAMPING, FORCE_LOW, FORCE_HIGH, DOF = 0, 1, 2, 5, 6, 7
 # An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds.
 TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTUATOR = 0, 1, 2, 3, 9, 12, 15, 17, 19
 ON_JOINT, ON_TENDON = 0, 1
+# A push: the node that it acts on, and where in its frame.
+PUSHED, PUSH = 0, 4
 # A tendon: its spring, damper and bounds; then joint by joint the coordinate, the velocity and the coefficient.
 COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
-LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT = range(5)
+LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING = range(8)
+OF_POSES = (CONNECT, CONTACT, TURN, STRING)
 
 # What is kept of a node while it is computed: pose (rotation by rows, position), velocity, acceleration without v',
 # force, inertia; of a degree of freedom: its motion subspace (angular, linear).

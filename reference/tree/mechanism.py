@@ -10,9 +10,18 @@ from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import gradient, touch
-from crossbody.reference.tree import forces, layout, loops, sweeps
+from crossbody.reference.tree import forces, layout, loops, strings, sweeps
+from crossbody.reference.tree.points import point, pull
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
+
+
+@kernels.helper
+def _pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
+    """Return which node push i acts on, the motion of the point there, and the force."""
+    o, k = int(p[layout.AT_PUSH].real) + layout.PUSH * i, int(p[layout.ACTUATORS].real) + 3 * i
+    node = int(p[o + layout.PUSHED].real)
+    return node, point(p, w, node, p[o + 1], p[o + 2], p[o + 3]), (u[k], u[k + 1], u[k + 2])
 
 
 @kernels.dynamics
@@ -29,6 +38,17 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
             f[j] += forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
     sweeps.outwards(q, v, p, w)
     sweeps.inwards(p, w, M, f)
+    for i in range(int(p[layout.PUSHES].real)):
+        node, x, force = _pushed(u, p, w, i)
+        pull(p, w, node, 1.0, force, (x[0][0], x[1][0], x[2][0]), f)
+
+
+@kernels.helper
+def _polynomial(p: Array, c: int, y: Any) -> tuple[Any, Any, Any]:
+    """Return the polynomial with the coefficients p[c:] at y, and its first and second derivative."""
+    value = p[c] + y * (p[c + 1] + y * (p[c + 2] + y * (p[c + 3] + y * p[c + 4])))
+    slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
+    return value, slope, 2.0 * p[c + 2] + y * (6.0 * p[c + 3] + y * 12.0 * p[c + 4])
 
 
 @kernels.helper
@@ -42,12 +62,16 @@ def _row(q: Array, v: Array, p: Array, i: int) -> tuple[Any, Any, Any]:
         at = forces.tendon(p, int(p[o + 2].real))
         return p[o + 1] * (forces.length(q, p, at) - p[o + 3]), p[o + 1] * forces.rate(v, p, at), 0.0 * v[0]
     y, yd = 0.0 * q[0], 0.0 * v[0]
+    if kind == layout.TENDON_LOOP:
+        at, second = forces.tendon(p, int(p[o + 1].real)), int(p[o + 4].real)
+        if second >= 0:
+            other = forces.tendon(p, second)
+            y, yd = forces.length(q, p, other) - p[o + 6], forces.rate(v, p, other)
+        value, slope, curve = _polynomial(p, o + 7, y)
+        return forces.length(q, p, at) - p[o + 3] - value, forces.rate(v, p, at) - slope * yd, -curve * yd * yd
     if p[o + 4].real >= 0.0:
         y, yd = q[int(p[o + 4].real)] - p[o + 6], v[int(p[o + 5].real)]
-    c = o + 7
-    value = p[c] + y * (p[c + 1] + y * (p[c + 2] + y * (p[c + 3] + y * p[c + 4])))
-    slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
-    curve = 2.0 * p[c + 2] + y * (6.0 * p[c + 3] + y * 12.0 * p[c + 4])
+    value, slope, curve = _polynomial(p, o + 7, y)
     h = q[int(p[o + 1].real)] - p[o + 3] - value
     return h, v[int(p[o + 2].real)] - slope * yd, -curve * yd * yd
 
@@ -61,12 +85,15 @@ def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
         H[int(p[o + 3].real)] = p[o + 1]
     elif kind == layout.TENDON_LIMIT:
         forces.pull(p, forces.tendon(p, int(p[o + 2].real)), p[o + 1] + 0.0 * q[0], H)
+    elif kind == layout.TENDON_LOOP:
+        forces.pull(p, forces.tendon(p, int(p[o + 1].real)), 1.0 + 0.0 * q[0], H)
+        if p[o + 4].real >= 0.0:
+            other = forces.tendon(p, int(p[o + 4].real))
+            forces.pull(p, other, -_polynomial(p, o + 7, forces.length(q, p, other) - p[o + 6])[1], H)
     else:
         H[int(p[o + 2].real)] = 1.0
         if p[o + 4].real >= 0.0:
-            y, c = q[int(p[o + 4].real)] - p[o + 6], o + 7
-            slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
-            H[int(p[o + 5].real)] -= slope
+            H[int(p[o + 5].real)] -= _polynomial(p, o + 7, q[int(p[o + 4].real)] - p[o + 6])[1]
 
 
 @kernels.helper
@@ -90,6 +117,10 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
         kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real)
         if kind == layout.CONNECT:
             h[i], hd[i], _ = loops.connect(p, i, w)
+        elif kind == layout.TURN:
+            h[i], hd[i], _ = loops.turn(p, i, w)
+        elif kind == layout.STRING:
+            h[i], hd[i], _ = strings.string(p, i, w)
         elif kind == layout.CONTACT:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
@@ -106,6 +137,12 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
         if kind == layout.CONNECT:
             h[j], _, Hdv[j] = loops.connect(p, idx[j], w)
             loops.connect_columns(p, idx[j], w, H[j])
+        elif kind == layout.TURN:
+            h[j], _, Hdv[j] = loops.turn(p, idx[j], w)
+            loops.turn_columns(p, idx[j], w, H[j])
+        elif kind == layout.STRING:
+            h[j], _, Hdv[j] = strings.string(p, idx[j], w)
+            strings.string_columns(p, idx[j], w, H[j])
         elif kind == layout.CONTACT:
             at, (gap, n, place) = _contact(p, w, idx[j])
             h[j], Hdv[j] = gap[0], gap[2]
@@ -160,7 +197,7 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
 
 @kernels.power
 def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
-    """Of the actuators, and what dampers take."""
+    """Of the actuators and pushes, and what dampers take."""
     n, at_dof = len(v), int(p[layout.AT_DOF].real)
     given, taken = 0.0 * v[0], 0.0 * v[0]
     if len(u) > 0:
@@ -175,6 +212,12 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         o = forces.tendon(p, i)
         speed = forces.rate(v, p, o)
         taken += speed * forces.damper(p, o + layout.DAMP, speed)
+    if p[layout.PUSHES].real > 0.0:
+        w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * n, dtype=q.dtype)
+        sweeps.outwards(q, v, p, w)
+        for i in range(int(p[layout.PUSHES].real)):
+            _, x, force = _pushed(u, p, w, i)
+            given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]
     e[0], e[1] = given, taken
 
 

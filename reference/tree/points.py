@@ -62,17 +62,37 @@ def direction(w: Array, node: int, a: Any, b: Any, c: Any) -> Any:
 
 
 @kernels.helper
+def _last(p: Array, node: int) -> int:
+    """Return the last velocity of a node."""
+    o = int(p[layout.AT_NODE].real) + layout.NODE * node
+    kind = int(p[o + layout.TYPE].real)
+    return int(p[o + layout.V].real) + (5 if kind == layout.FREE else (2 if kind == layout.BALL else 0))
+
+
+@kernels.helper
 def pull(p: Array, w: Array, node: int, sign: float, n: Any, at: Any, H: Array) -> None:
     """Add what a force of size `sign` along n at a place of a node is in the velocities on the way to the world."""
     if node < 0:
         return
-    o, root = int(p[layout.AT_NODE].real) + layout.NODE * node, _root(p, node)
+    root = _root(p, node)
     m0, m1, m2 = cross(at[0] - w[root + 9], at[1] - w[root + 10], at[2] - w[root + 11], n[0], n[1], n[2])
-    kind, j = int(p[o + layout.TYPE].real), int(p[o + layout.V].real)
-    j += 5 if kind == layout.FREE else (2 if kind == layout.BALL else 0)
     spaces, at_dof = layout.NODE_SCRATCH * int(p[layout.NODES].real), int(p[layout.AT_DOF].real)
+    j = _last(p, node)
     while j >= 0:
         s = spaces + layout.DOF_SCRATCH * j
         along = w[s + 3] * n[0] + w[s + 4] * n[1] + w[s + 5] * n[2]
         H[j] += sign * (w[s] * m0 + w[s + 1] * m1 + w[s + 2] * m2 + along)
+        j = int(p[at_dof + layout.DOF * j].real)
+
+
+@kernels.helper
+def twist(p: Array, w: Array, node: int, sign: float, n: Any, H: Array) -> None:
+    """Add the same of a torque."""
+    if node < 0:
+        return
+    spaces, at_dof = layout.NODE_SCRATCH * int(p[layout.NODES].real), int(p[layout.AT_DOF].real)
+    j = _last(p, node)
+    while j >= 0:
+        s = spaces + layout.DOF_SCRATCH * j
+        H[j] += sign * (w[s] * n[0] + w[s + 1] * n[1] + w[s + 2] * n[2])
         j = int(p[at_dof + layout.DOF * j].real)

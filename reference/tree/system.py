@@ -33,7 +33,7 @@ def system(scene: Scene, law: Law, q0: Floats | None = None) -> System:
     fields: dict[str, Any] = dict(
         n=scene.nv, nq=scene.nq, parameters=table.p, **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
-        inputs=len(scene.actuators), scratch=table.scratch, **KERNELS,
+        inputs=len(scene.inputs), scratch=table.scratch, **KERNELS,
     )  # fmt: skip
     whole = System(**fields)
     if q0 is None or not scene.loops:

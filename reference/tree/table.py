@@ -13,7 +13,7 @@ import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Scene, Shape, Tendon
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Push, Scene, Shape, Tendon, Vector
 from crossbody.cases.scene_contacts import contacts
 from crossbody.reference._kinds import Index
 from crossbody.reference.pairs import layout as pairs
@@ -203,14 +203,29 @@ class _Builder:
         )  # fmt: skip
         head[layout.GRAVITY : layout.GRAVITY + 3] = scene.gravity
         head[layout.RESTING] = self.resting
-        head[layout.POSED] = sum(row[layout.KIND] in (layout.CONNECT, layout.CONTACT) for row in rows)
-        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places)]
+        head[layout.POSED] = sum(row[layout.KIND] in layout.OF_POSES for row in rows)
+        pushes = [self._push(push) for push in scene.pushes]
+        head[layout.PUSHES] = len(pushes)
+        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places), pushes]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
-        where = [layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR]
-        head[where] = starts[:6]
+        head[[
+            layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR,
+            layout.AT_PUSH,
+        ]] = starts[:-1]  # fmt: skip
         packed = np.concatenate([head, *(row for part in parts for row in part)])
         finite: Floats = np.clip(packed, -1e300, 1e300)
         return finite  # a bound that is not there: parameters are finite
+
+    def placed(self, body: str, position: Vector) -> tuple[float, ...]:
+        """Return the node of a body, and a point of the body in the node's frame."""
+        place = self.places[body]
+        return (place.node, *(place.p + place.R @ np.array(position)))
+
+    def _push(self, push: Push) -> Floats:
+        if self.places[push.body].node < 0:
+            raise SceneError(f"Push {push.name!r}: body {push.body!r} does not move.")
+        com = next(body.com for body in self.scene.bodies if body.name == push.body)
+        return np.array(self.placed(push.body, com))
 
     def _actuator(self, actuator: Actuator) -> Floats:
         row = np.zeros(layout.ACTUATOR)
@@ -280,8 +295,14 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
     for i, tendon in enumerate(scene.tendons):
         for sign in (1.0, -1.0):
             bound = tendon.range[0 if sign > 0 else 1]
-            if np.isfinite(bound):
-                rows.append(_row(layout.TENDON_LIMIT, sign, i, bound + sign * tendon.margin))
+            if not np.isfinite(bound):
+                continue
+            beyond = bound + sign * tendon.margin
+            if tendon.bodies:
+                ends = [builder.placed(*end) for end in zip(tendon.bodies, tendon.positions, strict=True)]
+                rows.append(_row(layout.STRING, sign, *ends[0], *ends[1], beyond))
+            else:
+                rows.append(_row(layout.TENDON_LIMIT, sign, i, beyond))
     for i, contact in enumerate(contacts(scene)):
         rows += [_row(layout.CONTACT, i, place) for place in range(contact.places)]
     return rows
@@ -323,6 +344,13 @@ def _limit(joint: Joint, builder: _Builder, sign: float) -> Floats:
 
 
 def _loop(loop: Loop, builder: _Builder) -> list[Floats]:
+    if loop.type == "tendon":
+        tendons = {tendon.name: i for i, tendon in enumerate(builder.scene.tendons)}
+        ends: list[float] = []
+        for name in (loop.first, loop.second):
+            i = tendons.get(name, -1)
+            ends += [i, 0, builder.scene.rest_length(builder.scene.tendons[i]) if i >= 0 else 0.0]
+        return [_row(layout.TENDON_LOOP, *ends, *loop.polynomial)]
     if loop.type == "joint":
         where: list[float] = []
         for name in (loop.first, loop.second):
@@ -332,11 +360,13 @@ def _loop(loop: Loop, builder: _Builder) -> list[Floats]:
             joint = next(joint for joint in builder.scene.joints if joint.name == name)
             where += [builder.coordinates[name], builder.dofs[name], joint.reference]
         return [_row(layout.JOINT_LOOP, *where, *loop.polynomial)]
-    if loop.type == "connect":
+    points = *builder.placed(loop.first, loop.first_position), *builder.placed(loop.second, loop.second_position)
+    rows = [_row(layout.CONNECT, k, *points) for k in range(3)]
+    if loop.type == "weld":
         one, two = (builder.places[name] for name in (loop.first, loop.second))
-        points = [one.p + one.R @ np.array(loop.first_position), two.p + two.R @ np.array(loop.second_position)]
-        return [_row(layout.CONNECT, k, one.node, *points[0], two.node, *points[1]) for k in range(3)]
-    raise SceneError(f"Loop {loop.name!r}: a {loop.type} is not done.")
+        turns = (one.R @ rotation(loop.orientation)).ravel(), two.R.ravel()
+        rows += [_row(layout.TURN, k, one.node, *turns[0], two.node, *turns[1], loop.torque_scale) for k in range(3)]
+    return rows
 
 
 def dof_parents(table: Table) -> Index:

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 AGAIN = 1.0
 """Time after which a run that did not notice is told again, s."""
@@ -33,12 +33,16 @@ def bounded(seconds: float) -> Iterator[None]:
         bell.wind(seconds)
         yield
     finally:
-        bell.stop()
+        try:
+            bell.stop()
+        except Overdue:  # it came before the bell was held
+            bell.stop()
 
 
 class _Bell:
     def __init__(self, seconds: float) -> None:
-        self.thread, self.lock, self.done = threading.get_ident(), threading.Lock(), False
+        self.thread, self.lock = threading.get_ident(), threading.Lock()
+        self.rung, self.done = False, False
         self.timer: threading.Timer | None = None
 
     def wind(self, seconds: float) -> None:
@@ -49,25 +53,31 @@ class _Bell:
     def _ring(self) -> None:
         with self.lock:
             if not self.done:
-                _raise(self.thread, Overdue)
+                self.rung = True
+                _overdue(self.thread)
                 self.wind(AGAIN)
 
     def stop(self) -> None:
-        """No ring after this; one that is on its way is taken back."""
-        while not self.done:
-            try:
-                with self.lock:
-                    _raise(self.thread, None)
-                    self.done = True
-            except Overdue:
-                continue
+        """Let no ring come after this; one that may be on its way is waited for.
+
+        Taking it back (`PyThreadState_SetAsyncExc` with NULL) would leave the interpreter's mark that one is due, which
+        only an exception that arrives clears: with it a profiler or a debugger stays at a function's first instruction
+        for ever.
+        """
+        with self.lock:
+            self.done = True
         if self.timer is not None:
             self.timer.cancel()
+        if self.rung:
+            with suppress(Overdue):
+                _overdue(self.thread)  # in place of one on its way
+                while True:
+                    pass
 
 
-def _raise(thread: int, error: type[BaseException] | None) -> None:
-    what = None if error is None else ctypes.py_object(error)
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), what)
+def _overdue(thread: int) -> None:
+    """Have a thread raise Overdue at its next instruction that looks for it."""
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(Overdue))
 
 
 @contextmanager

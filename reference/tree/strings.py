@@ -1,0 +1,39 @@
+"""Rows that bound the distance of two points, of one body or of two, or of one and the world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference import kernels
+from crossbody.reference._kinds import Array
+from crossbody.reference.pairs import solids
+from crossbody.reference.tree import layout
+from crossbody.reference.tree.points import point, pull
+
+SIGN, FIRST, SECOND, BOUND = 1, 2, 6, 10  # in a row: 1 below, -1 above; a node and a point in its frame, twice
+
+
+@kernels.helper
+def _between(p: Array, o: int, w: Array) -> Any:
+    """Return the distance of the second point from the first as a jet, its direction, and both points."""
+    one = point(p, w, int(p[o + FIRST].real), p[o + FIRST + 1], p[o + FIRST + 2], p[o + FIRST + 3])
+    two = point(p, w, int(p[o + SECOND].real), p[o + SECOND + 1], p[o + SECOND + 2], p[o + SECOND + 3])
+    d, n = solids.point(two, one)
+    return d, n, (one[0][0], one[1][0], one[2][0]), (two[0][0], two[1][0], two[2][0])
+
+
+@kernels.helper
+def string(p: Array, i: int, w: Array) -> tuple[Any, Any, Any]:
+    """Return gap, rate and H' v of row i."""
+    o = int(p[layout.AT_ROW].real) + layout.ROW * i
+    d, sign = _between(p, o, w)[0], p[o + SIGN]
+    return sign * (d[0] - p[o + BOUND]), sign * d[1], sign * d[2]
+
+
+@kernels.helper
+def string_columns(p: Array, i: int, w: Array, H: Array) -> None:
+    """Fill H (n,) of row i along the joints of both points."""
+    o = int(p[layout.AT_ROW].real) + layout.ROW * i
+    sign, (_, n, one, two) = p[o + SIGN].real, _between(p, o, w)
+    pull(p, w, int(p[o + FIRST].real), -sign, n, one, H)
+    pull(p, w, int(p[o + SECOND].real), sign, n, two, H)
