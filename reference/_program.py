@@ -94,10 +94,12 @@ def _permanent(function: Any) -> bool:
 def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """The program with one system's kernels built in.
 
-    Handing ten functions over from Python costs more than a short run; an entry names them as constants.
+    Handing ten functions over from Python costs more than a short run; an entry names their addresses as constants.
     """
     advance = address()
-    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = functions
+    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = (
+        Address(function, kernels.REAL[name]) for name, function in zip(kernels.NAMES, functions, strict=True)
+    )
 
     def call(state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
         return advance(

@@ -24,6 +24,7 @@ import click
 
 from crossbody.cases import CrossbodyError
 from crossbody.reports.replay.cli import identify, memory_option, replay
+from crossbody.reports.runs.watch import stopping
 from crossbody.reports.voice import as_json, quiet, speaks
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
@@ -366,7 +367,7 @@ def _obey(arguments: list[str] | None) -> int:
     except click.ClickException as error:
         return _say(error.format_message())
     except CrossbodyError as error:
-        return _say(str(error))
+        return 130 if stopping() else _say(str(error))
     except BrokenPipeError:
         return _enough()
     except SystemExit:  # click's own answer to a pipe that is closed, whose streams it has wrapped
@@ -374,6 +375,8 @@ def _obey(arguments: list[str] | None) -> int:
             return _enough()
         raise
     except Exception as error:
+        if stopping():  # what is being imported may make an ImportError of it
+            return 130
         if isinstance(error, OSError) and error.errno in REFUSED:
             _drop_what_cannot_be_printed()
             return _say(f"The system refuses: {error.strerror}{f' ({error.filename})' if error.filename else ''}.")

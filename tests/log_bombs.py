@@ -148,6 +148,13 @@ def _hdf_many(file: object) -> None:
         file.create_group(f"g{i}")  # type: ignore[attr-defined]
 
 
+def _hdf_links(file: object) -> None:
+    """One dataset under many names."""
+    file["t"] = np.arange(10.0)  # type: ignore[index]
+    for i in range(25_000):
+        file[f"t{i}"] = file["t"]  # type: ignore[index]
+
+
 def _hdf_cycle(file: object) -> None:
     """Groups that contain themselves, by hard and by soft links, and no numbers."""
     one = file.create_group("one")  # type: ignore[attr-defined]
@@ -615,6 +622,13 @@ def _tdms_segments(folder: Path) -> Path:
     return tdms(folder, first, *[again] * 8000)
 
 
+def tdms_ones(folder: Path, channels: int, chunks: int) -> Path:
+    """Chunks of one value a channel: to read a channel, all before it are gone through in every chunk."""
+    many = b"".join(tdms_object(f"/'a'/'c{i}'", 1) for i in range(channels))
+    values = np.repeat(np.arange(float(chunks)), channels).tobytes()
+    return tdms(folder, (14, struct.pack("<I", channels) + many, values))
+
+
 def _tdms_channels(folder: Path) -> Path:
     many = b"".join(tdms_object(f"/'a'/'c{i}'", 1) for i in range(25_000))
     return tdms(folder, (14, struct.pack("<I", 25_000) + many, bytes(8 * 25_000)))
@@ -662,6 +676,7 @@ def bombs() -> Iterator[Bomb]:
         "nptdms": {
             "tdms-objects": _tdms_objects, "tdms-string": _tdms_string, "tdms-rows": _tdms_rows,
             "tdms-segments": _tdms_segments, "tdms-channels": _tdms_channels,
+            "tdms-ones": partial(tdms_ones, channels=2400, chunks=200),
         },
     }  # fmt: skip
     for needs, found in makers.items():
@@ -672,5 +687,5 @@ def bombs() -> Iterator[Bomb]:
 HDF: dict[str, Callable[[object], None]] = {
     "big-chunk": _hdf_big_chunk, "small-chunk-unfolds": _hdf_small_chunk_unfolds, "many-chunks": _hdf_many_chunks,
     "deep": _hdf_deep, "many": _hdf_many, "tiny-chunks": _hdf_tiny_chunks,
-    "cycle": _hdf_cycle, "attribute": _hdf_attribute,
+    "links": _hdf_links, "cycle": _hdf_cycle, "attribute": _hdf_attribute,
 }  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import random
 import re
 import signal
@@ -12,12 +14,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from rig_data import run_as_log
 
 from crossbody import cases, hw
+from crossbody.cases import InvalidValue, Outcome, OutputError
 from crossbody.hw.replaying.comparison import Prediction
+from crossbody.reports import cli
 from crossbody.reports.replay.kept import keeper
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.parts import Parts
@@ -167,6 +172,48 @@ def test_a_prediction_comes_back_as_it_was(tmp_path: Path) -> None:
             assert mine.tobytes() == theirs.tobytes()
     for name in ("engine", "profile", "settings", "outcomes", "messages", "wall_s", "steps"):
         assert getattr(one, name) == getattr(other, name)
+
+
+def test_a_part_that_somebody_made_is_read_or_refused_in_a_sentence(tmp_path: Path) -> None:
+    """A folder of results may come from anybody, and with it the parts of a replay."""
+    rows = (np.ones((3, 2)), np.zeros((4, 2)))
+    outcomes = (Outcome.FINISHED, Outcome.FINISHED)
+    made = Prediction(engine="a", profile="b", settings={"dt": 0.1}, y=rows, yd=rows, outcomes=outcomes)
+    rng, told = random.Random(1), json.dumps({"rows": [10**12], "width": 10**9}).encode()
+    with Parts(tmp_path, "replay", {}) as parts:
+        keep = keeper(parts)
+        keep("whole", lambda: made)
+        files = {path.name: path.read_bytes() for path in parts.part("whole").iterdir()}
+        for i in range(200):
+            for name, whole in files.items():
+                raw = bytearray(rng.choice((whole, whole[: rng.randrange(len(whole))], b"3", b"[]", b"", told)))
+                for _ in range(rng.randrange(3) if raw else 0):
+                    raw[rng.randrange(len(raw))] = rng.randrange(256)
+                (parts.part("whole") / name).write_bytes(raw if i % 2 or name.endswith("json") else whole)
+            with suppress(OutputError):
+                found = keep("whole", lambda: made)
+                assert [len(y) for y in found.y] == [len(y) for y in found.yd]
+
+
+@pytest.mark.parametrize("error", [ImportError, InvalidValue, None])
+def test_an_interrupt_that_a_library_takes_for_its_own_fault_is_one(
+    error: type[Exception] | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """And what was done meanwhile is not kept."""
+
+    def command(**_: object) -> int:
+        with Parts(tmp_path, "replay", {}) as parts, parts.put("half"):
+            with suppress(watch.Stopped):
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(1.0)
+            if error:
+                raise error("initialization failed")
+        return 0
+
+    monkeypatch.setattr(cli.cli, "main", command)
+    assert watch.watched(lambda: cli._obey([])) == 130
+    assert capfd.readouterr().err == ""
+    assert not list(tmp_path.glob("*/[0-9a-f]*"))
 
 
 def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:

@@ -213,6 +213,29 @@ def test_chunks_of_messages_are_decoded_once(tmp_path: Path, monkeypatch: pytest
     assert len(count) == len(summary.chunk_indexes) > 10
 
 
+def test_what_a_library_prints_about_a_file_is_dropped(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """It shows the line that it cannot read, which may hold what a terminal obeys."""
+    pytest.importorskip("mcap")
+    definition = log_bombs.schema(1, "float64 a\nint32 \x1b]0;title\x07 b\n")
+    path = log_bombs.mcap(tmp_path, definition, log_bombs.channel(1, "/rig"), log_bombs.message(1, bytes(20)))
+    with pytest.raises(LogFormatError):
+        hw.survey(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_tdms_file_looks_at_the_clock_before_every_channel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    count: list[int] = []
+    read = nptdms.TdmsChannel.read_data
+    monkeypatch.setattr(nptdms.TdmsChannel, "read_data", lambda *given: count.append(1) or read(*given))
+    reader = formats.open_log(log_bombs.tdms_ones(tmp_path, channels=9, chunks=9))
+    reader.budget.seconds = 0.0
+    with pytest.raises(LogFormatError, match="takes more than"):
+        next(reader.blocks(reader.groups[0], [column.name for column in reader.groups[0].columns]))
+    reader.close()
+    assert not count
+
+
 @pytest.mark.parametrize("skip", [4, 2 * 10**9, 9 * 10**18])
 def test_no_more_lines_are_left_out_than_there_are(skip: int, tmp_path: Path) -> None:
     path = tmp_path / "short.csv"

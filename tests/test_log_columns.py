@@ -88,6 +88,14 @@ def test_options_of_a_format_are_its_own(tmp_path: Path) -> None:
     assert told.value.key == "$.options"
 
 
+@pytest.mark.parametrize("option", ["decimal = '1'", "decimal = ''", "delimiter = 'ab'", "skip = -1"])
+def test_a_layout_that_no_table_has_is_refused_with_its_key(option: str, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,enc1\n0,1\n1,2\n")
+    with pytest.raises(ColumnMapError) as told:
+        hw.read(tmp_path / "log.csv", hw.parse_columns(f"options = {{{option}}}\n" + GOOD))
+    assert told.value.key == f"$.options.{option.split()[0]}"
+
+
 finite = st.floats(allow_nan=False, allow_infinity=False)
 signals = st.builds(
     hw.Signal,
@@ -147,7 +155,8 @@ def test_a_unit_that_would_never_end_is_refused_at_once(text: str) -> None:
         ("deg", "rad", np.pi / 180), ("rpm", "rad/s", np.pi / 30), ("turn", "rad", 2 * np.pi), ("mN m", "N m", 1e-3),
         ("Nm", "N m", 1.0), ("N·m", "N m", 1.0), ("m/s^2", "m/s^2", 1.0), ("g", "kg", 1e-3), ("Hz", "1/s", 1.0),
         ("%", "1", 0.01), ("", "1", 1.0), ("µs", "s", 1e-6), ("degC", "K", 274.15), ("kN", "N", 1e3),
-        ("deg/s", "rad/s", np.pi / 180), ("inch", "m", 0.0254),
+        ("deg/s", "rad/s", np.pi / 180), ("inch", "m", 0.0254), ("mNm", "N m", 1e-3), ("kNm", "N m", 1e3),
+        ("Ns", "N s", 1.0), ("mNm*s", to_si("N m s").si, 1e-3), ("Nms", to_si("N m s").si, 1.0),
     ],
 )  # fmt: skip
 def test_units(unit: str, si: str, value: float) -> None:
@@ -156,6 +165,12 @@ def test_units(unit: str, si: str, value: float) -> None:
     assert found.apply(np.array([1.0]))[0] == pytest.approx(value, rel=1e-15)
     assert to_si(found.si).si == si
     assert to_si(found.si).factor == 1.0
+
+
+@pytest.mark.parametrize("unit", ["dB", "dBm", "Np", "decade", "octave", "dBu"])
+def test_a_logarithm_is_no_factor_and_shift(unit: str) -> None:
+    with pytest.raises(InvalidValue, match="is no unit"):
+        to_si(unit)
 
 
 def test_whole_fractions_of_a_unit_round_once() -> None:

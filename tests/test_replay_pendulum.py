@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rig_data import channels, log_of, needs_pendulum, pendulum
 from scipy.integrate import solve_ivp
 
 from crossbody import engines, hw
+from crossbody.cases import SceneError
 from crossbody.hw.models._contract import Segment
+from crossbody.hw.replaying.windows import windows
 
 
 def minimal(p, th, w, times):
@@ -97,6 +101,42 @@ def test_a_log_without_what_the_model_needs_is_refused() -> None:
         hw.replay(log, "single_pendulum", kind="closed_loop")
     with pytest.raises(hw_error(), match="There is no parameter of single_pendulum 'mass'"):
         hw.replay(log, "single_pendulum", parameters={"mass": 1.0})
+
+
+def driven(delay: float = 0.0, unit: str = "N m", names: tuple[str, ...] = ("torque 1", "torque 2")) -> hw.Log:
+    t = np.linspace(0.0, 1.0, 101)
+    pushes = {name: np.random.default_rng(i).normal(size=len(t)) for i, name in enumerate(names)}
+    inputs = tuple(replace(one, delay=delay) for one in channels("inputs", unit, pushes))
+    return log_of(t, channels("coordinates", "rad", {"th1": np.sin(t), "th2": np.cos(t)}), inputs)
+
+
+@pytest.mark.parametrize(
+    ("log", "says"),
+    [
+        (driven(unit="A"), r"inputs\.torque 1 of the log is in \[A\]; double_pendulum takes it in N m"),
+        (driven(names=("torque 1",)), "the input torque 1, and no torque 2"),
+    ],
+)
+def test_inputs_of_another_mechanism_are_refused(log: hw.Log, says: str) -> None:
+    for use in (hw.replay, hw.inverse):
+        with pytest.raises(SceneError, match=says):
+            use(log, "double_pendulum", **({"restart": 0.5} if use is hw.replay else {}))
+
+
+def test_coordinates_in_another_unit_are_refused() -> None:
+    t = np.linspace(0.0, 1.0, 101)
+    log = log_of(t, channels("coordinates", "m", {"th1": np.sin(t)}))
+    with pytest.raises(SceneError, match=r"coordinates\.th1 of the log is in \[m\]; single_pendulum takes it in rad"):
+        hw.replay(log, "single_pendulum", restart=0.5)
+
+
+@pytest.mark.parametrize("late", [-3, 0, 1, 7])
+def test_an_input_acts_when_it_was_true(late: int) -> None:
+    """What stands at t was in force at t less its delay, until the next one is."""
+    model = hw.models.load("double_pendulum")
+    told = np.concatenate([w.u for w in windows(driven(), model, restart=0.0)])
+    found = np.concatenate([w.u for w in windows(driven(delay=0.01 * late), model, restart=0.0)])
+    np.testing.assert_array_equal(found, told[np.clip(np.arange(len(told)) + late, 0, len(told) - 1)])
 
 
 def hw_error() -> type[Exception]:

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import random
+import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
@@ -368,6 +374,46 @@ def test_wrong_controls_are_refused(tmp_path: Path, text: str, said: str) -> Non
         cases.load(write(tmp_path), "raised", ctrl=str(table))
 
 
+@pytest.mark.parametrize("kind", ["npz", "parquet", "csv"])
+def test_damaged_controls_are_refused_in_a_sentence(kind: str, tmp_path: Path) -> None:
+    scene, table, rng = write(tmp_path), tmp_path / f"u.{kind}", random.Random(1)
+    held = pd.DataFrame({"t": np.arange(20.0), "m1": np.zeros(20), "m2": np.ones(20)})
+    match kind:
+        case "npz":
+            np.savez_compressed(table, t=held["t"], ctrl=held[["m1", "m2"]])
+        case "parquet":
+            held.to_parquet(table)
+        case _:
+            held.to_csv(table, index=False)
+    whole = table.read_bytes()
+    for i in range(60):
+        raw = bytearray(whole if i % 2 else whole[: rng.randrange(len(whole))])
+        for _ in range(rng.randrange(4) if raw else 0):
+            raw[rng.randrange(len(raw))] = rng.randrange(256)
+        table.write_bytes(raw)
+        with suppress(InvalidValue):
+            cases.load(scene, "raised", ctrl=str(table))
+
+
+def test_controls_that_unfold_to_gigabytes_are_refused(tmp_path: Path) -> None:
+    scene, zeros = write(tmp_path), np.zeros((1 << 20, 2))
+    with zipfile.ZipFile(tmp_path / "u.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
+        with file.open("t.npy", "w") as one:
+            np.save(one, zeros[:, 0])
+        with file.open("ctrl.npy", "w", force_zip64=True) as one:
+            one.write(b"\x93NUMPY\x01\x00\x76\x00")
+            shape = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({20 << 20}, 2), }}"
+            one.write(shape.ljust(0x75).encode() + b"\n")
+            for _ in range(20):
+                one.write(zeros.tobytes())
+    pq.write_table(pa.table({name: pa.nulls(12 << 20, pa.float64()) for name in ("t", "m1", "m2")}),
+                   tmp_path / "u.parquet")  # fmt: skip
+    assert max((tmp_path / name).stat().st_size for name in ("u.npz", "u.parquet")) < 3_000_000
+    for name in ("u.npz", "u.parquet"):
+        with pytest.raises(InvalidValue, match="MB in memory"):
+            cases.load(scene, "raised", ctrl=str(tmp_path / name))
+
+
 def test_a_push_moves_every_engine_alike(tmp_path: Path) -> None:
     """Two pushes at once on one body, and one that never ends."""
     path = write(tmp_path)
@@ -413,7 +459,7 @@ ROPE = """
 
 
 def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> None:
-    """Its touches in the reference and Pinocchio; MuJoCo's steps meet them where they are."""
+    """Its touches in the reference and Pinocchio; MuJoCo as far as a row that stops pushing is gone for both."""
     path = tmp_path / "rope.xml"
     path.write_text(ROPE, encoding="utf-8")
     case = cases.load(str(path), "thrown", t_end=0.5)  # errors grow some times from touch to touch
@@ -421,15 +467,18 @@ def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> 
     runs = [
         engines.load("reference").prepare(case, "compiled", rtol=1e-11).run(),
         engines.load("pinocchio").prepare(case, "law", rtol=1e-11).run(),
-        engines.load("mujoco").prepare(case, "matched", dt=1e-4).run(),
     ]
-    touches = [[event.t for event in run.events if event.contact == 1] for run in runs[:2]]
+    touches = [[event.t for event in run.events if event.contact == 1] for run in runs]
     assert len(touches[0]) >= 2
     assert len(touches[0]) == len(touches[1])
     assert np.abs(np.subtract(*touches)).max() < 1e-9
-    for run, size in zip(runs, (0.0, 1e-8, 1e-3), strict=True):
-        assert run.outcome is Outcome.FINISHED
-        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= size
+    assert np.abs(runs[1].q[-1] - runs[0].q[-1]).max() <= 1e-8
+    case = cases.load(str(path), "thrown", t_end=0.2)
+    run = engines.load("mujoco").prepare(case, "matched", dt=2e-5).run()
+    first = engines.load("reference").prepare(case, "compiled").run()
+    assert run.outcome is Outcome.FINISHED
+    # A step is first order where it meets the end of the string: 2e-5 s of the difference that it makes to speeds.
+    assert np.abs(run.q[-1, :4] - first.q[-1, :4]).max() <= 2e-5
 
 
 def test_what_a_string_cannot_do_is_refused(tmp_path: Path) -> None:
@@ -617,8 +666,9 @@ def test_engines_agree_on_what_bounces(tmp_path: Path) -> None:
         engines.load(name).prepare(case, profile, **settings).run().q[-1]
         for name, profile, settings in (
             ("reference", "compiled", {"rtol": 1e-10}), ("reference", "cvode", {"rtol": 1e-10}),
-            ("pinocchio", "law", {}),
+            ("pinocchio", "law", {}), ("mujoco", "matched", {"dt": 1e-4}),
         )
     ]  # fmt: skip
     assert np.abs(ends[1] - ends[0]).max() < 1e-7
     assert np.abs(ends[2] - ends[0]).max() < 1e-6
+    assert np.abs(ends[3] - ends[0]).max() < 1e-4  # first order in the step where it touches, at a few m/s

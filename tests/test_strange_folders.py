@@ -8,6 +8,7 @@ import random
 import re
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,12 @@ import pytest
 from ladder import ladder
 
 from crossbody.cases import OutputError, load
+from crossbody.hw.formats._budget import Budget
 from crossbody.reports.cli import main
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.pages import site
-from crossbody.reports.runs import files, study
+from crossbody.reports.runs import files, store, study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
 
@@ -115,6 +117,16 @@ def test_file_and_field_are_named(out: Path, kind: str, capsys: pytest.CaptureFi
     (out / name).write_text(json.dumps(craft(json.loads((out / name).read_text()))))
     assert report(out) == 2
     assert re.search(said, capsys.readouterr().err)
+
+
+def test_a_motion_that_unfolds_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "traces").mkdir()
+    path = tmp_path / "traces" / "0000.parquet"
+    pq.write_table(pa.table({f"q{i}": pa.nulls(1 << 20, pa.float64()) for i in range(10)}), path)
+    assert path.stat().st_size < 30_000
+    monkeypatch.setattr(store, "Budget", partial(Budget, memory=50_000_000))
+    with pytest.raises(OutputError, match="it needs 84 MB in memory"):
+        store.load(path)
 
 
 def test_nested_a_million_times_is_a_sentence(out: Path) -> None:

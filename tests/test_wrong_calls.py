@@ -28,6 +28,12 @@ from crossbody.reports.sweep import command as stress
 LOG_CALLS = 300
 
 
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What is wrong for most may be a good name of a file to write."""
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture
 def cheap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A folder to be in, and commands that stop where they would begin to compute; a fault of ours is one here."""
@@ -40,7 +46,6 @@ def cheap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     for module, name in costly + more:
         monkeypatch.setattr(module, name, stop)
     monkeypatch.setattr(cli, "_crashed", _raise)
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("x")
     (tmp_path / "folder").mkdir()
     assert commands

@@ -5,7 +5,9 @@ A table has a column t in s, and one for every actuator by its name.
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from crossbody.cases._case import Inputs
 from crossbody.cases._errors import InvalidValue
 from crossbody.cases._regular import open_regular
 from crossbody.cases.scene import Push, Scene
+
+LARGEST = 1 << 28  # bytes in memory: an hour of eight actuators at 1 kHz
 
 
 def read_controls(path: Path, scene: Scene) -> Inputs:
@@ -31,16 +35,20 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
     try:
         open_regular(path).close()
         times, values = _from_npz(path, names) if path.suffix == ".npz" else _from_table(path, names)
-    except (OSError, ValueError, KeyError, UnicodeDecodeError) as error:
-        raise InvalidValue(f"Controls {path}: {error}") from None
+    except Exception as error:  # damaged, a table makes its library raise anything
+        raise InvalidValue(f"Controls {path}: {str(error) or type(error).__name__}") from None
     if values.shape != (len(times), len(names)):
         raise InvalidValue(f"Controls {path} have the shape {values.shape}; valid: ({len(times)}, {len(names)}).")
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all() and len(times) and times[0] >= 0.0):
         raise InvalidValue(f"Controls {path}: t must be finite, at least 0 and increasing.")
+    if not np.isfinite(values).all():
+        raise InvalidValue(f"Controls {path}: every value must be finite.")
     return Inputs(names=tuple(names), times=times, values=values)
 
 
 def _from_npz(path: Path, names: list[str]) -> tuple[Floats, Floats]:
+    with zipfile.ZipFile(path) as held:
+        _check_size(sum(one.file_size for one in held.infolist()))
     with np.load(path, allow_pickle=False) as held:
         return np.asarray(held["t"], dtype=float), np.asarray(held["ctrl"], dtype=float)
 
@@ -48,11 +56,26 @@ def _from_npz(path: Path, names: list[str]) -> tuple[Floats, Floats]:
 def _from_table(path: Path, names: list[str]) -> tuple[Floats, Floats]:
     import pandas as pd
 
-    table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+    table = _parquet(path, ["t", *names]) if path.suffix == ".parquet" else pd.read_csv(path)
     missing = [name for name in ("t", *names) if name not in table.columns]
     if missing:
         raise ValueError(f"there is no column {missing[0]!r}; it has: {', '.join(map(str, table.columns))}.")
     return table["t"].to_numpy(dtype=float), table[names].to_numpy(dtype=float)
+
+
+def _parquet(path: Path, names: list[str]) -> Any:
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(path) as file:
+        known = [name for name in file.schema_arrow.names if name in names]
+        _check_size(8 * file.metadata.num_rows * len(known))
+        return file.read(columns=known).to_pandas()
+
+
+def _check_size(size: int) -> None:
+    """Refuse what a small file would unfold to."""
+    if size > LARGEST:
+        raise ValueError(f"the table needs {size / 1e6:.0f} MB in memory; valid: at most {LARGEST / 1e6:.0f} MB.")
 
 
 def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Inputs | None]:

@@ -20,6 +20,8 @@ from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
+from crossbody.engines.mujoco._drift import Drift
+from crossbody.engines.mujoco._globals import Hook
 from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._scene import Scene as Prepared
 
@@ -86,7 +88,7 @@ def build(case: Case, profile: str, dt: float) -> Prepared:
         model=model, data=data, nc=len(case.contacts), start=_start(case, model, data), modes=rows.modes,
         lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
         observe=rows.observe(), instants=() if case.inputs is None else case.inputs.times.tolist(),
-        change=_change(case, data),
+        change=_change(case, data), hook=rows.hook() if profile == "matched" else None, always=True,
     )  # fmt: skip
     prepared.audit = _audit(case, profile, model, rows)
     return prepared
@@ -213,6 +215,23 @@ class Rows:
         (low, high), length = self.scene.tendons[part].range, self.data.ten_length[part]
         off = abs(self.data.efc_pos[j] - (length - low)), abs(self.data.efc_pos[j] - (high - length))
         return self.places[kind, part, bool(off[1] < off[0])]
+
+    def hook(self) -> Hook | None:
+        """Return what gives contacts and strings the part of the law that MuJoCo leaves out; None without such rows."""
+        drift, first = Drift(self.scene, self.model), self.nc - self.touching.count
+        if not drift.strings and not self.touching.count:
+            return None
+
+        def hook(_model: Any, data: Any) -> None:
+            for j in range(data.ne, data.nefc):
+                kind, part = int(data.efc_type[j]), int(data.efc_id[j])
+                if kind == TOUCH:
+                    data.efc_aref[j] -= drift.touches(data.qpos, data.qvel)[self._touch(part) - first]
+                elif kind == LIMITS[1] and part in drift.strings:
+                    upper = self._place(j, kind, part) == self.places.get((kind, part, True))
+                    data.efc_aref[j] -= (-1.0 if upper else 1.0) * drift.lengths(data.qpos, data.qvel)[part]
+
+        return hook
 
     def modes(self) -> Modes:
         """Return the mode of every row: a bound is in contact where it pushes."""

@@ -16,7 +16,9 @@ SPAN = 16  # samples of one comparison: long enough to outweigh the noise of one
 GAIN = (0.5, 2.0)
 ALIKE = 0.7  # correlation
 QUANTA = 20.0  # steps of the encoder that a span must change by, or there is no motion to judge by
-SMOOTH = 0.2  # correlation of neighbouring spans: about 1 for a resolved motion, -0.5 for noise at rest
+SMOOTH = 0.2  # correlation of neighbouring spans: about 1 for a slow motion, -0.5 for noise at rest
+LAGS = 8  # spans over which a faster motion comes back to itself; noise has forgotten after one
+CHANCE = 4.5  # standard deviations that such a correlation of noise stays within
 FEWEST = 8  # spans
 OFF = 0.03  # of the gain: published logs of encoders and of cameras are within 0.015
 LATE = 2.0  # sample times of a delay: published logs are within 1.1
@@ -62,7 +64,8 @@ class RateCheck:
         self._name, self._rotates, self._lag = name, rotates, lag
         self._slips = JumpCheck(name, "rad" if rotates else "m", own=False)
         self._n, self._left, self._loose = 0, 0.0, 0.0
-        self._moved = np.zeros((2, 3))  # of all spans and usual ones: how many, squares of dq, products of two
+        # Of all spans and of usual ones: how many, squares of dq, products of two that are 1 .. `LAGS` apart.
+        self._moved = np.zeros((2, 2 + LAGS))
         self._products = np.zeros((3, 3))  # of dq, the integral of v and the change of v
         self._totals = np.zeros(4)  # of usual spans: dq, the integral of v, the size of dq, time
         self._apart = np.zeros(2)  # squares of what the integral of v is more than dq, and its products with the next
@@ -98,7 +101,7 @@ class RateCheck:
         self._totals += usual[0].sum(), usual[1].sum(), np.abs(usual[0]).sum(), length
         self._apart += (apart * apart).sum(), (apart[1:] * apart[:-1]).sum()
         for sums, change in zip(self._moved, (dq, usual[0]), strict=True):
-            sums += len(change), (change * change).sum(), (change[1:] * change[:-1]).sum()
+            sums += len(change), *((change[lag:] * change[: -lag or None]).sum() for lag in range(LAGS + 1))
         self._remember(dq, spans[1], rows[at[:-1]], times[at[:-1]])
         if first:
             self._step = float(np.median(times[1:] - times[:-1]))
@@ -155,9 +158,11 @@ class RateCheck:
 
     def _moves(self) -> bool:
         """Whether the coordinate does more than show its noise and the steps of its encoder, with or without slips."""
-        count, squares, products = self._moved.T
+        count, squares, *products = self._moved.T
         size = np.sqrt(squares / np.maximum(count, 1.0))
-        return bool(np.any((count >= FEWEST) & (size > QUANTA * self._quantum) & (products > SMOOTH * squares)))
+        surely = np.maximum(CHANCE / np.sqrt(np.maximum(count, 1.0)), SMOOTH)
+        again = np.any(products[1:] > surely * squares, axis=0) | (products[0] > SMOOTH * squares)
+        return bool(np.any((count >= FEWEST) & (size > QUANTA * self._quantum) & again))
 
     def findings(self) -> list[Finding]:
         """Whether the two belong together; nothing if there is too little motion to tell."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from importlib.metadata import version
+from io import StringIO
 from pathlib import Path
 
 from crossbody.cases import CrossbodyError, LogFormatError
@@ -23,7 +24,8 @@ def parsing(path: Path, what: str, row: int | None = None, column: str = "") -> 
     """Run calls into a parser.
 
     Damaged input makes these libraries raise anything (struct.error, KeyError, zlib.error, OverflowError, ...), so
-    everything but an absent package and our own errors is taken as the file's fault; the cause stays chained.
+    everything but an absent package and our own errors is taken as the file's fault; the cause stays chained. What
+    they print, a stranger may have written: it is dropped.
 
     Args:
         path: the log.
@@ -35,7 +37,7 @@ def parsing(path: Path, what: str, row: int | None = None, column: str = "") -> 
         LogFormatError: for whatever the parser raised.
     """
     try:
-        with warnings.catch_warnings(), _silent():
+        with warnings.catch_warnings(), _silent(), redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             warnings.simplefilter("ignore")
             yield
     except (CrossbodyError, ModuleNotFoundError):

@@ -16,7 +16,7 @@ from crossbody.hw.formats._grouping import Table, grouped, layout, places, spans
 from crossbody.hw.formats._guard import library, parsing
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-MOST_OBJECTS = 20_000  # groups and datasets of a file
+MOST_LINKS = 20_000  # of a file, whatever they lead to: each takes some 70 us
 MOST_CHUNKS, TINY = 50_000, 1024  # chunks of a dataset, where they have fewer bytes than this: each takes some 20 us
 DEEPEST = 32  # groups inside one another; the library itself recurses without an end
 LONGEST = 4096  # bytes of an attribute that is read
@@ -42,6 +42,7 @@ class HdfReader:
         self.refused: dict[str, str] = {}
         self._tables: list[Table] = []
         self._visited: set[int] = set()
+        self._links = 0
         with parsing(path, what):
             self._file = h5py.File(path, "r")
         try:
@@ -60,6 +61,9 @@ class HdfReader:
         if depth > DEEPEST:
             raise LogFormatError(self._path, f"has groups inside groups beyond {DEEPEST} levels.")
         for name in group:
+            self._links += 1
+            if self._links > MOST_LINKS:
+                raise LogFormatError(self._path, f"holds more than {MOST_LINKS} groups, datasets and links to them.")
             if (not prefix and name.startswith("#")) or not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 continue
             item = group[name]
@@ -67,8 +71,6 @@ class HdfReader:
             if place_in_file in self._visited:
                 continue
             self._visited.add(place_in_file)
-            if len(self._visited) > MOST_OBJECTS:
-                raise LogFormatError(self._path, f"holds more than {MOST_OBJECTS} groups and datasets.")
             if isinstance(item, h5py.Group):
                 self._walk(f"{prefix}{name}/", item, depth + 1)
             elif isinstance(item, h5py.Dataset):

@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Annotated, Any, Literal, TextIO
 
 import msgspec
 import numpy as np
@@ -44,10 +44,10 @@ class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         header: whether the first line names the columns; they are c0, c1, ... if not.
     """
 
-    delimiter: str = ""
-    decimal: str = "."
+    delimiter: Annotated[str, msgspec.Meta(max_length=1)] = ""
+    decimal: Literal[".", ","] = "."
     encoding: str = "utf-8"
-    skip: int = 0
+    skip: Annotated[int, msgspec.Meta(ge=0)] = 0
     header: bool = True
     units: bool = False
 
@@ -128,7 +128,7 @@ class CsvReader:
                 for batch in stream:
                     yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in columns}
                     rows += batch.num_rows
-        except pa.ArrowException as error:  # it does not tell the place of every fault
+        except (pa.ArrowException, UnicodeError) as error:  # it does not tell the place of every fault
             raise find_fault(self._path, self._options, self._delimiter, columns, error, rows) from error
 
     def _stream(self, columns: Sequence[str] | None = None) -> Any:

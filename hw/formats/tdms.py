@@ -41,10 +41,11 @@ class TdmsReader:
         from nptdms import TdmsFile
 
         self._path = path
+        self._budget = current(path)
         self.library = library("npTDMS")
         self.refused: dict[str, str] = {}
         self._channels: dict[str, Any] = {}
-        self._raw = MeteredFile(path, current(path))  # a file of our own is closed whatever happens in there
+        self._raw = MeteredFile(path, self._budget)  # a file of our own is closed whatever happens in there
         try:
             with parsing(path, WHAT):
                 self._file = TdmsFile.open(self._raw)
@@ -85,6 +86,7 @@ class TdmsReader:
         for start, stop in spans(group.rows or 0):
             block: Block = {}
             for name in columns:
+                self._budget.spend(0)  # every chunk goes through all channels before this one
                 with parsing(self._path, WHAT, start, name):
                     found = np.asarray(self._channels[name].read_data(start, stop - start))
                 block[name] = found.astype("datetime64[ns]").astype(np.int64) if found.dtype.kind == "M" else found

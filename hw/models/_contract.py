@@ -38,6 +38,10 @@ class Segment:
     inputs: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
 
+TORQUE = "N m"
+"""Unit of the inputs of every model."""
+
+
 def read_as_they_are(model: Model, log: Log) -> tuple[Floats, Floats | None]:
     """Measured coordinates (n, k), and their rates where the log has them."""
     names = [c.name for c in model.measured]
@@ -77,7 +81,7 @@ class Model:
         measured: names and units of what is compared; the coordinates that a log must have, but for `needs`.
         seen: which coordinates of the case they are.
         needs: names of the coordinates that a log must have, where they are others.
-        inputs: names of the recorded inputs that drive it; a log without them is a free motion.
+        inputs: names of the recorded torques that drive it, N m; a log without any of them is a free motion.
         forces: names of the case's further inputs: what acts besides, and may be estimated.
         build: (parameters, segment) -> the scene of one stretch.
         places: parameter -> its place in the parameter array of the reference, for exact derivatives; a model whose
@@ -147,7 +151,11 @@ class Model:
         return self.needs or tuple(c.name for c in self.measured)
 
     def check_log(self, log: Log) -> None:
-        """Raise SceneError for a log that lacks a measured coordinate; it names what there is."""
+        """Whether a log is one of this mechanism.
+
+        Raises:
+            SceneError: if it lacks a measured coordinate or some of the inputs, or has one in another unit.
+        """
         from crossbody.hw.reading.log import Log
 
         have = _arguments.instance("log", log, Log, "a log that was read").names("coordinates")
@@ -157,3 +165,14 @@ class Model:
                 f"The log has no coordinate {', '.join(lacking)}, which {self.name} needs; it has: "
                 f"{', '.join(have) or 'none'}. Name them so in the column map."
             )
+        given = [name for name in self.inputs if name in log.names("inputs")]
+        lacking = [name for name in self.inputs if name not in given]
+        if given and lacking:
+            raise SceneError(
+                f"The log has the input {given[0]}, and no {', '.join(lacking)}, which drives {self.name} too; "
+                "a joint that nothing drives takes a column of zeros."
+            )
+        wanted = {} if self.needs else {("coordinates", c.name): c.unit for c in self.measured}
+        for (role, name), unit in (wanted | {("inputs", name): TORQUE for name in given}).items():
+            if (told := log.channel(role, name).unit) != unit:
+                raise SceneError(f"{role}.{name} of the log is in [{told}]; {self.name} takes it in {unit}.")

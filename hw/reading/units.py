@@ -23,7 +23,11 @@ TOKEN = re.compile(r"(?P<operand>[A-Za-z_µμΩ°%]++|1(?![\w.]))|(?P<power>(?:\
 LONGEST = 40  # characters
 DEEPEST = 2  # brackets inside one another
 PREFERRED = ("N", "N m", "N s", "N/m", "N s/m", "Pa", "W", "V", "ohm", "kg", "A", "m", "s", "K")
-SPELLED = {"°": "degree", "%": "percent", "Nm": "newton * meter", "": "dimensionless", "1": "dimensionless"}
+SPELLED = {
+    "°": "degree", "%": "percent", "": "dimensionless", "1": "dimensionless", "Ns": "newton * second",
+    "Nms": "newton * meter * second", "As": "ampere * second", "Vs": "volt * second", "Ws": "watt * second",
+}  # fmt: skip
+"""What pint reads as something else: an s behind a symbol is its plural there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +80,9 @@ def is_time(unit: str) -> bool:
 def _registry() -> Any:
     import pint
 
-    return pint.UnitRegistry(cache_folder=None)
+    found = pint.UnitRegistry(cache_folder=None, on_redefinition="ignore")
+    found.define("newton_meter = newton * meter = Nm")  # pint's own Nm is a number of yarns, and mNm a thousandth of it
+    return found
 
 
 def _check_grammar(text: str) -> None:
@@ -105,11 +111,12 @@ def _convert(unit: str) -> Conversion:
     registry = _registry()
     text = re.sub(r"(?<=[A-Za-z)])\s+(?=[A-Za-z(])", " * ", SPELLED.get(unit, unit)).replace("·", "*")
     parsed = registry.Unit(text)
-    zero, one = (registry.Quantity(x, parsed).to_base_units() for x in (0.0, 1.0))
-    if not 0.0 < one.magnitude - zero.magnitude < math.inf:
-        raise ValueError(unit)
+    zero, one, two = (registry.Quantity(x, parsed).to_base_units() for x in (0.0, 1.0, 2.0))
+    step = one.magnitude - zero.magnitude
+    if not (0.0 < step < math.inf and math.isclose(two.magnitude - one.magnitude, step, rel_tol=1e-9)):
+        raise ValueError(unit)  # a logarithmic one is no factor and shift
     if zero.magnitude:
-        return Conversion(si=_name(one.units), factor=one.magnitude - zero.magnitude, shift=zero.magnitude)
+        return Conversion(si=_name(one.units), factor=step, shift=zero.magnitude)
     return Conversion(si=_name(one.units), factor=one.magnitude)
 
 

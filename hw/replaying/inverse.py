@@ -27,6 +27,7 @@ from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.lift import check_measured, closed_by, lift, rows_at
 from crossbody.hw.replaying.rank import conditions
 from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, Rows, derivatives, felt
+from crossbody.hw.replaying.windows import recorded_inputs
 from crossbody.reference import System
 
 
@@ -125,18 +126,6 @@ def pushed(model: str | Model) -> Model:
     if not chosen.forces:
         raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
     return chosen
-
-
-def recorded_inputs(log: Log, model: Model) -> Floats:
-    """The inputs that the model is driven by (n, nu).
-
-    Raises:
-        SceneError: naming those that the log does not have.
-    """
-    lacking = [name for name in model.inputs if name not in log.names("inputs")]
-    if lacking:
-        raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
-    return log.matrix("inputs", model.inputs)
 
 
 def shift_of(log: Log, model: Model, delay: float) -> float:

@@ -16,9 +16,10 @@ from crossbody.cases._entry_points import checked_arguments
 from crossbody.engines._equations import system_of
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.inverse import Inferred, noise_of, pushed, recorded_inputs, shift_of
+from crossbody.hw.replaying.inverse import Inferred, noise_of, pushed, shift_of
 from crossbody.hw.replaying.lift import check_measured
 from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, derivatives
+from crossbody.hw.replaying.windows import recorded_inputs
 from crossbody.reference.linear import Unknown, filtered
 
 

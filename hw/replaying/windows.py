@@ -17,6 +17,8 @@ from crossbody.hw.replaying.turns import advanced
 
 FEWEST = 8
 """Samples of a window."""
+SAME = 1e-6
+"""Of a sample: two times this near are one."""
 BESIDE = 3
 """Samples on each side of an impact at which no polynomial through neighbours gives a rate."""
 
@@ -71,8 +73,8 @@ def windows(
         raise InvalidValue(f"horizon is {reach!r} s; it must be above 0, and restart too.")
     y, yd = model.read(model, log)
     delays = _delays(log, model) + delay
-    recorded = [name for name in model.inputs if name in log.names("inputs")]
-    u = log.matrix("inputs", recorded) if len(recorded) == len(model.inputs) else np.zeros((len(log), 0))
+    driven = any(name in log.names("inputs") for name in model.inputs)
+    u = recorded_inputs(log, model) if driven else np.zeros((len(log), 0))
     cuts = _cuts(log.time, length, reach)
     if yd is None:
         if model.falls >= 0:
@@ -81,6 +83,28 @@ def windows(
         yd = np.zeros_like(y)
         yd[starts] = rates_by_fit(log.time, y, starts)
     return tuple(_window(log, y, yd, u, delays, model.turns, a, b) for a, b in cuts)
+
+
+def recorded_inputs(log: Log, model: Model) -> Floats:
+    """The inputs that drive a model (n, nu), in force from each of the log's times on.
+
+    Their delays, which the column map tells, are taken off, to the next sample.
+
+    Raises:
+        SceneError: naming those that the log does not have.
+    """
+    lacking = [name for name in model.inputs if name not in log.names("inputs")]
+    if lacking:
+        raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
+    return np.array([_in_force(log, name) for name in model.inputs]).reshape(len(model.inputs), len(log)).T
+
+
+def _in_force(log: Log, name: str) -> Floats:
+    channel = log.channel("inputs", name)
+    if channel.delay == 0.0:
+        return channel.values
+    rows = np.searchsorted(log.times("inputs", name), log.time + SAME * log.sample_time, side="right") - 1
+    return channel.values[np.maximum(rows, 0)]
 
 
 def _delays(log: Log, model: Model) -> Floats:

@@ -7,8 +7,9 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 
 from crossbody.cases import Outcome, OutputError
@@ -17,7 +18,7 @@ from crossbody.hw.replaying.comparison import Prediction
 from crossbody.reports.runs import files
 from crossbody.reports.runs.parts import Parts
 
-ABOUT, ARRAYS = "prediction.json", "prediction.npz"
+ABOUT, ARRAYS = "prediction.json", "prediction.f8"
 
 
 def source(model: Model) -> str:
@@ -44,19 +45,34 @@ def _write(made: Path, found: Prediction) -> None:
     told = {
         "engine": found.engine, "profile": found.profile, "settings": dict(found.settings),
         "outcomes": [outcome.value for outcome in found.outcomes], "messages": found.messages,
-        "wall_s": found.wall_s, "steps": found.steps, "rows": [len(y) for y in found.y],
+        "wall_s": found.wall_s, "steps": found.steps, "rows": [len(y) for y in found.y], "width": found.y[0].shape[1],
     }  # fmt: skip
     (made / ABOUT).write_text(json.dumps(told), encoding="utf-8")
-    np.savez(made / ARRAYS, y=np.concatenate(found.y), yd=np.concatenate(found.yd))
+    (made / ARRAYS).write_bytes(np.stack([np.concatenate(found.y), np.concatenate(found.yd)]).tobytes())
+
+
+class _Told(msgspec.Struct, forbid_unknown_fields=True):
+    """What stands beside the numbers of a prediction."""
+
+    engine: str
+    profile: str
+    settings: dict[str, Any]
+    outcomes: tuple[Outcome, ...]
+    messages: tuple[str, ...]
+    wall_s: float
+    steps: int
+    rows: list[Annotated[int, msgspec.Meta(ge=0)]]
+    width: Annotated[int, msgspec.Meta(ge=1)]
 
 
 def _read(part: Path) -> Prediction:
     try:
-        told: Any = files.decoded(files.read_inside(part, ABOUT))
-        ends = np.cumsum(told.pop("rows"))[:-1]
-        with files.open_inside(part, ARRAYS) as file, np.load(file, allow_pickle=False) as found:
-            y, yd = (tuple(np.split(found[name], ends)) for name in ("y", "yd"))
-        outcomes = tuple(map(Outcome, told.pop("outcomes")))
-        return Prediction(**told | {"messages": tuple(told["messages"])}, outcomes=outcomes, y=y, yd=yd)
-    except (OSError, ValueError, KeyError, TypeError, EOFError):
+        told = msgspec.json.decode(files.read_inside(part, ABOUT), type=_Told)
+        whole = np.frombuffer(bytearray(files.read_inside(part, ARRAYS))).reshape(2, sum(told.rows), told.width)
+    except (OSError, ValueError, msgspec.MsgspecError):
         raise OutputError(f"{part} is no part of a replay; remove {part.parent}.") from None
+    y, yd = (tuple(np.split(one, np.cumsum(told.rows)[:-1])) for one in whole)
+    return Prediction(
+        engine=told.engine, profile=told.profile, settings=told.settings, outcomes=told.outcomes,
+        messages=told.messages, wall_s=told.wall_s, steps=told.steps, y=y, yd=yd,
+    )  # fmt: skip

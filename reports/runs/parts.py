@@ -94,6 +94,8 @@ class Parts:
         made = Path(tempfile.mkdtemp(prefix=".", dir=self.path))
         try:
             yield made
+            if watch.stopping():  # a library may have swallowed it, and done less than it should
+                raise watch.Stopped
             os.rename(made, self.part(key))
         except OSError as error:
             raise OutputError(f"{made} cannot be written: {error.strerror or error}.") from error

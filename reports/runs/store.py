@@ -12,8 +12,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from crossbody.cases import Event, Ledger, Mode, Outcome, OutputError, Trajectory
+from crossbody.cases import Event, Ledger, LogFormatError, Mode, Outcome, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.hw.formats._budget import Budget, opening
+from crossbody.hw.formats._guard import plain_allocator
 from crossbody.reports.runs.files import decoded, open_inside
 
 _KEY = b"crossbody"
@@ -151,16 +153,28 @@ def load(path: Path) -> Trace:
         return _loaded(path)
     except OutputError:
         raise
+    except LogFormatError:
+        raise OutputError(f"{path} is not a motion of crossbody: it unfolds to more than a motion needs.") from None
     except _BROKEN as error:
         raise OutputError(f"{path} is not a motion of crossbody: {type(error).__name__}: {error}.") from None
+
+
+def _table(path: Path) -> pa.Table:
+    """The table of a motion, within the memory that a log of its size may take."""
+    budget = Budget(path)
+    with _opened(path) as file, opening(budget), plain_allocator(path):
+        parquet = pq.ParquetFile(file, pre_buffer=False)
+        size = 8 * parquet.metadata.num_rows * parquet.metadata.num_columns
+        if size > budget.memory:
+            raise ValueError(f"it needs {size / 1e6:.0f} MB in memory")
+        return parquet.read(use_threads=False)
 
 
 _BROKEN = (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, pa.ArrowException)
 
 
 def _loaded(path: Path) -> Trace:
-    with _opened(path) as file:
-        data = pq.read_table(file)
+    data = _table(path)
     about = decoded((data.schema.metadata or {})[_KEY])
     _check(about, "", _TOLD)
     run = replace(

@@ -56,6 +56,7 @@ class _Diary:
 
 
 _diary: _Diary | None = None
+_stopping = False
 _lost: dict[str, str] = {}
 
 
@@ -63,6 +64,11 @@ def limited(label: str, seconds: float = LIMIT) -> None:
     """Say what is run from now on and how long it may take, s; nothing but that is lost if it hangs or crashes."""
     if _diary is not None:
         _diary.write(label=label, until=time.monotonic() + seconds, seconds=seconds)
+
+
+def stopping() -> bool:
+    """Whether the user has interrupted this process, also where a library has taken that for a fault of its own."""
+    return _stopping
 
 
 def unlimited() -> None:
@@ -239,6 +245,8 @@ def _leave(code: int) -> None:
 
 
 def _stop_once(_number: int, _frame: FrameType | None) -> None:
+    global _stopping
+    _stopping = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal tells parent and child, and users are impatient
     raise Stopped
 

@@ -655,7 +655,9 @@ def _address() -> Address:
 def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """`evaluate` with one system's kernels built in."""
     general = _address()
-    dynamics, gaps, rows, power, velocity, watch = functions
+    dynamics, gaps, rows, power, velocity, watch = (
+        Address(function, kernels.REAL[name]) for name, function in zip(_USED, functions, strict=True)
+    )
 
     def call(what, t, y, out, lines):  # type: ignore[no-untyped-def]
         return general(dynamics, gaps, rows, power, velocity, watch, what, t, y, out, lines)
