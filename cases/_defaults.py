@@ -29,6 +29,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     if not case.contacts:
         return
     yield "gap_residual", 1e-9, _IDENTITY
+    yield "mode_residual", 0.0, "an identity at every sample"
     yield "law_residual", 1e-6, "the law's own equation at every state, with the rounding of stiff rows"
     yield "lam_impulse_path", 1e-5, _FASTER
     if case.law.unilateral.any():

@@ -14,7 +14,7 @@ import numpy as np
 from crossbody.cases._case import Case, Claim, Parameter, Tier, Value
 from crossbody.cases._delta import pose
 from crossbody.cases._delta import scene as delta
-from crossbody.cases._delta.limits import TRACKING, on_the_circle
+from crossbody.cases._delta.limits import on_the_circle, tracking
 
 PARAMETERS = {
     **delta.ROBOT,
@@ -81,10 +81,10 @@ def _claims(variant: str, parameters: Mapping[str, Value]) -> tuple[Claim, ...]:
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene: at rest in the middle of the circle."""
     p, claims = delta.numbers(parameters), _claims(variant, parameters)
-    settled = p["t_end"] >= SETTLED
+    settled, grown = p["t_end"] >= SETTLED, min(p["t_end"] / p["fade"], 1.0) ** 3
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
     return delta.scene(
         "delta_tracking", variant, _TITLES[variant], PARAMETERS, parameters, q0, np.zeros(9),
         claims=claims,
-        limits=(*TRACKING, *(on_the_circle(claim.expected, settled) for claim in claims)),
+        limits=(*tracking(grown), *(on_the_circle(claim.expected, settled) for claim in claims)),
     )  # fmt: skip

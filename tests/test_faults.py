@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Claim, InvalidValue, Limit, Outcome, Tier, Trajectory, UnknownName, load
+from crossbody.cases import Case, Claim, InvalidValue, Limit, Mode, Outcome, Tier, Trajectory, UnknownName, load
 from crossbody.cases._arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
@@ -47,7 +47,23 @@ def _one_touch_less(run: Trajectory) -> Trajectory:
     return replace(run, events=run.events[:last])
 
 
+def _stopped(run: Trajectory) -> Trajectory:
+    """A record that ends at nine tenths, of a run that says that it finished."""
+    n = int(np.searchsorted(run.t, 0.9 * run.t[-1])) or 1
+    columns = {name: getattr(run, name)[:n] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")}
+    if run.ledger is not None:
+        kept = {name: getattr(run.ledger, name)[:n] for name in ("contact", "input", "dissipated")}
+        columns["ledger"] = replace(run.ledger, **kept)
+    return replace(run, events=tuple(e for e in run.events if e.t <= columns["t"][-1]), **columns)
+
+
 FAULTS: dict[str, Fault] = {
+    "stops early": _stopped,
+    "modes of other events": lambda run: replace(run, mode=np.where(run.mode == Mode.FREE, Mode.BALLISTIC, run.mode)),
+    "an event less": lambda run: replace(run, events=(*run.events[:1], *run.events[2:])),
+    "an event without an instant": lambda run: replace(
+        run, events=(*run.events[:-1], replace(run.events[-1], t=np.nan))
+    ),
     "every force doubled": _forces,
     "force unknown": _silent,
     "velocity 10 % large": lambda run: replace(run, v=1.1 * run.v),
@@ -159,11 +175,13 @@ def test_a_claimed_number_that_is_missing_is_outside(recorded: Recorded) -> None
         assert "fifth_exit" in _outside(claimed, entry, truth)
 
 
-def test_a_claim_that_judged_nothing_is_reported(recorded: Recorded) -> None:
+@pytest.mark.parametrize("metric", ["ring_changes", "position (model)"])
+def test_a_claim_that_judged_nothing_is_reported(metric: str, recorded: Recorded) -> None:
     case, truth, entries = recorded["bouncing_ball", "listing"]
-    claim = Claim(metric="ring_changes", expected=4.0, tier=Tier.B, source="another mechanism")
-    rows = judged(replace(case, claims=(*case.claims, claim)), [entries["reference:compiled"]], truth, "")
-    assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == ["ring_changes"]
+    claim = Claim(metric=metric, expected=4.0, tier=Tier.B, source="another mechanism")
+    alone = replace(entries["reference:compiled"], refined=None)
+    rows = judged(replace(case, claims=(*case.claims, claim)), [alone], truth, "")
+    assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == [metric]
 
 
 @pytest.mark.parametrize(

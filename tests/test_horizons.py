@@ -27,7 +27,10 @@ FACTORS = (0.1, 0.5, 2.0)
 EVERY = [(name, variant, factor) for name in cases.names() for variant in cases.variants(name) for factor in FACTORS]
 LATE = ("ball_maze", "solve", 2.0)
 """Two and a half minutes of rest in the centre: nothing new."""
-QUICK = (("ball_maze", "outside", 0.1), ("red_body", "frozen", 2.0), ("soft_contact", "axis", 0.1))
+QUICK = (
+    ("ball_maze", "outside", 0.1, "reference:compiled"), ("red_body", "frozen", 2.0, "reference:compiled"),
+    ("soft_contact", "axis", 0.1, "reference:compiled"), ("delta_tracking", "circle", 0.1, "pinocchio:law"),
+)  # fmt: skip
 """What was outside once, or rests, and costs little."""
 
 
@@ -38,9 +41,9 @@ def outside(name: str, variant: str, factor: float, engine: str) -> list[tuple[s
     return [(row.profile, row.metric, row.value, row.why) for row in rows if row.verdict in ("outside", "crashed")]
 
 
-@pytest.mark.parametrize(("name", "variant", "factor"), QUICK)
-def test_a_right_motion_is_not_outside_at_another_horizon(name: str, variant: str, factor: float) -> None:
-    assert outside(name, variant, factor, "reference:compiled") == []
+@pytest.mark.parametrize(("name", "variant", "factor", "engine"), QUICK)
+def test_a_right_motion_is_not_outside_at_another_horizon(name: str, variant: str, factor: float, engine: str) -> None:
+    assert outside(name, variant, factor, engine) == []
 
 
 @pytest.mark.slow

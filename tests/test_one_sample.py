@@ -141,6 +141,31 @@ def test_one_late_touch_or_release_counts_in_full(after: Mode, ball: tuple[Case,
     assert measure("event_times", case, truth, run) == pytest.approx(1e-5, rel=1e-6)
 
 
+def test_an_event_without_an_instant_is_no_number(ball: tuple[Case, Truth]) -> None:
+    case, truth = ball
+    events = truth.trajectory.events
+    for k in range(len(events)):
+        lost = replace(truth.trajectory, events=(*events[:k], replace(events[k], t=np.nan), *events[k + 1 :]))
+        assert np.isnan(measure("event_times", case, truth, lost))
+
+
+@pytest.mark.parametrize("place", [0.1, 0.5, 0.9])
+def test_every_sample_and_every_event_counts_in_the_residual_of_the_modes(
+    place: float, ball: tuple[Case, Truth]
+) -> None:
+    case, truth = ball
+    run = truth.trajectory
+    mode, events = run.mode.copy(), run.events
+    k, j = int(place * len(run.t)), int(place * len(events))
+    mode[k] = Mode.COLLISION
+    assert measure("mode_residual", case, truth, run) == 0.0
+    assert measure("mode_residual", case, truth, replace(run, mode=mode)) == 1.0
+    assert measure("mode_residual", case, truth, replace(run, events=(*events[:j], *events[j + 1 :]))) >= 1.0
+    assert measure("mode_residual", case, truth, replace(run, events=events[::-1])) >= 1.0
+    other = replace(events[j], before=Mode.COLLISION)
+    assert measure("mode_residual", case, truth, replace(run, events=(*events[:j], other, *events[j + 1 :]))) == 1.0
+
+
 @pytest.mark.parametrize(("name", "left"), [("touch_count", Mode.CONTACT), ("release_count", Mode.BALLISTIC)])
 def test_a_contact_less_is_counted(name: str, left: Mode, ball: tuple[Case, Truth]) -> None:
     case, truth = ball

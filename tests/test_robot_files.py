@@ -330,6 +330,27 @@ def test_bounds_are_rows_that_open_and_close(tmp_path: Path) -> None:
     assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() <= 1e-7
 
 
+@pytest.mark.parametrize("safe", ["enable", "disable"])
+@pytest.mark.parametrize("draw", range(10))
+def test_a_bound_has_the_stiffness_and_damping_that_mujoco_gives_it(draw: int, safe: str) -> None:
+    """Its own K, B and impedance at a bound that acts; short time constants are lengthened to two steps."""
+    rng = np.random.default_rng(draw)
+    given = -rng.uniform(10.0, 1e4, 2) if draw % 3 == 0 else (10.0 ** rng.uniform(-4.0, -1.0), rng.uniform(0.3, 2.0))
+    d = rng.uniform(0.5, 0.99)
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{10.0 ** rng.uniform(-4.0, -2.0)}"><flag refsafe="{safe}"/></option>'
+        f"<worldbody><body>"
+        f'<joint name="j" type="slide" limited="true" range="0 1" solreflimit="{given[0]} {given[1]}" '
+        f'solimplimit="{d} {d} 1"/><geom size=".1"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    data.qpos[0] = -0.01
+    mujoco.mj_forward(model, data)
+    K, B, impedance = np.reshape(data.efc_KBIP, (-1, 4))[0, :3]
+    law = scene_of(model).joints[0].law
+    assert (law.a0, law.a1) == pytest.approx((K * impedance, B), rel=1e-12)
+
+
 def test_controls_come_from_a_table(tmp_path: Path) -> None:
     path, table = write(tmp_path), tmp_path / "u.csv"
     table.write_text("t,m1,m2\n0,1,0\n0.1,-1,0.5\n", encoding="utf-8")

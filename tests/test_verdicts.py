@@ -13,7 +13,7 @@ from crossbody import cases as cases_
 from crossbody import engines
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
 from crossbody.cases._defaults import limits_of
-from crossbody.reports.judging.audit import audit, difference
+from crossbody.reports.judging.audit import AuditRow, audit, difference
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
@@ -284,6 +284,25 @@ def test_the_audit_allows_rounding_alone(off: float, same: bool, case: Case) -> 
     assert all(row.ok for row in audit(mine, PHYSICS, case)) == same
 
 
+@pytest.mark.parametrize(
+    ("quantity", "factor", "word"),
+    [
+        ("lam", 1.0, Word.EXPECTED),
+        ("lam", 3.0, Word.OUTSIDE),
+        ("lam", 0.3, Word.OUTSIDE),
+        ("masses", 1.0, Word.OUTSIDE),
+    ],
+)
+def test_a_known_difference_of_the_audit_has_a_quantity_and_a_size(quantity: str, factor: float, word: Word) -> None:
+    shipped = load("bouncing_ball", "linear")
+    settings = engines.load("mujoco").prepare(shipped, "default").settings
+    entry = Entry(engine="mujoco", profile="default", settings=settings, run=truth_of(shipped).trajectory)
+    off = factor * deviations(shipped, entry)["audit lam"]
+    row = AuditRow(quantity=quantity, mine="", theirs="", difference=off, tolerance=1e-10)
+    found = {each.metric: each for each in judged(shipped, [replace(entry, audit=(row,))], truth_of(shipped), "")}
+    assert found["audit"].verdict == word
+
+
 def test_the_largest_difference_counts() -> None:
     assert difference([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]) == 0.25
 
@@ -298,7 +317,7 @@ def test_every_case_is_limited_in_all_that_it_has() -> None:
         "energy_residual",
         "rate_residual",
     }
-    rows = {"gap_residual", "law_residual", "lam_impulse_path"}
+    rows = {"gap_residual", "mode_residual", "law_residual", "lam_impulse_path"}
     opening = {"gap_error", "complementarity", "event_times", "touch_count", "release_count"}
     for name in cases_.names():
         for variant in cases_.variants(name):

@@ -73,7 +73,19 @@ _SWING = (1e-2, "0.5 % of a period of 1.4 s, for a swing that is not quite small
 IMPULSE = tuple(_limits(_SMOOTH))
 FREE = (*_limits(_FALL), *_fixed_step(100.0, _FOLDED, _FALL))
 SINGULARITY = (*_limits(_SMOOTH), Limit(metric="swing_period", value=_SWING[0], why=_SWING[1]))
-TRACKING = tuple(_limits(_SAMPLED))
+
+
+def tracking(grown: float) -> tuple[Limit, ...]:
+    """Limits of a robot on a circle.
+
+    Args:
+        grown: part of its radius that the circle has reached at the horizon.
+    """
+    value, why = _SAMPLED["position"]
+    aside = {
+        "position": (value / grown, why + ", over the part of the radius that is reached: sideways angles grow with it")
+    }
+    return tuple(_limits({**_SAMPLED, **aside}))
 
 
 def on_the_circle(lag: float, settled: bool) -> Limit:

@@ -39,6 +39,8 @@ SPLIT = ("position", "event_times")
 PARTS = ("model", "discretisation")
 FLOOR = 0.5
 """A number is judged where at least this part of the time for which the truth must be trusted was compared."""
+REACHED = 1e-9
+"""Part of the horizon by which the end of a record may miss it: steps that do not add up to it exactly."""
 BY_EVENTS = ("event_times", "restitution_error")
 """Metrics that match events with the truth's, as far as that is trusted."""
 
@@ -273,11 +275,16 @@ def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
 
 
 def _outcome(judge_: _Judge, run: Trajectory) -> Verdict:
-    """Whether the run reached its horizon: a run that did not is outside, with the advice."""
-    if run.outcome.ok:
+    """Whether the run reached its horizon: one that did not is outside with the advice, whatever it says of itself."""
+    t_end = judge_.case.t_end
+    end = float(run.t[-1]) if len(run.t) else 0.0
+    if not run.outcome.ok:
+        told = "" if run.outcome.advice in run.message else run.outcome.advice
+        why = " ".join(text for text in (f"{run.outcome.value}:", run.message, told) if text)
+    elif abs(end - t_end) <= REACHED * t_end:
         return judge_.row("finished", 1.0, "1", Word.WITHIN, "", expected=1.0, limit=0.0)
-    told = "" if run.outcome.advice in run.message else run.outcome.advice
-    why = " ".join(text for text in (f"{run.outcome.value}:", run.message, told) if text)
+    else:
+        why = f"It says that it finished, but its record ends at t = {end:.9g} s instead of {t_end:.9g} s."
     return judge_.row("finished", 0.0, "1", Word.OUTSIDE, why, expected=1.0, limit=0.0)
 
 

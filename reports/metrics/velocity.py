@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
-STILL = 1e-9
-"""Velocities below this part of what would carry their like through the horizon are rest but for rounding."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -37,12 +35,6 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def _scale(exact: Trajectory, case: Case) -> Floats:
-    """Largest |v_truth| of all that share a unit (nv,); where they all rest, what carries them by their size."""
-    own, sizes = np.max(np.abs(exact.v), axis=0), np.max(np.abs(exact.q), axis=0)
-    units, of_q = (np.array([one.unit for one in named]) for named in (case.velocities, case.coordinates))
-    sizes[list(case.quaternions)] = 1.0
-    of_q[list(case.quaternions)] = "rad"
-    shared = of_like(own, case.velocities)
-    carrying = np.array([sizes[of_q == unit].max(initial=0.0) for unit in units]) / case.t_end
-    moving = np.where(shared > STILL * carrying, shared, carrying)
-    return np.maximum(moving, least(case.velocities, rates=True))
+    """Largest |v_truth| of all that share a unit (nv,), and no less than what such rates are measured by."""
+    shared = of_like(np.max(np.abs(exact.v), axis=0), case.velocities)
+    return np.maximum(shared, least(case.velocities, rates=True))

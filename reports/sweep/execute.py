@@ -25,9 +25,9 @@ RTOL = 1e-9
 """Of the reference, if nothing is said."""
 ACCOUNT = 10.0
 """The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
-AFFORD, SHARE = 100, 0.2
-"""The independent integrator is asked for every run of at most so many steps, and gets such a part of its time: it
-takes some ten times the steps, each through Python. Where that is not enough the energy account alone judges."""
+AFFORD = 1_000
+"""The independent integrator is asked for every run of at most so many steps, and gets as much time as a run may take:
+it takes some ten times the steps. Where that is not enough the energy account alone judges."""
 REFUSED, SKIPPED, EXCEPTION, CRASHED = "refused", "skipped", "exception", "crashed"
 """Ends of a run that never began, or that should not be: the words beside those of `Outcome`."""
 
@@ -125,7 +125,7 @@ def _error(spec: Spec, tried: Tried) -> Error:
     if spec.second:
         second = (10 * spec.max_steps, 3.0 * spec.time_limit)
     elif spec.afford and run.steps <= AFFORD:
-        second = (100 * AFFORD, SHARE * spec.time_limit)
+        second = (100 * AFFORD, spec.time_limit)
     asked = Asked(limit=limit(spec, tried.settings), near=lambda: _beside(spec, case, tried.settings), second=second)
     try:
         return error(case, run, asked)
