@@ -109,7 +109,7 @@ class FrozenMachine(LevelMachine):
             if not self._collide_all(t, q, v, view):
                 break
             self._seen.clear()  # v is another: a mode set may stand again
-            self._one_by_one = False
+            self._one_by_one = self._alone = False
         self._arm(view, t, q, v)
         self._located.clear()
         return view

@@ -100,7 +100,7 @@ class LevelMachine:
         self.fastest = self._rounding = 0.0
         self._instant = -np.inf
         self._seen: set[tuple[int, ...]] = set()
-        self._one_by_one = False
+        self._one_by_one = self._alone = False
         self.guards: list[Guard] = []
 
     @property
@@ -197,7 +197,7 @@ class LevelMachine:
     def _repeats(self, t: float) -> bool:
         """Note the mode set; whether it stood here at this instant before."""
         if abs(t - self._instant) > SAME_INSTANT * abs(t):
-            self._instant, self._one_by_one = t, False
+            self._instant, self._one_by_one, self._alone = t, False, False
             self._seen.clear()
         now = tuple(self.modes)
         known = now in self._seen
@@ -215,11 +215,25 @@ class LevelMachine:
         return view
 
     def _switch_rows(self, t: float, q: Floats, v: Floats) -> View:
-        """All rows together, judged by one mode set; only the strongest once a mode set has repeated."""
+        """All rows together, judged by one mode set; only the strongest once a mode set has repeated.
+
+        Where rows that join together depend on each other all go back, and join one after another: what is left closes
+        by itself.
+        """
         changed: set[int] = set()
+        settled: list[Mode] = []
+        events = len(self.events)
         self._repeats(t)
         while True:
-            view = self.look(t, q, v)
+            try:
+                view = self.look(t, q, v)
+            except Ended as error:
+                if error.outcome is not Outcome.ILL_POSED or not settled or self._alone:
+                    raise
+                self.modes[:], settled, self._one_by_one, self._alone = settled, [], True, True
+                del self.events[events:]
+                continue
+            settled, events = list(self.modes), len(self.events)
             wanted = {i: after for i in self.rows if (after := self._wanted(i, view, t, q, v)) != self.modes[i]}
             if self._one_by_one and len(wanted) > 1:
                 wanted = {i: wanted[i] for i in self._strongest(wanted, t, q, v)}
@@ -241,7 +255,8 @@ class LevelMachine:
             i: self._change_of_acceleration(i, t, q, v) if self.modes[i] in ACTIVE or after in ACTIVE else np.inf
             for i, after in wanted.items()
         }
-        return [i for i, size in sizes.items() if size >= max(sizes.values()) * (1.0 - SAME_CHANGE)]
+        found = [i for i, size in sizes.items() if size >= max(sizes.values()) * (1.0 - SAME_CHANGE)]
+        return found[:1] if self._alone else found
 
     def _change_of_acceleration(self, i: int, t: float, q: Floats, v: Floats) -> float:
         """Square of the difference that row i makes to v', in the norm of the mass matrix."""
