@@ -108,6 +108,12 @@ def test_what_was_recorded_is_not_outside(recorded: Recorded, scene: tuple[str, 
     assert _outside(case, entries[who], truth) == []
 
 
+def test_collisions_that_take_energy_in_no_time_are_not_outside() -> None:
+    case = load("newtons_cradle", "sliders", zeta=0.2)
+    found = jobs.run_case(case, jobs.picks(("reference:compiled", "reference:cvode")), refine=False)
+    assert [_outside(case, entry, found.truth) for entry in found.entries] == [[], []]
+
+
 @pytest.mark.parametrize("who", ENGINES)
 @pytest.mark.parametrize("scene", SCENES, ids=":".join)
 @pytest.mark.parametrize("fault", FAULTS)
