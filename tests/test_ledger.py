@@ -5,6 +5,7 @@ import pytest
 from mechanisms import ball, flyby, oscillator, sliders
 from test_machines import gusty
 
+from crossbody import cases, engines
 from crossbody.cases import Outcome
 from crossbody.reference import System, kernels, simulate
 
@@ -88,3 +89,10 @@ def test_random_runs_close_their_account_by_far(seed):
     rtol = 10.0 ** rng.uniform(-11, -3)
     run = simulate(system, [rng.uniform(-0.01, 2)], [rng.normal()], 2.0, rtol=rtol, ledger=True, shortcuts=False)
     assert run.outcome.ok, run.message
+
+
+def test_a_first_step_that_is_some_tolerances_off_contradicts_nothing():
+    """A stiff ball begins inside the floor: its first step is fourteen times off what the tolerance adds."""
+    values = {"a0": 121796.9705728013, "a1": 570.2599202694515, "height": -0.005680055905624148}
+    case = cases.load("bouncing_ball", "linear", t_end=0.5, speed=-0.9301994487774878, **values)
+    assert engines.load("reference").prepare(case, "compiled").run().outcome.ok

@@ -19,7 +19,7 @@ from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, M
 CLOSE = 1e-9  # part of the terms behind a row's multiplier: rounding stays far below, and asks no further
 WRONG = 1e-6  # part of all terms of a row's law: more is no rounding, however ill-conditioned the rows are
 SELDOM = 64  # steps between two looks at a system that brings its own algebra: they cost two right-hand sides
-OPEN = 10.0  # times what the tolerance may add to the energy of all steps until now
+OPEN = 30.0  # times what the tolerance may add to the energy of all steps: a first step can be fourteen of it off
 
 
 @inlined
