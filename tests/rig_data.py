@@ -55,4 +55,10 @@ def run_as_log(case: Case, names: dict[str, int], noise: float, rate: float = 50
     random = np.random.default_rng(seed)
     y = {name: run.q[keep][:, i] + noise * random.standard_normal(keep.sum()) for name, i in names.items()}
     yd = {name: run.v[keep][:, i] for name, i in names.items()}
-    return log_of(run.t[keep], channels("coordinates", "m", y), channels("velocities", "m/s", yd))
+    units = {name: case.coordinates[i].unit for name, i in names.items()}
+    seen = (
+        channels(role, f"{units[name]}{per}", {name: values})
+        for role, per, of in (("coordinates", "", y), ("velocities", "/s", yd))
+        for name, values in of.items()
+    )
+    return log_of(run.t[keep], *seen)
