@@ -52,7 +52,9 @@ def quiet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.Capture
     """Nothing printed, by Python or beneath it, and no file left in the working directory."""
     monkeypatch.chdir(tmp_path)
     yield
-    assert capfd.readouterr() == ("", "")
+    out, err = capfd.readouterr()
+    waiting = "crossbody: another process compiles what this one needs; waiting for it.\n"  # a cold cache, many workers
+    assert (out, err.replace(waiting, "")) == ("", "")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -142,8 +142,9 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.history, s.one_by_one = 0, 0  # another velocity: mode sets may stand again
             continue
         if remember(s, b):
-            if s.one_by_one:
-                return MODE_CYCLE
+            if s.one_by_one:  # the set that stands again is the one of rows that depend on each other, or a cycle
+                code = evaluate(K, s, m, w, b.mode) if s.one_by_one == ALONE else 0
+                return int(code) if code != 0 else MODE_CYCLE
             s.one_by_one, s.history = 1, 0
             changed[:] = 0
 

@@ -244,6 +244,8 @@ class LevelMachine:
                 return view
             if self._repeats(t):
                 if self._one_by_one:
+                    if self._alone:
+                        self.look(t, q, v)  # raises where the set that stands again is that of the dependent rows
                     raise Ended(Outcome.MODE_CYCLE, sorted(changed))
                 self._one_by_one = True
                 self._seen.clear()
