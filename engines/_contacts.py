@@ -16,6 +16,9 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Scene, Shape, Vector
 from crossbody.cases.scene_contacts import Contact, contacts
 
+TURN = 1e-3
+"""Angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it."""
+
 Pose = tuple[Floats, Floats]
 """Rotation (3, 3) and position (3,) in the world."""
 Poses = Callable[[str], Pose]
@@ -150,6 +153,19 @@ def _nearest(one: Pose, half: float, two: Pose, other: float) -> tuple[Floats, F
     if abs(s) <= half and abs(t) <= other:
         tried.append((M + s * A, N + t * B))
     return min(tried, key=lambda pair: float(np.sum((pair[1] - pair[0]) ** 2)))
+
+
+def drift(rates: Callable[[float], Floats], v: Floats) -> Floats:
+    """Return H' v by a central difference of fourth order along the motion.
+
+    Args:
+        rates: time from now along the motion with constant v -> H v there.
+        v: velocities (nv,).
+    """
+    step = TURN / max(float(np.abs(v).max()), 1e-12)
+    before, left, right, ahead = (rates(k * step) for k in (-2, -1, 1, 2))
+    total: Floats = (before - 8.0 * left + 8.0 * right - ahead) / (12.0 * step)
+    return total
 
 
 def gradient(touch: Touch, velocity: Callable[[str, Floats], Any]) -> Floats:

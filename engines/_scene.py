@@ -15,7 +15,7 @@ import numpy as np
 from crossbody.cases import CaseUnsupported
 from crossbody.cases._arrays import Floats
 from crossbody.cases._rotations import turned
-from crossbody.cases.scene import WIDTHS, Joint, Loop, Scene, Tendon, Vector
+from crossbody.cases.scene import WIDTHS, Joint, Scene, Tendon, Vector
 
 
 def polynomial(constants: Vector, x: Any) -> Any:
@@ -196,17 +196,19 @@ class Rows:
 
     scene: Scene
     forces: Forces
+    ends: list[tuple[tuple[Floats, float], tuple[Floats, float]]] = field(init=False)
 
     def __post_init__(self) -> None:
         """Refuse loops in space, which an engine's own kinematics must give."""
         for loop in self.scene.loops:
             if loop.in_space:
                 raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
+        self.ends = [(self._end(loop.type, loop.first), self._end(loop.type, loop.second)) for loop in self.scene.loops]
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""
         x = self.forces.x(q)
-        h = [self._loop(loop, x)[0] for loop in self.scene.loops]
+        h = [self._loop(i, x)[0] for i in range(len(self.ends))]
         for part, row in self._bounded():
             (low, high), length = part.range, float(row @ x)
             h += [length - low - part.margin] if np.isfinite(low) else []
@@ -216,7 +218,7 @@ class Rows:
     def jacobian(self, q: Floats) -> Floats:
         """Return H (nc, nv)."""
         x = self.forces.x(q)
-        H = [self._loop(loop, x)[1] for loop in self.scene.loops]
+        H = [self._loop(i, x)[1] for i in range(len(self.ends))]
         for part, row in self._bounded():
             H += [sign * row for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
         return np.array(H).reshape(-1, len(x))
@@ -225,8 +227,8 @@ class Rows:
         """Return H' v (nc,)."""
         x = self.forces.x(q)
         drift = np.zeros(len(self.heights(q)))
-        for i, loop in enumerate(self.scene.loops):
-            drift[i] = -self._loop(loop, x)[2] * (self._end(loop.type, loop.second)[0] @ v) ** 2
+        for i, (_, (second, _)) in enumerate(self.ends):
+            drift[i] = -self._loop(i, x)[2] * (second @ v) ** 2
         return drift
 
     def _bounded(self) -> list[tuple[Joint | Tendon, Floats]]:
@@ -246,9 +248,9 @@ class Rows:
         reference = next(joint.reference for joint in self.scene.joints if joint.name == name)
         return np.eye(self.scene.nv)[self.forces.place[name]], reference
 
-    def _loop(self, loop: Loop, x: Floats) -> tuple[float, Floats, float]:
+    def _loop(self, i: int, x: Floats) -> tuple[float, Floats, float]:
         """Return h, H and the second derivative of the polynomial."""
-        (first, rest), (second, other) = (self._end(loop.type, name) for name in (loop.first, loop.second))
-        P, y = np.polynomial.Polynomial(loop.polynomial), float(second @ x) - other
+        (first, rest), (second, other) = self.ends[i]
+        P, y = np.polynomial.Polynomial(self.scene.loops[i].polynomial), float(second @ x) - other
         slope, curve = float(P.deriv()(y)), float(P.deriv(2)(y))
         return float(first @ x) - rest - float(P(y)), first - slope * second, curve

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, wraps
 from sys import modules
 from typing import Any
@@ -53,6 +53,11 @@ class Address(types.WrapperAddressProtocol):  # type: ignore[misc]
         return self._signature
 
 
+def addresses(names: Sequence[str], functions: Sequence[Any]) -> list[Address]:
+    """Kernels by their names, to be named in other compiled code."""
+    return [Address(function, kernels.REAL[name]) for name, function in zip(names, functions, strict=True)]
+
+
 @cache
 def address() -> Address:
     """The program, to be named in other compiled code."""
@@ -97,9 +102,7 @@ def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     Handing ten functions over from Python costs more than a short run; an entry names their addresses as constants.
     """
     advance = address()
-    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = (
-        Address(function, kernels.REAL[name]) for name, function in zip(kernels.NAMES, functions, strict=True)
-    )
+    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = addresses(kernels.NAMES, functions)
 
     def call(state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
         return advance(

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from published import MJCF, URDF
+from published import MJCF, STATES, URDF, close, dynamics_of, moves_as_in_mujoco
 
 from crossbody.cases import SceneError
 from crossbody.cases.files.case import check_runnable
 from crossbody.cases.files.reading import model_of, scene_of
 from crossbody.cases.scene import Scene
-from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 
-SAME = 1e-10
-"""Of the largest entry: what two programs may make of the same numbers."""
-STATES = 100
 REFUSED = {
     "dm_control/dog": "activation",
     "dm_control/fish": "medium",
@@ -36,23 +30,6 @@ REFUSED = {
 }
 """What a scene does not have, and the word by which the refusal says so."""
 NOTHING = [pytest.param("", marks=pytest.mark.skip(reason="The packages of the extra `robots` are not installed."))]
-
-
-def of(scene: Scene) -> Callable[[Any, Any, Any], tuple[Any, Any]]:
-    """Return what gives M and the forces at a state."""
-    table = tabulate(scene)
-    w = np.zeros(table.scratch)
-
-    def ours(q: Any, v: Any, u: Any) -> tuple[Any, Any]:
-        M, f = np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv)
-        mechanism.dynamics(0.0, q, v, u, table.p, M, f, w)
-        return M, f
-
-    return ours
-
-
-def close(mine: Any, theirs: Any) -> bool:
-    return bool(np.abs(mine - theirs).max() <= SAME * np.abs(theirs).max())
 
 
 def read(name: str, path: Path) -> tuple[Any, Scene] | None:
@@ -75,20 +52,7 @@ def test_a_published_file_has_the_dynamics_of_mujoco(name: str) -> None:
     found = read(name, MJCF[name])
     if found is None:
         return
-    model, scene = found
-    data, rng, ours = mujoco.MjData(model), np.random.default_rng(7), of(scene)
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    for _ in range(STATES):
-        q = np.array(model.qpos0)
-        mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), 1.0)
-        v, u = rng.normal(size=model.nv) * 2.0, rng.normal(size=model.nu) * 20.0
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
-        mujoco.mj_forward(model, data)
-        full = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, full)
-        M, f = ours(q, v, u)
-        assert close(M, full)
-        assert close(f, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
+    moves_as_in_mujoco(*found)
 
 
 @pytest.mark.parametrize("name", list(URDF) or NOTHING)
@@ -99,7 +63,7 @@ def test_a_published_urdf_has_the_dynamics_of_pinocchio(name: str) -> None:
         return
     scene = found[1]
     theirs = pin.buildModelFromUrdf(str(URDF[name]))
-    data, rng, ours = theirs.createData(), np.random.default_rng(7), of(scene)
+    data, rng, ours = theirs.createData(), np.random.default_rng(7), dynamics_of(scene)
     places = [theirs.joints[theirs.getJointId(joint.name)] for joint in scene.joints]
     order = [place.idx_v for place in places]
     assert sorted(order) == list(range(theirs.nv)), "the same joints"

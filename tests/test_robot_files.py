@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
+from published import SAME, STATES, moves_as_in_mujoco
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, SceneError, UnknownName
@@ -30,9 +31,6 @@ from crossbody.reports.cli import cli
 ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",
              "universal_robots_ur5e/ur5e")  # fmt: skip
-STATES = 100
-SAME = 1e-10
-"""Of the largest entry: what two programs may make of the same arrays."""
 ARM = """
 <mujoco><compiler angle="radian"/><option timestep="0.001" integrator="{integrator}"/><worldbody><body>
 <joint name="shoulder" axis="0 1 0" damping=".3" armature=".02" {shoulder}/>
@@ -59,21 +57,7 @@ def test_published_robots_have_the_dynamics_of_mujoco(robot: str) -> None:
     if not path.is_file():
         pytest.skip(f"The robot's file {path} is not here.")
     model = compiled(path)
-    scene, data = scene_of(model), mujoco.MjData(model)
-    table, rng = tabulate(scene), np.random.default_rng(7)
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    M, f, full = np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), np.zeros((scene.nv, scene.nv))
-    for _ in range(STATES):
-        q = np.array(model.qpos0)
-        mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), 1.0)
-        v, u = rng.normal(size=model.nv) * 2.0, rng.normal(size=model.nu) * 20.0
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
-        mujoco.mj_forward(model, data)
-        mujoco.mj_fullM(model, data, full)
-        mechanism.dynamics(0.0, q, v, u, table.p, M, f, np.zeros(table.scratch))
-        theirs = data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias
-        assert np.abs(M - full).max() <= SAME * np.abs(full).max()
-        assert np.abs(f - theirs).max() <= SAME * np.abs(theirs).max()
+    moves_as_in_mujoco(model, scene_of(model))
 
 
 FLOATING = """

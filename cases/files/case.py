@@ -156,13 +156,12 @@ def check_runnable(scene: Scene) -> None:
     for part in scene.bounded:
         if part.friction_loss:
             raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
-    strings = {tendon.name: tendon for tendon in scene.tendons if tendon.bodies}
-    used = {*(part.tendon for part in scene.actuators), *(n for part in scene.loops for n in (part.first, part.second)
-            if part.type == "tendon")}  # fmt: skip
-    for name, tendon in strings.items():
-        if any(tendon.stiffness) or any(tendon.damping) or name in used:
+    used = {part.tendon for part in scene.actuators}
+    used |= {name for loop in scene.loops if loop.type == "tendon" for name in (loop.first, loop.second)}
+    for tendon in scene.tendons:
+        if tendon.bodies and (any(tendon.stiffness) or any(tendon.damping) or tendon.name in used):
             raise SceneError(
-                f"Tendon {name!r} runs between two points: it can have a range, and nothing acts along it."
+                f"Tendon {tendon.name!r} runs between two points: it can have a range, and nothing acts along it."
             )
 
 

@@ -99,15 +99,10 @@ def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Input
     if inputs is not None:
         last = np.searchsorted(inputs.times, times, side="right") - 1
         values[last >= 0, : len(inputs.names)] = inputs.values[last[last >= 0]]
-    for (_, force, (start, end)), columns in zip(given, _columns(scene), strict=True):
-        values[(times >= start) & (times < end), columns] = force
+    pushes = values[:, len(scene.actuators) :].reshape(len(times), -1, 3)
+    for i, (_, force, (start, end)) in enumerate(given):
+        pushes[(times >= start) & (times < end), i] = force
     return scene, Inputs(names=scene.inputs, times=times, values=values)
-
-
-def _columns(scene: Scene) -> list[slice]:
-    """Return which inputs each push is."""
-    first = len(scene.actuators)
-    return [slice(first + 3 * i, first + 3 * i + 3) for i in range(len(scene.pushes))]
 
 
 def _push(text: str, scene: Scene) -> tuple[str, Floats, tuple[float, float]]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import Scene
+from crossbody.engines._contacts import Poses
 from crossbody.engines._log import Observe
 
 
@@ -38,3 +41,13 @@ def mass_matrix(model: Any, data: Any) -> Floats:
     full: Floats = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
     return full
+
+
+def numbers(scene: Scene) -> dict[str, int]:
+    """Return MuJoCo's number of every body, and of the world, whose name is empty; a file need not name them."""
+    return {"": 0, **{body.name: i for i, body in enumerate(scene.bodies, start=1)}}
+
+
+def pose_of(data: Any, bodies: Mapping[str, int]) -> Poses:
+    """Return what gives the pose of a body by its name, where the kinematics were computed last."""
+    return lambda body: (data.xmat[bodies[body]].reshape(3, 3), data.xpos[bodies[body]])

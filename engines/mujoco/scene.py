@@ -22,7 +22,7 @@ from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._drift import Drift
 from crossbody.engines.mujoco._globals import Hook
-from crossbody.engines.mujoco._observe import mass_matrix
+from crossbody.engines.mujoco._observe import mass_matrix, numbers, pose_of
 from crossbody.engines.mujoco._scene import Scene as Prepared
 
 SLOWEST, OF_RATE = 1e-3, 0.02
@@ -131,8 +131,8 @@ def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
 
 def _change(case: Case, data: Any) -> Callable[[float], None]:
     given, scene = case.inputs, _scene(case)
-    numbers = {body.name: i for i, body in enumerate(scene.bodies, start=1)}  # a file need not name them
-    pushed = [numbers[push.body] for push in scene.pushes]
+    bodies = numbers(scene)
+    pushed = [bodies[push.body] for push in scene.pushes]
 
     def change(t: float) -> None:
         if given is None:
@@ -218,18 +218,23 @@ class Rows:
 
     def hook(self) -> Hook | None:
         """Return what gives contacts and strings the part of the law that MuJoCo leaves out; None without such rows."""
-        drift, first = Drift(self.scene, self.model), self.nc - self.touching.count
-        if not drift.strings and not self.touching.count:
+        strings = {i for i, tendon in enumerate(self.scene.tendons) if tendon.bodies}
+        if not strings and not self.touching.count:
             return None
+        drift, first = Drift(self.scene, self.model, self.touching), self.nc - self.touching.count
 
         def hook(_model: Any, data: Any) -> None:
-            for j in range(data.ne, data.nefc):
-                kind, part = int(data.efc_type[j]), int(data.efc_id[j])
+            acting = [(j, int(data.efc_type[j]), int(data.efc_id[j])) for j in range(data.ne, data.nefc)]
+            acting = [one for one in acting if one[1] == TOUCH or (one[1] == LIMITS[1] and one[2] in strings)]
+            if not acting:
+                return
+            lengths, touches = drift(data.qpos, data.qvel)
+            for j, kind, part in acting:
                 if kind == TOUCH:
-                    data.efc_aref[j] -= drift.touches(data.qpos, data.qvel)[self._touch(part) - first]
-                elif kind == LIMITS[1] and part in drift.strings:
+                    data.efc_aref[j] -= touches[self._touch(part) - first]
+                else:
                     upper = self._place(j, kind, part) == self.places.get((kind, part, True))
-                    data.efc_aref[j] -= (-1.0 if upper else 1.0) * drift.lengths(data.qpos, data.qvel)[part]
+                    data.efc_aref[j] -= (-1.0 if upper else 1.0) * lengths[part]
 
         return hook
 
@@ -241,11 +246,7 @@ class Rows:
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
         data = mujoco.MjData(self.model)
-        forces = Forces(self.scene)
-
-        def poses(body: str) -> tuple[Floats, Floats]:
-            i = self.model.body(body or 0).id
-            return data.xmat[i].reshape(3, 3), data.xpos[i]
+        forces, poses = Forces(self.scene), pose_of(data, numbers(self.scene))
 
         def heights(q: Floats) -> list[float]:
             h: list[float] = []

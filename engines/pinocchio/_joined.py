@@ -8,7 +8,7 @@ A = s/2 (e0 1 - [e]x) R2', h = s e, H = A (J1 - J2) of the angular velocities w1
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,8 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Loop, Tendon
-from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian
+from crossbody.cases.scene import UPRIGHT, Loop, Tendon
+from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian, pose
 
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
 AXES = pin.LOCAL_WORLD_ALIGNED
@@ -40,13 +40,13 @@ class Joined:
         loops: of type connect or weld.
     """
 
-    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], loops: tuple[Loop, ...]) -> None:
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], loops: Sequence[Loop]) -> None:
         self.model, self.data = model, model.createData()
         self.none, self.loops = np.zeros(model.nv), loops
         self.ends = [
             (
                 _end(placed[loop.first], loop.first_position, loop.orientation),
-                _end(placed[loop.second], loop.second_position, (1.0, 0.0, 0.0, 0.0)),
+                _end(placed[loop.second], loop.second_position, UPRIGHT),
             )
             for loop in loops
         ]
@@ -96,7 +96,7 @@ class Joined:
         parts: list[Floats] = []
         for loop, (one, two) in zip(self.loops, self.ends, strict=True):
             parts += [points(one, two)] + ([axes(one, two, loop.torque_scale)] if loop.type == "weld" else [])
-        return np.concatenate(parts) if parts else np.zeros(0)
+        return np.concatenate(parts)
 
     def _between(self, one: End, two: End) -> tuple[float, Floats]:
         """Return e0 and e of the first's axes seen from the second's."""
@@ -147,13 +147,12 @@ class Strings:
         tendons: those between points.
     """
 
-    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: tuple[Tendon, ...]) -> None:
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
         self.model, self.data, self.none = model, model.createData(), np.zeros(model.nv)
         self.rows: list[tuple[float, float, End, End]] = []  # sign, bound, ends
         for tendon in tendons:
             ends = [
-                _end(placed[body], place, (1.0, 0.0, 0.0, 0.0))
-                for body, place in zip(tendon.bodies, tendon.positions, strict=True)
+                _end(placed[body], place, UPRIGHT) for body, place in zip(tendon.bodies, tendon.positions, strict=True)
             ]
             for sign, bound in zip((1.0, -1.0), tendon.range, strict=True):
                 if np.isfinite(bound):
@@ -192,10 +191,8 @@ class Strings:
 
 
 def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:
-    joint, pose = placed
-    w, x, y, z = orientation
-    turned = pin.Quaternion(w, x, y, z).normalized().matrix()
-    return End(joint, pose * pin.SE3(turned, np.array(position)))
+    joint, where = placed
+    return End(joint, where * pose(position, orientation))
 
 
 def by_least_norm(model: Any, data: Any, tau: Floats) -> Solve:

@@ -61,6 +61,12 @@ def mass_matrix(model: Any, data: Any, q: Floats) -> Floats:
     return full
 
 
+def pose(position: Any, orientation: Any) -> Any:
+    """A place (3,) and a quaternion, w first and of any length above 0, as SE3."""
+    w, x, y, z = orientation
+    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), np.array(position))
+
+
 def point_jacobian(model: Any, data: Any, joint: int, point: Floats) -> Floats:
     """Jacobian (3, nv) of the velocity of a point in the world that a joint carries, after computeJointJacobians."""
     if joint == 0:

@@ -15,7 +15,7 @@ from crossbody.engines import _scene as parts
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm
-from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian
+from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 
@@ -41,34 +41,33 @@ def build(case: Case, algebra: str) -> Prepared:
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
-    data = model.createData()
+    centres = at_centres(scene, forces, model, model.createData(), placed)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
         ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + at_centres(scene, forces, model, data, placed, q)
+        tau[:] = to.back(q, ours) + centres(q)
 
-    joined = Joined(model, placed, tuple(loop for loop in scene.loops if loop.in_space))
-    strings = Strings(model, placed, tuple(tendon for tendon in scene.tendons if tendon.bodies))
-    touching = ContactRows(scene, model, placed)
-    order = _order(scene)
+    loops, strings = [loop for loop in scene.loops if loop.in_space], [one for one in scene.tendons if one.bodies]
+    in_space: list[Joined | Strings] = [
+        *([Joined(model, placed, loops)] if loops else []), *([Strings(model, placed, strings)] if strings else []),
+    ]  # fmt: skip
+    touching, order = ContactRows(scene, model, placed), _order(scene)
 
     def heights(q: Floats) -> Floats:
-        own = np.concatenate([rows.heights(to.ours(q)), joined.heights(q), strings.heights(q)])[order]
-        return np.concatenate([own, touching.heights(q)])
+        own = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
+        return np.concatenate([own[order], touching.heights(q)])
 
     def jacobian(q: Floats) -> Floats:
-        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), joined.jacobian(q), strings.jacobian(q)])[order]
-        return np.concatenate([own, touching.jacobian(q)])
+        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
+        return np.concatenate([own[order], touching.jacobian(q)])
 
     def drift(q: Floats, v: Floats) -> Floats:
-        own = np.concatenate([rows.drift(to.ours(q), to.velocities(q, v)), joined.drift(q, v), strings.drift(q, v)])[
-            order
-        ]
-        return np.concatenate([own, touching.drift(q, v)])
+        own = [rows.drift(to.ours(q), to.velocities(q, v)), *(part.drift(q, v) for part in in_space)]
+        return np.concatenate([np.concatenate(own)[order], touching.drift(q, v)])
 
     pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
-    if joined.ends:  # planar loops have rows that depend on each other
+    if loops:  # planar loops have rows that depend on each other
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
     start = to.theirs(case.q0)
     return Prepared(
@@ -96,23 +95,18 @@ def tree(scene: Scene) -> tuple[Any, Placed]:
     model.gravity.linear = np.array(scene.gravity)
     placed: Placed = {"": (0, pin.SE3.Identity())}
     for body in scene.bodies:
-        carrier, pose = placed[body.parent]
-        pose = pose * _pose(body.position, body.orientation)
+        carrier, where = placed[body.parent]
+        where = where * pose(body.position, body.orientation)
         for joint in scene.joints:
             if joint.body != body.name:
                 continue
             anchor = pin.SE3(np.eye(3), np.array(joint.anchor))
-            before = pin.SE3.Identity() if joint.type == "free" else pose * anchor
+            before = pin.SE3.Identity() if joint.type == "free" else where * anchor
             carrier = model.addJoint(carrier, _joint(joint), before, joint.name)
-            pose = anchor.inverse()
-        placed[body.name] = (carrier, pose)
-        model.appendBodyToJoint(carrier, _inertia(body), pose)
+            where = anchor.inverse()
+        placed[body.name] = (carrier, where)
+        model.appendBodyToJoint(carrier, _inertia(body), where)
     return model, placed
-
-
-def _pose(position: Any, orientation: Any) -> Any:
-    w, x, y, z = orientation
-    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), np.array(position))
 
 
 def _joint(joint: Joint) -> Any:
@@ -127,20 +121,26 @@ def _inertia(body: Body) -> Any:
     return pin.Inertia(body.mass, np.array(body.com), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed: Placed, q: Floats) -> Floats:
-    """Return the generalised force (nv,) of the weight that bodies are spared, and of pushes."""
-    total: Floats = np.zeros(model.nv)
-    acting = {body.name: -body.weightless * body.mass * np.array(scene.gravity) for body in scene.bodies}
-    for push, force in zip(scene.pushes, forces.pushes, strict=True):
-        acting[push.body] = acting[push.body] + force
-    found = [(body, acting[body.name]) for body in scene.bodies if acting[body.name].any()]
-    if found:
-        pin.computeJointJacobians(model, data, q)
-    for body, force in found:
-        carrier, pose = placed[body.name]
-        centre = (data.oMi[carrier] * pose).act(np.array(body.com))
-        total += point_jacobian(model, data, carrier, centre).T @ force
-    return total
+def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed: Placed) -> Callable[[Floats], Floats]:
+    """Return what gives, at q, the generalised force (nv,) of the weight that bodies are spared, and of pushes."""
+    own = {body.name: np.array(body.com) for body in scene.bodies}
+    lifted = {
+        body.name: -body.weightless * body.mass * np.array(scene.gravity) for body in scene.bodies if body.weightless
+    }
+    pushed = [push.body for push in scene.pushes]
+
+    def force(q: Floats) -> Floats:
+        total: Floats = np.zeros(model.nv)
+        acting = [*lifted.items(), *zip(pushed, forces.pushes, strict=True)]
+        if acting:
+            pin.computeJointJacobians(model, data, q)
+        for body, each in acting:
+            carrier, where = placed[body]
+            centre = (data.oMi[carrier] * where).act(own[body])
+            total += point_jacobian(model, data, carrier, centre).T @ each
+        return total
+
+    return force
 
 
 def _observe(

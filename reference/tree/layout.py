@@ -27,6 +27,7 @@ COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
 LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING = range(8)
+LED, LEADS, POLYNOMIAL = 1, 4, 7  # of a coupling: coordinate and velocity, or tendon; where it rests; coefficients
 OF_POSES = (CONNECT, CONTACT, TURN, STRING)
 
 # What is kept of a node while it is computed: pose (rotation by rows, position), velocity, acceleration without v',

@@ -15,6 +15,7 @@ import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array
+from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout
 from crossbody.reference.tree.points import point, pull, twist
 from crossbody.reference.tree.sweeps import cross, turned
@@ -52,8 +53,7 @@ def connect_columns(p: Array, i: int, w: Array, H: Array) -> None:
     n = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
     for end in range(2):
         at, sign = (o + FIRST, 1.0) if end == 0 else (o + SECOND, -1.0)
-        x = _end(p, at, w)
-        pull(p, w, int(p[at].real), sign, n, (x[0][0], x[1][0], x[2][0]), H)
+        pull(p, w, int(p[at].real), sign, n, value(_end(p, at, w)), H)
 
 
 @kernels.helper

@@ -9,11 +9,20 @@ import numpy as np
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
+from crossbody.reference.pairs.jets import value
 from crossbody.reference.pairs.rows import gradient, touch
 from crossbody.reference.tree import forces, layout, loops, strings, sweeps
 from crossbody.reference.tree.points import point, pull
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
+
+
+@kernels.helper
+def _posed(q: Array, v: Array, p: Array) -> Array:
+    """Return the scratch of the outward sweep, filled."""
+    w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
+    sweeps.outwards(q, v, p, w)
+    return w
 
 
 @kernels.helper
@@ -40,15 +49,37 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
     sweeps.inwards(p, w, M, f)
     for i in range(int(p[layout.PUSHES].real)):
         node, x, force = _pushed(u, p, w, i)
-        pull(p, w, node, 1.0, force, (x[0][0], x[1][0], x[2][0]), f)
+        pull(p, w, node, 1.0, force, value(x), f)
 
 
 @kernels.helper
 def _polynomial(p: Array, c: int, y: Any) -> tuple[Any, Any, Any]:
     """Return the polynomial with the coefficients p[c:] at y, and its first and second derivative."""
-    value = p[c] + y * (p[c + 1] + y * (p[c + 2] + y * (p[c + 3] + y * p[c + 4])))
+    total = p[c] + y * (p[c + 1] + y * (p[c + 2] + y * (p[c + 3] + y * p[c + 4])))
     slope = p[c + 1] + y * (2.0 * p[c + 2] + y * (3.0 * p[c + 3] + y * 4.0 * p[c + 4]))
-    return value, slope, 2.0 * p[c + 2] + y * (6.0 * p[c + 3] + y * 12.0 * p[c + 4])
+    return total, slope, 2.0 * p[c + 2] + y * (6.0 * p[c + 3] + y * 12.0 * p[c + 4])
+
+
+@kernels.helper
+def _followed(q: Array, v: Array, p: Array, kind: int, o: int) -> tuple[Any, Any]:
+    """Return how far the coordinate or tendon at p[o:] is from where it rests, and its rate; 0 if there is none."""
+    if p[o].real < 0.0:
+        return 0.0 * q[0], 0.0 * v[0]
+    if kind == layout.TENDON_LOOP:
+        at = forces.tendon(p, int(p[o].real))
+        return forces.length(q, p, at) - p[o + 2], forces.rate(v, p, at)
+    return q[int(p[o].real)] - p[o + 2], v[int(p[o + 1].real)]
+
+
+@kernels.helper
+def _along(p: Array, kind: int, o: int, slope: Any, H: Array) -> None:
+    """Add a derivative along the coordinate or tendon at p[o:], if there is one."""
+    if p[o].real < 0.0:
+        return
+    if kind == layout.TENDON_LOOP:
+        forces.pull(p, forces.tendon(p, int(p[o].real)), slope, H)
+    else:
+        H[int(p[o + 1].real)] += slope
 
 
 @kernels.helper
@@ -61,23 +92,14 @@ def _row(q: Array, v: Array, p: Array, i: int) -> tuple[Any, Any, Any]:
     if kind == layout.TENDON_LIMIT:
         at = forces.tendon(p, int(p[o + 2].real))
         return p[o + 1] * (forces.length(q, p, at) - p[o + 3]), p[o + 1] * forces.rate(v, p, at), 0.0 * v[0]
-    y, yd = 0.0 * q[0], 0.0 * v[0]
-    if kind == layout.TENDON_LOOP:
-        at, second = forces.tendon(p, int(p[o + 1].real)), int(p[o + 4].real)
-        if second >= 0:
-            other = forces.tendon(p, second)
-            y, yd = forces.length(q, p, other) - p[o + 6], forces.rate(v, p, other)
-        value, slope, curve = _polynomial(p, o + 7, y)
-        return forces.length(q, p, at) - p[o + 3] - value, forces.rate(v, p, at) - slope * yd, -curve * yd * yd
-    if p[o + 4].real >= 0.0:
-        y, yd = q[int(p[o + 4].real)] - p[o + 6], v[int(p[o + 5].real)]
-    value, slope, curve = _polynomial(p, o + 7, y)
-    h = q[int(p[o + 1].real)] - p[o + 3] - value
-    return h, v[int(p[o + 2].real)] - slope * yd, -curve * yd * yd
+    x, xd = _followed(q, v, p, kind, o + layout.LED)
+    y, yd = _followed(q, v, p, kind, o + layout.LEADS)
+    there, slope, curve = _polynomial(p, o + layout.POLYNOMIAL, y)
+    return x - there, xd - slope * yd, -curve * yd * yd
 
 
 @kernels.helper
-def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
+def _gradient(q: Array, v: Array, p: Array, i: int, H: Array) -> None:
     """Fill H (n,) of row i where it is not zero."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     kind = int(p[o].real)
@@ -85,15 +107,10 @@ def _gradient(q: Array, p: Array, i: int, H: Array) -> None:
         H[int(p[o + 3].real)] = p[o + 1]
     elif kind == layout.TENDON_LIMIT:
         forces.pull(p, forces.tendon(p, int(p[o + 2].real)), p[o + 1] + 0.0 * q[0], H)
-    elif kind == layout.TENDON_LOOP:
-        forces.pull(p, forces.tendon(p, int(p[o + 1].real)), 1.0 + 0.0 * q[0], H)
-        if p[o + 4].real >= 0.0:
-            other = forces.tendon(p, int(p[o + 4].real))
-            forces.pull(p, other, -_polynomial(p, o + 7, forces.length(q, p, other) - p[o + 6])[1], H)
     else:
-        H[int(p[o + 2].real)] = 1.0
-        if p[o + 4].real >= 0.0:
-            H[int(p[o + 5].real)] -= _polynomial(p, o + 7, q[int(p[o + 4].real)] - p[o + 6])[1]
+        y = _followed(q, v, p, kind, o + layout.LEADS)[0]
+        _along(p, kind, o + layout.LED, 1.0 + 0.0 * q[0], H)
+        _along(p, kind, o + layout.LEADS, -_polynomial(p, o + layout.POLYNOMIAL, y)[1], H)
 
 
 @kernels.helper
@@ -107,12 +124,7 @@ def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
     """Of every row; where points or shapes of bodies are to meet their poses are computed first."""
-    size = 0
-    if p[layout.POSED].real > 0.0:
-        size = layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v)
-    w = np.empty(size, dtype=q.dtype)
-    if size > 0:
-        sweeps.outwards(q, v, p, w)
+    w = _posed(q, v, p) if p[layout.POSED].real > 0.0 else np.empty(0, dtype=q.dtype)
     for i in range(len(h)):
         kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real)
         if kind == layout.CONNECT:
@@ -149,7 +161,7 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
             gradient(p, w, at, n, place, H[j])
         else:
             h[j], _, Hdv[j] = _row(q, v, p, idx[j])
-            _gradient(q, p, idx[j], H[j])
+            _gradient(q, v, p, idx[j], H[j])
 
 
 @kernels.helper
@@ -168,8 +180,7 @@ def _stored(q: Array, p: Array, o: int) -> Any:
 def energy(q: Array, v: Array, p: Array, e: Array) -> None:
     """T = sum of V.IV/2 over the nodes and of armatures; V of weight, of what is spared of it, and of springs."""
     nodes = int(p[layout.NODES].real)
-    w = np.empty(layout.NODE_SCRATCH * nodes + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
-    sweeps.outwards(q, v, p, w)
+    w = _posed(q, v, p)
     kinetic, potential = 0.0 * q[0], p[layout.RESTING] + 0.0 * q[0]
     for i in range(nodes):
         o, x = int(p[layout.AT_NODE].real) + layout.NODE * i, layout.NODE_SCRATCH * i
@@ -213,8 +224,7 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         speed = forces.rate(v, p, o)
         taken += speed * forces.damper(p, o + layout.DAMP, speed)
     if p[layout.PUSHES].real > 0.0:
-        w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * n, dtype=q.dtype)
-        sweeps.outwards(q, v, p, w)
+        w = _posed(q, v, p)
         for i in range(int(p[layout.PUSHES].real)):
             _, x, force = _pushed(u, p, w, i)
             given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]

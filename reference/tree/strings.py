@@ -7,6 +7,7 @@ from typing import Any
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array
 from crossbody.reference.pairs import solids
+from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout
 from crossbody.reference.tree.points import point, pull
 
@@ -19,7 +20,7 @@ def _between(p: Array, o: int, w: Array) -> Any:
     one = point(p, w, int(p[o + FIRST].real), p[o + FIRST + 1], p[o + FIRST + 2], p[o + FIRST + 3])
     two = point(p, w, int(p[o + SECOND].real), p[o + SECOND + 1], p[o + SECOND + 2], p[o + SECOND + 3])
     d, n = solids.point(two, one)
-    return d, n, (one[0][0], one[1][0], one[2][0]), (two[0][0], two[1][0], two[2][0])
+    return d, n, value(one), value(two)
 
 
 @kernels.helper

@@ -343,23 +343,22 @@ def _limit(joint: Joint, builder: _Builder, sign: float) -> Floats:
     return _row(layout.LIMIT, sign, *place, bound + sign * joint.margin)
 
 
-def _loop(loop: Loop, builder: _Builder) -> list[Floats]:
+def _followed(loop: Loop, name: str, builder: _Builder) -> tuple[float, float, float]:
+    """Return coordinate and velocity of a joint, or number of a tendon, and where it rests; -1 without a name."""
+    if not name:
+        return -1, -1, 0.0
     if loop.type == "tendon":
-        tendons = {tendon.name: i for i, tendon in enumerate(builder.scene.tendons)}
-        ends: list[float] = []
-        for name in (loop.first, loop.second):
-            i = tendons.get(name, -1)
-            ends += [i, 0, builder.scene.rest_length(builder.scene.tendons[i]) if i >= 0 else 0.0]
-        return [_row(layout.TENDON_LOOP, *ends, *loop.polynomial)]
-    if loop.type == "joint":
-        where: list[float] = []
-        for name in (loop.first, loop.second):
-            if not name:
-                where += [-1, -1, 0.0]
-                continue
-            joint = next(joint for joint in builder.scene.joints if joint.name == name)
-            where += [builder.coordinates[name], builder.dofs[name], joint.reference]
-        return [_row(layout.JOINT_LOOP, *where, *loop.polynomial)]
+        i, tendon = next((i, one) for i, one in enumerate(builder.scene.tendons) if one.name == name)
+        return i, -1, builder.scene.rest_length(tendon)
+    joint = next(joint for joint in builder.scene.joints if joint.name == name)
+    return builder.coordinates[name], builder.dofs[name], joint.reference
+
+
+def _loop(loop: Loop, builder: _Builder) -> list[Floats]:
+    if not loop.in_space:
+        kind = layout.JOINT_LOOP if loop.type == "joint" else layout.TENDON_LOOP
+        ends = [number for name in (loop.first, loop.second) for number in _followed(loop, name, builder)]
+        return [_row(kind, *ends, *loop.polynomial)]
     points = *builder.placed(loop.first, loop.first_position), *builder.placed(loop.second, loop.second_position)
     rows = [_row(layout.CONNECT, k, *points) for k in range(3)]
     if loop.type == "weld":

@@ -21,7 +21,7 @@ from numba import types
 from crossbody.reference import kernels
 from crossbody.reference._cache import compiled, embedding, inlined
 from crossbody.reference._kinds import Array, Floats, Floats2, Index
-from crossbody.reference._program import Address, kept_with_kernels
+from crossbody.reference._program import Address, addresses, kept_with_kernels
 from crossbody.reference._system import System
 from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
 
@@ -655,9 +655,7 @@ def _address() -> Address:
 def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
     """`evaluate` with one system's kernels built in."""
     general = _address()
-    dynamics, gaps, rows, power, velocity, watch = (
-        Address(function, kernels.REAL[name]) for name, function in zip(_USED, functions, strict=True)
-    )
+    dynamics, gaps, rows, power, velocity, watch = addresses(_USED, functions)
 
     def call(what, t, y, out, lines):  # type: ignore[no-untyped-def]
         return general(dynamics, gaps, rows, power, velocity, watch, what, t, y, out, lines)
