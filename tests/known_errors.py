@@ -236,9 +236,19 @@ def struck(s: Scene) -> tuple[Trajectory, float]:
 
 
 def later(s: Scene) -> tuple[Trajectory, float]:
-    """One event of any kind at another instant, before the next one of its row."""
-    k = s.one(range(len(s.run.events)))
-    return moved(s.run, k, s.sign() * 1e-7), 1e-7
+    """One event on which the motion depends at another instant, before the next one of its row."""
+    kinds = [i for i, e in enumerate(s.run.events) if e.before in CLOSED or e.after in CLOSED]
+    return moved(s.run, s.one(kinds), s.sign() * 1e-7), 1e-7
+
+
+def freed(s: Scene) -> tuple[Trajectory, float]:
+    """A row that was let go below the surface comes free later: the way of its gap until then, at its fastest rate."""
+    t, gap = s.run.t, s.run.gap[:, 0]
+    k = s.one([i for i, e in enumerate(s.run.events) if e.before is Mode.BALLISTIC])
+    slopes = np.diff(gap)[np.diff(t) > 0.0] / np.diff(t)[np.diff(t) > 0.0]
+    behind = s.at(s.run.events[k].t)[-1]
+    slope = (gap[behind + 1] - gap[behind]) / (t[behind + 1] - t[behind])
+    return moved(s.run, k, 1e-7), 1e-7 * slope / np.abs(slopes).max()
 
 
 def lost(of: Callable[[Event], bool]) -> Known:
@@ -339,7 +349,7 @@ ERRORS: dict[str, tuple[str, Known]] = {
     "complementarity": ("box", pulling),
     "complementarity of an open row": ("box", acting),
     "event_times": ("box", later),
-    "event_times of one row": ("linear ball", later),
+    "event_times of a row that comes free": ("linear ball", freed),
     "touch_count": ("box", lost(lambda e: e.after in CLOSED and e.before not in CLOSED)),
     "release_count": ("box", lost(lambda e: e.before in CLOSED and e.after not in CLOSED)),
     "mode_residual": ("sliders", misnamed),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ def pieces(rng: np.random.Generator, twice: bool) -> tuple[Trajectory, np.ndarra
     """
     ends = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, 4))])
     times, rows, modes, made = [], [], [], list[np.ndarray]()
-    for i, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+    for i, (a, b) in enumerate(itertools.pairwise(ends)):
         made.append(rng.normal(size=(4, 7)))
         if not twice and i:
             made[-1][0] = at(made[-2], ends[i - 1], a)[0]

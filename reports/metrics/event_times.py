@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.reports.metrics._align import matched
+from crossbody.reports.metrics._contacts import Contact
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -26,5 +27,20 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """
     if np.isnan([event.t for event in run.events]).any():
         return math.nan
-    pairs = [each for a, b in matched(truth, run) for each in zip(a.instants(), b.instants(), strict=True)]
-    return max((abs(b - a) for a, b in pairs if np.isfinite(a) and np.isfinite(b)), default=None)
+    pairs = matched(truth, run)
+    known = [each for a, b in pairs for each in zip(a.instants(), b.instants(), strict=True)]
+    shifts = [abs(b - a) for a, b in known if np.isfinite(a) and np.isfinite(b)]
+    shifts += [_opened(truth.trajectory, a, b) for a, b in pairs if np.isfinite(a.free) and np.isfinite(b.free)]
+    return max(shifts, default=None)
+
+
+def _opened(truth: Trajectory, a: Contact, b: Contact) -> float:
+    """How far the gap of the truth opens from one freedom to the other, over its fastest rate, s.
+
+    A row that is let go where its multiplier vanishes rises as the cube of the time: its instant is known to the cube
+    root of its depth alone, and nothing in the motion depends on it.
+    """
+    gap, (here, there) = truth.gap[:, a.row], np.interp([a.free, b.free], truth.t, truth.gap[:, a.row])
+    dt = np.diff(truth.t)
+    fastest = float(np.max(np.abs(np.diff(gap)[dt > 0.0] / dt[dt > 0.0]), initial=0.0))
+    return abs(there - here) / fastest if fastest else 0.0
