@@ -32,6 +32,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     yield "mode_residual", 0.0, "an identity at every sample"
     yield "law_residual", 1e-6, "the law's own equation at every state, with the rounding of stiff rows"
     yield "lam_impulse_path", 1e-5, _FASTER
+    yield "contact_work", 1e-6, _TOLERANCE
     if case.law.unilateral.any():
         yield "gap_error", 1e-6, _TOLERANCE
         yield "complementarity", 1e-6, "contacts push only, to the precision of the released instant"

@@ -175,6 +175,12 @@ def account(s: Scene) -> tuple[Trajectory, float]:
     return booked(s.run, name, (k, s.one(range(s.run.gap.shape[1]))) if name == "contact" else k, off), OFF
 
 
+def worked(s: Scene) -> tuple[Trajectory, float]:
+    """Work of one row that the truth does not know."""
+    at = (s.sample(), s.one(range(s.run.gap.shape[1])))
+    return booked(s.run, "contact", at, s.sign() * OFF * float(energies(s.run))), OFF
+
+
 def given(s: Scene) -> tuple[Trajectory, float]:
     """Work of the rows above zero: the law made energy."""
     assert s.run.ledger is not None
@@ -338,6 +344,8 @@ ERRORS: dict[str, tuple[str, Known]] = {
     "energy_integrator with friction": ("block", account),
     "energy_law": ("box", given),
     "energy_switching_error": ("springs", switched),
+    "contact_work": ("sliders", worked),
+    "contact_work of one row": ("linear ball", worked),
     "law_residual": ("box", pressed),
     "lam_error": ("robot", bumped("lam", of_all("lam"))),
     "lam_error below zero": ("mirrored robot", bumped("lam", of_all("lam"))),
