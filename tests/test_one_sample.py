@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from known_errors import ERRORS, OFF, right, scene
+from known_errors import ERRORS, OFF, account, right, scene
 from known_values import VALUES
 
 from crossbody import cases
@@ -18,6 +18,7 @@ from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.metrics._align import matched
 from crossbody.reports.metrics._contacts import contacts
 from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.sweep.measure import residual
 
 SEEDS = range(8)
 """Draws of sample, row, component and sign, and of which event."""
@@ -67,6 +68,17 @@ def test_a_collision_in_no_time_is_a_step_between_the_samples_of_its_instant(see
         same = np.flatnonzero(t == event.t)
         wanted[same[-1] if len(same) else int((t < event.t).sum()) :, event.contact] += event.impulse
     assert np.array_equal(with_collisions(run, events), wanted)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_account_that_is_open_is_what_a_stress_run_says(seed: int) -> None:
+    s = scene("block", seed)
+    off = OFF * float(s.run.energy[:, 0].max())
+    run, _ = account(s)
+    assert run.ledger is not None
+    works = (s.run.energy[:, 1], run.ledger.input, run.ledger.dissipated, *run.ledger.contact.T)
+    scale = max(float(s.run.energy[:, 0].max()), *(float(np.ptp(work)) for work in works))
+    assert residual(run) == pytest.approx(off / scale, rel=1e-2, abs=2.0 * residual(s.run))
 
 
 def test_every_metric_that_judges_is_held_against_a_known_error() -> None:
