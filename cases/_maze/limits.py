@@ -19,6 +19,7 @@ _LOG = "read between the samples of a run"
 _SMALL = "a tolerance of 1e-9 in the height, over that through which the ball moves, a part of its circle's radius"
 _TOLERATED, _DEFAULT = 1e-9, 1e-6
 """Default tolerance, and the limit that every case has on energies over the largest kinetic one."""
+_ENERGIES = ("energy_drift", "energy_integrator", "contact_work")
 _CLAIMED: Mapping[str, tuple[float, str]] = {
     "swing_period": (1e-6, _LOG),
     "unstable_pole": (1e-6, _TOLERANCE),
