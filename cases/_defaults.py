@@ -37,6 +37,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
         yield "gap_error", 1e-6, _TOLERANCE
         yield "complementarity", 1e-6, "contacts push only, to the precision of the released instant"
         yield "event_times", 1e-6, _TOLERANCE
+        yield "mode_times", 1e-6, _TOLERANCE
         yield "touch_count", 0.0, _COUNT
         yield "release_count", 0.0, _COUNT
     if (~case.law.unilateral & (case.law.a0 > 0.0)).any():

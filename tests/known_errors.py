@@ -242,8 +242,14 @@ def struck(s: Scene) -> tuple[Trajectory, float]:
 
 
 def later(s: Scene) -> tuple[Trajectory, float]:
-    """One event on which the motion depends at another instant, before the next one of its row."""
-    kinds = [i for i, e in enumerate(s.run.events) if e.before in CLOSED or e.after in CLOSED]
+    """One touch or release at another instant, before the next event of its row."""
+    kinds = [i for i, e in enumerate(s.run.events) if (e.before in CLOSED) != (e.after in CLOSED)]
+    return moved(s.run, s.one(kinds), s.sign() * 1e-7), 1e-7
+
+
+def handed(s: Scene) -> tuple[Trajectory, float]:
+    """One hand-over at another instant."""
+    kinds = [i for i, e in enumerate(s.run.events) if (e.before, e.after) == (Mode.COLLISION, Mode.CONTACT)]
     return moved(s.run, s.one(kinds), s.sign() * 1e-7), 1e-7
 
 
@@ -357,7 +363,9 @@ ERRORS: dict[str, tuple[str, Known]] = {
     "complementarity": ("box", pulling),
     "complementarity of an open row": ("box", acting),
     "event_times": ("box", later),
-    "event_times of a row that comes free": ("linear ball", freed),
+    "event_times of one row": ("linear ball", later),
+    "mode_times": ("box", handed),
+    "mode_times of a row that comes free": ("linear ball", freed),
     "touch_count": ("box", lost(lambda e: e.after in CLOSED and e.before not in CLOSED)),
     "release_count": ("box", lost(lambda e: e.before in CLOSED and e.after not in CLOSED)),
     "mode_residual": ("sliders", misnamed),

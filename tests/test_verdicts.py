@@ -327,7 +327,7 @@ def test_every_case_is_limited_in_all_that_it_has() -> None:
         "rate_residual",
     }
     rows = {"gap_residual", "mode_residual", "law_residual", "lam_impulse_path", "contact_work"}
-    opening = {"gap_error", "complementarity", "event_times", "touch_count", "release_count"}
+    opening = {"gap_error", "complementarity", "event_times", "mode_times", "touch_count", "release_count"}
     for name in cases_.names():
         for variant in cases_.variants(name):
             each = load(name, variant)

@@ -30,10 +30,6 @@ class Contact:
     settled: float = np.inf
     free: float = np.inf
 
-    def instants(self) -> tuple[float, float, float]:
-        """Those on which the motion depends: touch, release, hand-over, s."""
-        return self.touch, self.release, self.settled
-
     def behind(self, event: Event) -> Contact:
         """The contact with a later event of its row."""
         ends = event.before in CLOSED and event.after not in CLOSED
