@@ -14,7 +14,9 @@ from crossbody.cases._cradle.motion import Motion
 from crossbody.cases._cradle.rules import RULES, answer, block, simultaneous
 from crossbody.cases._cradle.scene import Row
 from crossbody.reports import metrics
+from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.truth import from_run, sample_times
+from crossbody.reports.runs import jobs
 
 ONE = Row(masses=np.full(5, 0.1), lifted=1, speed=1.0, gap=0.0, a0=1e6, zeta=0.0)
 THREE = replace(ONE, masses=np.ones(3))
@@ -184,6 +186,12 @@ def apart(seed: int, solver: str) -> dict[str, float]:
 def test_every_solver_meets_the_closed_form_of_any_damped_row(solver: str, seeds: range) -> None:
     """Contacts are counted alike even where they accumulate: 33 were told too many at a damping ratio of .7."""
     assert {seed: wrong for seed in seeds if max((wrong := apart(seed, solver)).values()) > 1e-6} == {}
+
+
+def test_balls_that_do_not_touch_are_not_held_against_those_that_do() -> None:
+    case = load("newtons_cradle", "sliders", n=3, lifted=2, zeta=0.2, gap=1e-3, collisions="simultaneous")
+    found = jobs.run_case(case, jobs.picks(("reference:compiled",)), refine=False)
+    assert [row.metric for row in judged(case, found.entries, found.truth, "") if row.verdict == "outside"] == []
 
 
 @pytest.mark.slow
