@@ -36,6 +36,18 @@ def test_delay_is_found_to_a_part_of_a_sample(late: float) -> None:
     assert found == pytest.approx(late, abs=5e-5)
 
 
+@pytest.mark.parametrize("part", [-0.24, -0.15, -0.05, 0.05, 0.15, 0.24, 0.3])
+def test_a_delay_is_looked_for_up_to_a_quarter_of_the_record(part: float) -> None:
+    """Steps at random, which no lag but the right one explains; what is later than a quarter is not told."""
+    late = round(part * 2000)
+    whole = np.cumsum(np.random.default_rng(3).standard_normal(4000))
+    found = _measures.delay(whole[1000 - late : 3000 - late], whole[1000:3000], STEP)
+    if abs(part) <= 0.25:
+        assert found == pytest.approx(late * STEP, abs=STEP)
+    else:
+        assert not abs(found) > 0.25 * 2000 * STEP
+
+
 def test_delay_of_what_does_not_move_is_unknown() -> None:
     assert np.isnan(_measures.delay(np.ones(100), np.ones(100), STEP))
 
