@@ -21,7 +21,8 @@ from crossbody.reports.runs.study import check_fields, read_json
 
 COLUMNS = tuple(Verdict.__dataclass_fields__)
 NUMBER = (int, float, type(None))
-JUDGED = {name: NUMBER if name in ("value", "expected", "limit", "compared", "band") else (str,) for name in COLUMNS}
+NUMBERS = ("value", "expected", "limit", "compared", "band", "known")
+JUDGED = {name: NUMBER if name in NUMBERS else (str,) for name in COLUMNS}
 AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
 
 
