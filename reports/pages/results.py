@@ -162,6 +162,11 @@ def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], di
     return found, walls
 
 
+def walls_of(out: Path) -> dict[tuple[str, str], float]:
+    """Run times of a folder, s, by case:variant and engine:profile."""
+    return _cases(out, verdicts_of(out))[1]
+
+
 def _wanted(verdicts: pd.DataFrame) -> dict[str, list[str]]:
     """Engines whose motion should be there, by case."""
     ran = verdicts[verdicts["verdict"] != Word.SKIPPED.value].drop_duplicates(["label", "who"])
