@@ -16,7 +16,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, split
+from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, splits
 from crossbody.reports.judging.stored import Deviations, defaults, deviations, differing, words
 from crossbody.reports.judging.truth import Truth, truth_of
 from crossbody.reports.judging.verdict import (
@@ -396,15 +396,13 @@ def _split(judge_: _Judge) -> Iterator[Verdict]:
     entry = judge_.entry
     if entry.run is None or (entry.study is None and entry.own is None):
         return
-    for name in SPLIT:
-        unit = metrics.load(name).UNIT
-        try:
-            found = split(judge_.case, judge_.truth, entry.run, entry.study or Study(), entry.own, name)
-        except Exception as error:
-            yield judge_.row(part_of(name, "step"), math.nan, unit, Word.CRASHED, crash(error))
-            continue
-        if found is not None:
-            yield from (row for part in PARTS for row in _part(judge_, name, part, found, unit))
+    try:
+        found = splits(judge_.case, judge_.truth, entry.run, entry.study or Study(), entry.own)
+    except Exception as error:
+        yield judge_.row(part_of("position", "step"), math.nan, "1", Word.CRASHED, crash(error))
+        return
+    for name, parts in found.items():
+        yield from (row for part in PARTS for row in _part(judge_, name, part, parts, metrics.load(name).UNIT))
 
 
 def _part(judge_: _Judge, name: str, part: str, found: Split, unit: str) -> Iterator[Verdict]:

@@ -97,10 +97,8 @@ class NotMeasuredError(Exception):
     """A part of an error that is not known, with the sentence that says why."""
 
 
-def split(
-    case: Case, truth: Truth, run: Trajectory, study: Study, own: Truth | None = None, metric: str = "position"
-) -> Split | None:
-    """Tell the parts of one metric's error; None where there is nothing to compare.
+def splits(case: Case, truth: Truth, run: Trajectory, study: Study, own: Truth | None = None) -> dict[str, Split]:
+    """Tell the parts of the errors of an engine: metric -> its parts, without those where there is nothing to compare.
 
     Args:
         case: what was run.
@@ -108,13 +106,14 @@ def split(
         run: the engine as it was judged.
         study: its other runs.
         own: the truth of the equations that the engine follows, where they are not the case's.
-        metric: "position" or "event_times".
     """
-    until = math.inf if own is None else own.trusted
-    positions = Positions(case, truth, run, until)
-    laid: Positions | Events = positions if metric == "position" else Events(case, truth, run)
-    if not laid.whole.size:
-        return None
+    positions = Positions(case, truth, run, math.inf if own is None else own.trusted)
+    laid: dict[str, Positions | Events] = {"position": positions, "event_times": Events(case, truth, run)}
+    told = {metric: _split(one, metric, positions, study, own) for metric, one in laid.items() if one.whole.size}
+    return told if positions.whole.size else {}
+
+
+def _split(laid: Positions | Events, metric: str, positions: Positions, study: Study, own: Truth | None) -> Split:
     here, says = laid.whole, ""
     errors: dict[str, Floats] = {}
     known: dict[str, float] = {}
@@ -125,10 +124,10 @@ def split(
             errors["importer"], known["importer"] = laid.whole - here, ROUNDING
         errors["step"], known["step"], says = _step(laid, positions, here, study, own)
     except NotMeasuredError as why:
-        missing |= dict.fromkeys([part for part in PARTS[1:] if part not in errors], str(why))
+        missing |= dict.fromkeys(PARTS[1:], str(why))
     else:
         errors["model"] = here - errors["step"]
-        known["model"] = max(known["step"], truth.agreement.get(metric, 0.0))
+        known["model"] = max(known["step"], laid.truth.agreement.get(metric, 0.0))
     where, along = laid.worst()
     return Split(
         where=where, there={part: along(error) for part, error in errors.items()},
@@ -224,6 +223,7 @@ class Positions:
 
     def __init__(self, case: Case, truth: Truth, run: Trajectory, until: float = math.inf) -> None:
         self.case, self.truth, self.run = case, truth, run
+        self.laid: dict[int, Floats] = {}
         self.scale = scale_of(truth.trajectory, case)
         for at in case.quaternions:
             self.scale[at : at + 4] = 1.0  # rad
@@ -237,13 +237,20 @@ class Positions:
         self.t = t[self.samples]
 
     def __call__(self, run: Trajectory) -> Floats:
-        """Return the error of a run at the same instants of the truth's clock.
-
-        Between its samples the error is interpolated, which is smaller and smoother than the motion: by a cubic through
-        the rates of both, where positions have rates of their own, else by a straight line.
+        """Return the error of a run at the same instants of the truth's clock; each is laid there once.
 
         Raises:
             NotMeasuredError: if it ends before.
+        """
+        if id(run) not in self.laid:
+            self.laid[id(run)] = self._lay(run)
+        return self.laid[id(run)]
+
+    def _lay(self, run: Trajectory) -> Floats:
+        """Return the error of a run.
+
+        Between its samples the error is interpolated, which is smaller and smoother than the motion: by a cubic through
+        the rates of both, where positions have rates of their own, else by a straight line.
         """
         t = clock(self.truth, run)
         if not len(t) or t[-1] < self.t[-1] - REACHED * self.case.t_end:

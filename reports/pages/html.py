@@ -169,7 +169,7 @@ def slug(text: str) -> str:
 
 
 def bounded(value: float | None, known: float | None) -> tuple[str, float]:
-    """ "< " and what a number is known to where it is below that, else nothing and the number."""
+    """Return a sign and what a number is known to where it is below that, else nothing and the number."""
     number, limit = (math.nan if x is None else x for x in (value, known))
     return ("< ", limit) if abs(number) < limit else ("", number)
 
