@@ -16,9 +16,9 @@ from crossbody.cases._rotations import differences
 
 ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 PUSHED = {
-    "agility_cassie/cassie": ("left-foot 0 0 30 0 .02", 0.015),
-    "franka_emika_panda/panda": ("link5 0 20 0 0 .1", 0.15),
-    "robotiq_2f85/2f85": ("left_pad 0 1 0 0 .1", 0.1),
+    "agility_cassie/cassie": ("left-foot 0 0 60 0 .02", 0.006),
+    "franka_emika_panda/panda": ("link5 0 40 0 0 .1", 0.06),
+    "robotiq_2f85/2f85": ("left_pad 0 3 0 0 .1", 0.06),
     "unitree_go1/go1": ("FL_calf 5 10 -5 0 .1", 0.2),
     "universal_robots_ur5e/ur5e": ("forearm_link 10 20 0 0 .2", 0.3),
 }
