@@ -42,7 +42,13 @@ def ends(case: Case, rtol: float) -> list[Trajectory]:
     return runs
 
 
-@pytest.mark.parametrize("name", list(PUSHED))
+LONG = ("agility_cassie/cassie", "robotiq_2f85/2f85")
+"""Robots whose least-norm rows in Python take seconds."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in PUSHED]
+)
 def test_both_witnesses_move_a_published_robot_alike(name: str) -> None:
     push, t_end = PUSHED[name]
     case = robot(name, push=push, t_end=t_end)
