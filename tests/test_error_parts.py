@@ -205,6 +205,25 @@ def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: p
         assert found.largest[part] == pytest.approx(before.largest[part], rel=1e-6)
 
 
+BOUNCING = """
+<mujoco><option timestep="0.001"/><default><geom condim="1"/></default><worldbody>
+<geom type="plane" size="2 2 .1" solref=".01 1"/>
+<body pos="0 0 .5"><freejoint/><geom name="solid" type="sphere" size=".1" mass="1"/></body>
+<body pos=".5 0 .5"><freejoint/><geom type="box" size=".1 .1 .1" euler="20 30 0" mass="1" priority="1"
+solref=".03 .5" solimp=".8 .9 .01"/></body></worldbody></mujoco>
+"""
+
+
+def test_contacts_of_the_scene_are_as_soft_as_those_of_its_file(tmp_path: Path) -> None:
+    """Constants that are mixed, or ruled by priority, reach the model that is built from the scene."""
+    path = tmp_path / "bouncing.xml"
+    path.write_text(BOUNCING, encoding="utf-8")
+    case, engine = cases.load(str(path), t_end=0.6), engines.load("mujoco")
+    own, built = (engine.prepare(case, "default", reader=reader).run() for reader in ("file", "scene"))
+    assert len(own.events) == len(built.events) > 0
+    assert np.abs(own.q - built.q).max() < 1e-12
+
+
 def test_a_published_biped_is_soft_by_its_file_and_converges_where_it_is_stiff() -> None:
     """Its equalities take it 4.6e-3 rad off the rigid motion at every step; stiff, Euler's error is g dt t / 2.
 
