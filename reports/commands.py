@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,9 @@ from crossbody.cases import Case, InvalidValue
 from crossbody.cases.files.reading import SUFFIXES
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
+from crossbody.reports.judging.parts import PARTS
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
-from crossbody.reports.pages import site
+from crossbody.reports.pages import grid, html, results, site
 from crossbody.reports.runs import jobs, output, study
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
@@ -31,8 +33,9 @@ OF_USERS = (".py", *SUFFIXES)
 """How names of files end that are cases."""
 GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
 WRONG = [Word.OUTSIDE, Word.CRASHED]
-WIDTH = 120  # of the table in a file or a pipe
-SHOWN = {"position": "position", "event_times": "times [s]", "energy_drift": "energy"}
+WIDTH = 140  # of the table in a file or a pipe
+SHOWN = {"position": "position", **{f"position ({part})": part for part in PARTS}}
+"""Metrics in the terminal and their heads: the parts of the worst error of position add up to it."""
 COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
 
 
@@ -145,7 +148,7 @@ def show(rows: pd.DataFrame, out: Path) -> None:
 
     console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
     if not voice.quiet():
-        console.print(_summary(rows))
+        console.print(_summary(rows, results.walls_of(out)))
         counts = rows["verdict"].value_counts()
         console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
     told = rows[rows["verdict"].isin(WRONG if voice.quiet() else [Word.SKIPPED, *WRONG])]
@@ -170,26 +173,29 @@ def where(out: Path) -> None:
         print(f"Report: {(out / site.PAGE).absolute()}")
 
 
-def _summary(rows: pd.DataFrame) -> Any:
+def _summary(rows: pd.DataFrame, walls: Mapping[tuple[str, str], float]) -> Any:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("case", "engine"):
         table.add_column(name, no_wrap=True)
-    for name in (*SHOWN.values(), Word.WITHIN, "expected", Word.OUTSIDE):
+    for name in (*SHOWN.values(), "run time", Word.WITHIN, "expected", Word.OUTSIDE):
         table.add_column(name, justify="right", no_wrap=True)
     for (case, variant, engine, profile), run in rows.groupby(["case", "variant", "engine", "profile"], sort=False):
-        values = run.drop_duplicates("metric").set_index("metric")["value"]
+        values = run.drop_duplicates("metric").set_index("metric")[["value", "known"]].T.to_dict()
         counts = run["verdict"].value_counts()
+        label, who = f"{case}:{variant}", f"{engine}:{profile}"
         table.add_row(
-            f"{case}:{variant}", f"{engine}:{profile}", *(_short(values.get(metric)) for metric in SHOWN),
+            label, who, *(_short(**values.get(metric, {})) for metric in SHOWN), grid.duration(walls.get((label, who))),
             *(_count(int(counts.get(word, 0)), word) for word in (Word.WITHIN, Word.EXPECTED, Word.OUTSIDE)),
         )  # fmt: skip
     return table
 
 
-def _short(value: float | None) -> str:
-    return "-" if value is None or value != value else f"{value:.1e}"
+def _short(value: float = math.nan, known: float = math.nan) -> str:
+    """A number in two digits, or below what it is known to."""
+    below, number = html.bounded(value, known)
+    return "-" if number != number else f"{below}{number:.1e}"
 
 
 def _count(count: int, word: Word) -> str:

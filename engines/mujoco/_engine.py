@@ -74,7 +74,8 @@ class Mujoco:
     """MuJoCo 4; see `crossbody.engines.Engine`.
 
     A mechanism is a module here with `default_step(case, profile)` and `build(case, profile, dt) -> Scene`; or, with a
-    machine of its own, `prepare(case, profile, used) -> Run`. It may say `why_not(case, profile)`.
+    machine of its own, `prepare(case, profile, used) -> Run`. It may say `why_not(case, profile)`, and have
+    `settings(case, profile)`, which `build` takes by name.
     """
 
     name = "mujoco"
@@ -109,7 +110,8 @@ class Mujoco:
         Args:
             case: the scene.
             profile: one of `profiles`.
-            settings: dt, time step, s; max_steps, bound on their number.
+            settings: dt, time step, s; max_steps, bound on their number; reader, of a file as it stands: "file", or
+                "scene" for the model that is built from the scene, with the file's options and softness.
 
         Raises:
             UnknownName: for a profile or setting that does not exist.
@@ -120,13 +122,16 @@ class Mujoco:
         if reason is not None:
             raise CaseUnsupported(reason)
         mechanism = _mechanism(case.mechanism)
-        used = _settings.chosen(self.name, profile, _known(case, mechanism.default_step(case, profile)), settings)
+        known = _known(case, mechanism.default_step(case, profile))
+        known |= getattr(mechanism, "settings", lambda *_: {})(case, profile)
+        used = _settings.chosen(self.name, profile, known, settings)
         with captured() as said:
             try:
                 if hasattr(mechanism, "prepare"):
                     run: Run = mechanism.prepare(case, profile, used)
                     return run
-                scene: Scene = mechanism.build(case, profile, float(used["dt"]))
+                more = {name: value for name, value in used.items() if name not in ("dt", "max_steps")}
+                scene: Scene = mechanism.build(case, profile, float(used["dt"]), **more)
             except CrossbodyError:
                 raise  # ours, and it is a ValueError too
             except ValueError as error:

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Mode, SceneError
+from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases._arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
@@ -21,6 +21,7 @@ from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._drift import Drift
+from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._globals import Hook
 from crossbody.engines.mujoco._observe import mass_matrix, numbers, pose_of
 from crossbody.engines.mujoco._scene import Scene as Prepared
@@ -45,6 +46,13 @@ def why_not(case: Case, profile: str) -> str | None:
     except SceneError as error:
         return str(error)
     return None
+
+
+def settings(case: Case, profile: str) -> dict[str, Parameter]:
+    """Return the setting that says who reads the file: MuJoCo, or the project, which builds its scene."""
+    if profile != "default":
+        return {}
+    return {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
 
 
 def default_step(case: Case, profile: str) -> float:
@@ -74,14 +82,18 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
 
 
-def build(case: Case, profile: str, dt: float) -> Prepared:
+def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared:
     """Compile the model of one profile.
 
     Raises:
         ValueError: MuJoCo's own, for a model that it refuses.
     """
     scene = _scene(case)
-    model = _from_file(case) if profile == "default" else matched(scene)
+    if profile == "default":
+        model = held(_from_file(case))
+        model = model if reader == "file" else rebuilt(scene, model)
+    else:
+        model = matched(scene)
     data = mujoco.MjData(model)
     rows = Rows(scene, model, data)
     prepared = Prepared(
