@@ -19,6 +19,7 @@ from crossbody.cases._errors import InvalidValue, SceneError, UnknownName
 from crossbody.cases._trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from crossbody.cases._control import Control
     from crossbody.cases.scene import Scene
 
 Value = float | int | str | bool
@@ -251,6 +252,7 @@ class Case:
         collisions: rule for several contacts: "sequential", "simultaneous" or "resolved".
         closed_form: the exact motion at given times, where one exists (tier A).
         inputs: what acts from outside; None for nothing.
+        control: a callable of the user's own that gives a scene's controls at its ticks, beside the inputs.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
         scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
@@ -278,6 +280,7 @@ class Case:
     collisions: str = "sequential"
     closed_form: Callable[[Floats], Trajectory] | None = None
     inputs: Inputs | None = None
+    control: Control | None = None
     claims: tuple[Claim, ...] = ()
     limits: tuple[Limit, ...] = ()
     discrete: tuple[str, ...] = ()
@@ -302,6 +305,8 @@ class Case:
             )
         if not (math.isfinite(self.t_end) and self.t_end > 0):
             raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
+        if self.control is not None and self.scene is None:
+            raise SceneError(f"Case {self.name} has a control but is no scene, for which alone there is one.")
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
 
