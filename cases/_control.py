@@ -169,7 +169,7 @@ class Controller:
         own = np.array(self.times)
         every = np.union1d(times, own)
         table = np.zeros((len(every), len(self.u)))
-        for at, rows in ((times, values), (own, np.array(self.values).reshape(len(own), -1))):
+        for at, rows in ((times, values), (own, np.array(self.values).reshape(len(own), len(self.u)))):
             last = np.searchsorted(at, every, side="right") - 1
             table[last >= 0] += rows[last[last >= 0]]
         names = self.control.names or tuple(f"u[{i}]" for i in range(len(self.u)))

@@ -18,6 +18,7 @@ from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.pages import site
+from crossbody.reports.pages.styles import TRUTH
 from crossbody.reports.runs import files, jobs, output, store, study
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
@@ -177,8 +178,8 @@ def show_controllers(out: Path) -> None:
     """Print how much of each run's time was spent in a controller of the user's own."""
     told = [store.peek(out / "traces" / name) for name in files.listed(out, "traces")]
     for one in told:
-        if one.get("control_s"):
-            about = one["about"]
+        about = one["about"]
+        if one.get("control_s") and about["engine"] != TRUTH:
             run = f"{about['case']}:{about['variant']} {about['engine']}:{about['profile']}"
             part = one["control_s"] / one["wall_s"]
             print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")

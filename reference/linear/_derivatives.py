@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import SceneError
+from crossbody.cases._control import Control
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 
@@ -71,11 +72,16 @@ class Derivatives:
 
 
 def check_coordinates(system: System) -> None:
-    """Refuse a system whose linear model would have to live on the tangent space of its positions.
+    """Refuse a system whose linear model would have to live on the tangent space of its positions, or is sampled.
 
     Raises:
-        SceneError: if its positions are not integrals of its velocities.
+        SceneError: if its positions are not integrals of its velocities, or if a controller in Python gives its inputs.
     """
+    if isinstance(system.control, Control):
+        raise SceneError(
+            f"System.control is the controller {system.control.label} in Python, which has no derivatives; "
+            "valid: the system without it, its inputs held."
+        )
     if system.velocity is not None:
         raise SceneError(
             "System.velocity is given: q' is not v. Linear models, trims, sensitivities and estimates of forces are "

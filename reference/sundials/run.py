@@ -290,10 +290,11 @@ class SundialsRun:
         """Put the inputs that hold from now on in force; the next instant at which they change."""
         s, system = self.state, self.system
         while self.next_input < len(self.inputs_t) and self.inputs_t[self.next_input] <= s.t:
-            if system.control is None or not self.next_input:
-                self.equations.u[:] = self.inputs_u[self.next_input]
+            now = self.inputs_u[self.next_input]
+            if system.control is None:
+                self.equations.u[:] = now
             else:  # by its change, so that what a controller holds on top stays
-                self.equations.u += self.inputs_u[self.next_input] - self.inputs_u[self.next_input - 1]
+                self.equations.u += now - (self.inputs_u[self.next_input - 1] if self.next_input else 0.0)
             self.next_input += 1
         if system.control is not None and self.next_tick * system.tick <= s.t:
             self._control(s)
