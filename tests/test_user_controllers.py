@@ -148,6 +148,23 @@ def test_contacts_under_a_controller_agree() -> None:
 
 
 @pytest.mark.parametrize(("engine", "profile"), RUNS)
+def test_a_controller_may_run_a_model_of_its_own(engine: str, profile: str) -> None:
+    """It looks ahead in MuJoCo, whose callbacks are those of the process, and in the compiled reference."""
+    ahead = {name: cases.from_scene(BALL, t_end=0.02) for name in ("mujoco", "reference")}
+
+    def looking(t: float, q: np.ndarray, v: np.ndarray) -> float:
+        for name, case in ahead.items():
+            moved = engines.load(name).prepare(replace(case, q0=q, v0=v)).run()
+            assert moved.outcome.ok
+        return 8.0 - float(q[0])
+
+    plain = cases.from_scene(BALL, t_end=0.35, control=Control(lambda t, q, v: 8.0 - float(q[0]), 0.05))
+    run, alone = (run_in(case, engine, profile) for case in (replace(plain, control=Control(looking, 0.05)), plain))
+    assert run.q.tolist() == alone.q.tolist()
+    assert len(run.events) > 1
+
+
+@pytest.mark.parametrize(("engine", "profile"), RUNS)
 def test_what_a_controller_gave_moves_the_arm_alike_when_it_is_played(engine: str, profile: str) -> None:
     more = {"rtol": 1e-13} if engine == "reference" and profile != "ida" else {}
     run = run_in(arm(pd), engine, profile, **more)

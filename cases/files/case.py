@@ -143,17 +143,14 @@ def case_of(
         a0=np.array([one.a0 for one in laws]), a1=np.array([one.a1 for one in laws]),
         a2=np.array([one.a2 for one in laws]), unilateral=np.array(unilateral, dtype=bool),
     )  # fmt: skip
-    if control is not None and inputs is not None and inputs.values[:, : len(scene.actuators)].any():
-        raise SceneError(f"{name}: inputs hold controls, and there is a control; valid: one of them.")
-    case = Case(
+    return Case(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         contacts=tuple(names), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
-        file=file, findings=findings,
+        control=control, file=file, findings=findings,
     )  # fmt: skip
-    return case if control is None else under(case, control)
 
 
 def check_runnable(scene: Scene) -> None:

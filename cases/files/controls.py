@@ -16,7 +16,7 @@ from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Inputs
 from crossbody.cases._control import Control
-from crossbody.cases._errors import InvalidValue, SceneError, UnknownName
+from crossbody.cases._errors import InvalidValue, UnknownName
 from crossbody.cases._own_file import from_file
 from crossbody.cases._regular import open_regular
 from crossbody.cases.scene import Push, Scene
@@ -103,16 +103,13 @@ def under(case: Case, control: Control) -> Case:
         InvalidValue: if it has a table of controls too.
         SceneError: for a scene without actuators.
     """
-    scene, inputs = case.scene, case.inputs
     if case.parameters.get("ctrl"):
         raise InvalidValue(f"{case.label} has a table of controls (ctrl) and a controller; valid: one of them.")
-    if scene is None or not scene.actuators:
-        raise SceneError(f"{case.label} has no actuators; there is nothing to control.")
-    control = replace(control, names=scene.inputs, width=len(scene.actuators)).fitted(case.t_end)
-    if inputs is not None:
+    inputs = case.inputs
+    if inputs is not None and case.scene is not None:
         values = inputs.values.copy()
-        values[:, : len(scene.actuators)] = 0.0
-        inputs = replace(inputs, times=control.on_ticks(inputs.times), values=values)
+        values[:, : len(case.scene.actuators)] = 0.0
+        inputs = replace(inputs, values=values)
     return replace(case, control=control, inputs=inputs)
 
 

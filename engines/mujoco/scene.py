@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._drift import Drift
-from crossbody.engines.mujoco._globals import Hook
+from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix, numbers, pose_of
 from crossbody.engines.mujoco._scene import Scene as Prepared
 
@@ -137,7 +138,9 @@ def _change(scene: Scene, data: Any, acting: Acting) -> Callable[[float], None]:
     pushed = [bodies[push.body] for push in scene.pushes]
 
     def change(t: float) -> None:
-        controls, pushes = np.split(acting.at(t, data.qpos, data.qvel), [len(scene.actuators)])
+        with hooked(None) if acting.controller is not None else nullcontext():  # it may compute with MuJoCo itself
+            given = acting.at(t, data.qpos, data.qvel)
+        controls, pushes = np.split(given, [len(scene.actuators)])
         data.ctrl[:] = controls
         data.xfrc_applied[:] = 0.0
         np.add.at(data.xfrc_applied[:, :3], pushed, pushes.reshape(-1, 3))
