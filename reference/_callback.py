@@ -61,13 +61,17 @@ class Callback:
         self.controller, self.end = controller, end
         self.failure: BaseException | None = None
         self._rooms = tuple(ctypes.c_double * size for size in (nq, nv, controller.width))
+        self._places: tuple[int, ...] = ()
+        self._arrays: list[Floats] = []
         self._function = _SIGNATURE(self._ask)
         self.address = float(ctypes.cast(self._function, ctypes.c_void_p).value or 0)
 
     def _ask(self, t: float, *places: int) -> None:
         try:
-            rooms = (room.from_address(at) for room, at in zip(self._rooms, places, strict=True))
-            q, v, u = map(np.ctypeslib.as_array, rooms)
+            if places != self._places:  # the workspace stays where it is: views of it are made once
+                rooms = (room.from_address(at) for room, at in zip(self._rooms, places, strict=True))
+                self._places, self._arrays = places, [np.ctypeslib.as_array(room) for room in rooms]
+            q, v, u = self._arrays
             u[:] = self.controller(t, q, v)[: len(u)]
         except BaseException as failure:  # an interrupt too: no exception passes through compiled code
             self.failure = failure

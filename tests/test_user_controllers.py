@@ -231,6 +231,24 @@ def test_random_scenes_with_an_impedance_law_move_alike_in_four_engines(seed: in
         np.testing.assert_allclose(other.inputs.values, ours.inputs.values, rtol=0.0, atol=1e-6 * np.abs(ours.v).max())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["universal_robots_ur5e/ur5e", "unitree_go1/go1", "franka_emika_panda/panda"])
+def test_published_robots_move_alike_under_one_impedance_law(robot: str) -> None:
+    path = Path(__file__).parents[2] / "shared" / "data" / "robots" / f"{robot}.xml"
+    if not path.is_file():
+        pytest.skip(f"The robot's file {path} is not here.")
+    start = cases.from_file(path, without="friction,contacts")
+    nu = len(start.scene.actuators)
+
+    def impedance(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return start.q0[-nu:] + 0.2 * np.sin(5.0 * t) - 0.02 * v[-nu:]
+
+    case = cases.from_file(path, control=Control(impedance, 5e-3), t_end=0.2, without="friction,contacts")
+    ours, *others = (run_in(case, *run) for run in RUNS if run[1] != "ida")
+    for other in others:
+        assert off(other, ours) < 1e-6
+
+
 def _late(value: Any) -> Callable[..., Any]:
     def control(t: float, q: np.ndarray, v: np.ndarray) -> Any:
         if t < 0.05:

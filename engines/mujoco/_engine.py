@@ -126,6 +126,7 @@ class Mujoco:
         used = _settings.chosen(self.name, profile, _known(case, mechanism.default_step(case, profile)), settings)
         dt, rounded = _dividing(case, float(used["dt"])) if "dt" in used else (0.0, "")
         used = used | ({"dt": dt} if rounded else {})
+        own = profile == "matched" and "dt" not in settings  # nobody's step was changed
         with captured() as said:
             try:
                 if hasattr(mechanism, "prepare"):
@@ -139,7 +140,7 @@ class Mujoco:
         followed = getattr(mechanism, "followed", None)
         return MujocoRun(
             case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said),
-            follows=followed(case, profile) if followed else None, rounded=rounded,
+            follows=followed(case, profile) if followed else None, rounded="" if own else rounded,
         )  # fmt: skip
 
     def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
