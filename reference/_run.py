@@ -166,7 +166,7 @@ class CompiledRun:
                     return Outcome.STEP_LIMIT
                 code = self.slice(min(budget, limit - steps))
                 if code == layout.DONE:
-                    return Outcome.NOT_FINITE if self.state["spoilt"][0] else Outcome.FINISHED
+                    return Outcome.FINISHED
                 if code < 0:
                     return self._ended(code)
                 self._grow(code)

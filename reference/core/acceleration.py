@@ -117,18 +117,18 @@ def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Arra
 
 
 @inlined
-def _rate_and_drive(s: Any, m: Model, w: Work, law: Array, j: int, v: Array) -> None:
+def _rate_and_drive(s: Any, m: Model, w: Work, on: float, j: int, v: Array) -> None:
     """Rate h' of active row j, and the right-hand side of its multiplier with the size of its terms."""
     i = w.idx[j]
     rate, push = 0.0, 0.0
     for c in range(m.span[i, 0], m.span[i, 1]):
         rate += w.H[j, c] * v[c]
         push += w.H[j, c] * w.vd[c]
-    h = w.ha[j]
-    spring = (law[i, 0] + law[i, 2] * h * h) * h
+    h, law = w.ha[j], w.law
+    damping, spring = on * law[i, 1] * rate, on * (law[i, 0] + law[i, 2] * h * h) * h
     w.hda[j] = rate
-    w.r[j] = -(push + w.Hdv[j] + law[i, 1] * rate + spring)
-    w.scale[j] = abs(push) + abs(w.Hdv[j]) + law[i, 1] * abs(rate) + abs(spring)
+    w.r[j] = -(push + w.Hdv[j] + damping + spring)
+    w.scale[j] = abs(push) + abs(w.Hdv[j]) + abs(damping) + abs(spring)
 
 
 @inlined
@@ -146,12 +146,12 @@ def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
 
 
 @compiled
-def assemble(rows: Any, s: Any, m: Model, w: Work, law: Array, t: float, q: Array, v: Array) -> int:
-    """Evaluate the active rows under a law (nc, 3) and factor their Schur complement G = H M^-1 H^T."""
+def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array, v: Array) -> int:
+    """Evaluate the active rows, their law on (1) or off (0), and factor their Schur complement G = H M^-1 H^T."""
     na = s.na
     rows(t, q, v, m.p, w.w, w.idx, na, w.H, w.ha, w.Hdv)
     for j in range(na):
-        _rate_and_drive(s, m, w, law, j, v)
+        _rate_and_drive(s, m, w, on, j, v)
         _schur_row(s, m, w, j)
     return factor_schur(w.G, na, w.reach)
 
@@ -166,7 +166,7 @@ def push_rows(m: Model, w: Work, na: int, x: Array, factor: float, out: Array) -
 
 
 @inlined
-def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, law: Array, t: float, q: Array, v: Array) -> int:
+def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, on: float, t: float, q: Array, v: Array) -> int:
     """One coordinate and at most one active row: everything is scalar."""
     M, f = w.M, w.f
     dynamics(t, q, v, w.u, p, M, f, w.w)
@@ -179,9 +179,9 @@ def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, law: Array, t:
         return 0
     Hs, ha, Hdvs = w.H, w.ha, w.Hdv
     rows(t, q, v, p, w.w, w.idx, 1, Hs, ha, Hdvs)
-    H, h, i = Hs[0, 0], ha[0], w.idx[0]
+    H, h, i, law = Hs[0, 0], ha[0], w.idx[0], w.law
     push, rate = H * free, H * v[0]
-    damping, spring = law[i, 1] * rate, (law[i, 0] + law[i, 2] * h * h) * h
+    damping, spring = on * law[i, 1] * rate, on * (law[i, 0] + law[i, 2] * h * h) * h
     X = H * inverse
     G = H * X
     w.X[0, 0], w.hda[0], w.G[0, 0] = X, rate, np.sqrt(G)
@@ -203,16 +203,16 @@ def accelerate(
     """
     s.rhs += 1
     na = s.na
-    law = w.no_law if general == SMOOTH else w.law
+    on = 0.0 if general == SMOOTH else 1.0
     if s.has_solve and general == OWN:
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
     if s.n == 1 and na <= 1:
-        return _scalar(dynamics, rows, s, m.p, w, law, t, q, v)
+        return _scalar(dynamics, rows, s, m.p, w, on, t, q, v)
     if _free(dynamics, s, m.p, w, t, q, v) != 0:
         return 1
     if na == 0:
         return 0
-    if assemble(rows, s, m, w, law, t, q, v) != 0:
+    if assemble(rows, s, m, w, on, t, q, v) != 0:
         return 1
     solve_schur(w.G, na, w.reach, w.r, w.la)
     push_rows(m, w, na, w.la, 1.0, w.vd)

@@ -149,8 +149,8 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
             return ILL_POSED
         scatter(s, w, w.lam0)
-        record.here(K, s, m, w, b.mode, b.out, b.modes)
     K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
+    record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
     moved = False
     for i in range(s.nc):
@@ -167,9 +167,11 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         if w.guard_hit[i] <= s.theta and settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
             return LOST
     code = _restart(K, s, m, w, b)
+    if code == 0 and s.audited:
+        code = audit.account(K, s, m, w)
     if code == 0:
-        record.here(K, s, m, w, b.mode, b.out, b.modes)
-    return code
+        record.here(K, s, m, w, b.mode, b.out, b.modes, s.audited)
+    return int(code)
 
 
 @compiled
@@ -203,8 +205,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         _land(K, s, m, w)
         _remember_step(s, before)
         _move(s, w, t)
-        code = _switch(K, s, m, w, b)
-        return audit.account(K, s, m, w) if code == 0 and s.audited else code
+        return _switch(K, s, m, w, b)
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)
@@ -212,14 +213,14 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         code = audit.account(K, s, m, w)
         if code != 0:
             return code
-    record.here(K, s, m, w, b.mode, b.out, b.modes)
+    record.step_end(K, s, m, w, b.mode, b.out, b.modes)
     if s.method == EXPLICIT or s.method == IMPLICIT:
         choice.choose_method(s, w)
     if at_stop and s.stop < s.t_end:
         _take_inputs(K, s, m, w, b)
         code = _resume(K, s, m, w, b)
         if code == 0:
-            record.here(K, s, m, w, b.mode, b.out, b.modes)
+            record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     return code
 
 
@@ -250,9 +251,10 @@ def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     code = _restart(K, s, m, w, b)
     if code != 0:
         return code
-    record.here(K, s, m, w, b.mode, b.out, b.modes)
+    K.energy(w.y[: s.nq], w.y[s.nq :], m.p, w.e)
+    record.here(K, s, m, w, b.mode, b.out, b.modes, True)
     while s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:
-        record.write_row(K, s, m, w, b.mode, s.t, w.y, w.lam0, w.z, b.out, b.modes)
+        record.write_row(s, w, b.mode, s.t, w.y, w.lam0, w.z, b.out, b.modes)
         s.next_sample += 1
     return LOST if lost else 0
 
@@ -276,7 +278,8 @@ def advance(
 
     Returns:
         DONE at the horizon, MORE after the budget, ROWS_FULL or EVENTS_FULL where the caller must grow a buffer,
-        or a negative code for a numerical failure. All that is needed to go on is in the arguments.
+        or a negative code for a numerical failure: NOT_FINITE at the horizon too, if a row that was written is not. All
+        that is needed to go on is in the arguments.
     """
     s = state[0]
     K = Kernels(dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch)
@@ -287,11 +290,13 @@ def advance(
             return code
     for _ in range(budget):
         if s.t >= s.t_end:
-            return DONE
+            break
         room = _room(s, b)
         if room != 0:
             return room
         code = _step(K, s, m, w, b)
         if code != 0:
             return code
-    return DONE if s.t >= s.t_end else MORE
+    if s.t < s.t_end:
+        return MORE
+    return NOT_FINITE if s.spoilt else DONE

@@ -105,7 +105,7 @@ def _bounce(s: Any, m: Model, w: Work, j: int) -> float:
 def _impulses(K: Any, s: Any, m: Model, w: Work) -> int:
     """Solve the map for la, the impulses; leaves in ha the restitution of every row, -1 where it is not struck."""
     nq = s.nq
-    if assemble(K.rows, s, m, w, w.law, s.t, w.y[:nq], w.y[nq:]) != 0:
+    if assemble(K.rows, s, m, w, 1.0, s.t, w.y[:nq], w.y[nq:]) != 0:
         return 1
     for j in range(s.na):
         w.r[j], w.ha[j] = 0.0, -1.0
@@ -222,7 +222,7 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if _factor(K, s, m, w, b) != 0:
         return ILL_POSED
     _list_rows(s, m, w, b)
-    if assemble(K.rows, s, m, w, w.law, s.t, w.y[:nq], w.y[nq:]) != 0:
+    if assemble(K.rows, s, m, w, 1.0, s.t, w.y[:nq], w.y[nq:]) != 0:
         return ILL_POSED
     for j in range(s.na):
         w.r[j], w.ha[j] = 0.0, -1.0

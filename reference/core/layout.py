@@ -191,7 +191,6 @@ class Work:
     vd: Floats
     free: Floats  # (n,) M^-1 f of an affine scene: constant between inputs
     law: Floats2  # (nc, 3) in force now; written where the modes are, and nowhere else
-    no_law: Floats2  # (nc, 3) zeros: the rows' law taken away
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
     lam_at: Floats2  # (12, nc) multipliers at the stages, 0 left out
@@ -252,7 +251,7 @@ def workspace(
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),
-        **dict.fromkeys(("G", "overlap"), (nc, nc)), **dict.fromkeys(("law", "no_law"), (nc, 3)),
+        **dict.fromkeys(("G", "overlap"), (nc, nc)), "law": (nc, 3),
         **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),

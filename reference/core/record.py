@@ -10,7 +10,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes, Floats
 from crossbody.reference.core import dense, peaks
 from crossbody.reference.core.acceleration import OWN, accelerate, scatter
-from crossbody.reference.core.algebra import all_finite
+from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.layout import EXACT, NEVER, Model, Work
 
 ARC_POINTS = 16  # an arc in closed form is one step, however long: these points show its shape
@@ -19,32 +19,53 @@ LEAST_POINTS = 2  # of a flight that is short against the longest: bounces that 
 
 @compiled
 def write_row(
-    K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, y: Array, lam: Array, z: Array, out: Floats, modes: Bytes
+    s: Any, w: Work, mode: Bytes, t: float, y: Array, lam: Array, z: Array, out: Floats, modes: Bytes
 ) -> None:  # fmt: skip
-    """Append one row."""
-    nq, nc, r = s.nq, s.nc, s.rows
-    at = 1 + nq + s.n
-    out[r, 0] = t
-    out[r, 1:at] = y
-    K.gaps(t, y[:nq], y[nq:], m.p, w.gap, w.rate)
-    out[r, at : at + nc] = w.gap
-    out[r, at + nc : at + 2 * nc] = lam
+    """Append one row, with the gaps in w.gap and the energies in w.e."""
+    nc, r, at = s.nc, s.rows, 1 + s.nq + s.n
+    row = out[r]
+    row[0] = t
+    _put(row, 1, y)
+    _put(row, at, w.gap)
+    _put(row, at + nc, lam)
     at += 2 * nc
-    K.energy(y[:nq], y[nq:], m.p, w.e)
-    out[r, at] = w.e[0]
-    out[r, at + 1] = w.e[1]
-    out[r, at + 2 : at + 2 + s.nz] = z
-    modes[r] = mode
+    row[at] = w.e[0]
+    row[at + 1] = w.e[1]
+    _put(row, at + 2, z)
+    for i in range(nc):
+        modes[r, i] = mode[i]
     s.rows = r + 1
-    if not (all_finite(out[r, :at]) and all_finite(out[r, at if s.has_energy else at + 2 :])):
-        s.spoilt = 1  # gaps, energies and powers steer no step
+    wrong = 0.0  # gaps, energies and powers steer no step
+    for i in range(len(row)):
+        wrong += row[i] - row[i] if s.has_energy or i < at or i > at + 1 else 0.0
+    if wrong != 0.0:
+        s.spoilt = 1
 
 
 @inlined
-def here(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Bytes) -> None:
-    """Append the present state, with the multipliers that hold now."""
+def _put(row: Array, at: int, x: Array) -> None:
+    """Write x into a row from place `at` on."""
+    for i in range(len(x)):
+        row[at + i] = x[i]
+
+
+@inlined
+def here(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Bytes, judged: bool) -> None:
+    """Append the present state with its gaps, in w.gap, and multipliers; `judged` if its energies have just been."""
     if s.natural:
-        write_row(K, s, m, w, mode, s.t, w.y, w.lam0, w.z, out, modes)
+        if not judged:
+            K.energy(w.y[: s.nq], w.y[s.nq :], m.p, w.e)
+        write_row(s, w, mode, s.t, w.y, w.lam0, w.z, out, modes)
+
+
+@inlined
+def step_end(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Bytes) -> None:
+    """Append the end of a step in which nothing happened: its last node knows the gaps, its account the energies."""
+    if s.natural and dense.long_for_rows(s):  # the node may have been moved onto the rows
+        K.gaps(s.t, w.y[: s.nq], w.y[s.nq :], m.p, w.gap, w.rate)
+    elif s.natural:
+        copy(w.gaps[0], w.gap)
+    here(K, s, m, w, mode, out, modes, s.audited)
 
 
 @compiled
@@ -60,7 +81,10 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     if s.ledger and s.method != EXACT:
         z = w.kz[1]
         dense.ledger(s, w, theta, z)
-    write_row(K, s, m, w, mode, t, w.ys, w.lam, z, out, modes)
+    q, v = w.ys[: s.nq], w.ys[s.nq :]
+    K.gaps(t, q, v, m.p, w.gap, w.rate)
+    K.energy(q, v, m.p, w.e)
+    write_row(s, w, mode, t, w.ys, w.lam, z, out, modes)
 
 
 @inlined

@@ -19,6 +19,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes
 from crossbody.reference.core.algebra import ULP, all_finite
 from crossbody.reference.core.enclosure import (
+    ABOVE,
     BESIDE,
     BETWEEN,
     BOUNDS,
@@ -34,8 +35,19 @@ from crossbody.reference.core.enclosure import (
     from_gaps,
     from_slopes,
     judge,
+    sign,
 )
-from crossbody.reference.core.guards import CATCH, FUNCTIONS, SWITCH, TOUCH_INSIDE, fill_step, functions, largest, root
+from crossbody.reference.core.guards import (
+    CATCH,
+    FUNCTIONS,
+    RELEASE,
+    SWITCH,
+    TOUCH_INSIDE,
+    fill_step,
+    functions,
+    largest,
+    root,
+)
 from crossbody.reference.core.layout import MEMORYLESS, NEVER, NODES, WINDOW_LEVELS, Model, Work
 
 FIRST = 0.125  # part of g that is left in the first halves; then what was left before, but at least
@@ -59,13 +71,32 @@ def _from_its_gap(w: Work, row: Array, kind: int, j: int, width: float) -> float
 
 
 @inlined
-def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int) -> float:
-    """The whole step: values at its nodes, bounds on g, what is taken for zero; the factor of the gap's rate."""
+def _highest(row: Array, count: int) -> int:
+    """The function whose least value at the places is the largest: the first that may be bounded from below by zero."""
+    best, most = 0, -np.inf
+    for j in range(count):
+        least = row[j * NODES]
+        for c in range(1, NODES):
+            least = min(least, row[j * NODES + c])
+        if least > most:
+            best, most = j, least
+    return best
+
+
+@inlined
+def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int) -> tuple[float, bool]:
+    """The whole step: values at its nodes, bounds on g, what is taken for zero.
+
+    Returns:
+        The factor of the gap's rate; whether a function is positive all along, so that the others were not looked at.
+    """
     row = w.window[0]
     scale = fill_step(K, s, m, w, mode, kind, i, row)
     for c in range(NODES):
         row[BESIDE + c] = w.gaps[c, i] if kind == CATCH else scale * w.rates[c, i]
-    for j in range(count):
+    highest = _highest(row, count)
+    for k in range(count):
+        j = (highest + k) % count
         at, most = j * NODES, 0.0
         for c in range(NODES):
             most = max(most, abs(row[at + c]))
@@ -74,7 +105,9 @@ def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, co
         g = from_slopes(row) if scale != 0.0 and j == 0 else decay(row, at)
         g = max(g, _from_its_gap(w, row, kind, j, s.hs))
         _bound(w, row, j, g)
-    return scale
+        if k == 0 and count > 1 and sign(row, j) == ABOVE:
+            return scale, True
+    return scale, False
 
 
 @inlined
@@ -148,6 +181,20 @@ def _halve(
 
 
 @inlined
+def _value(
+    K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, level: int, place: float, kept: float
+) -> float:  # fmt: skip
+    """The guard at a place of an interval; `kept` is what stands in its line.
+
+    Of the whole step that is the guard itself, but of a multiplier, which is watched less sharply than it switches.
+    """
+    if level == 0 and kind != RELEASE:
+        return kept
+    functions(K, s, m, w, mode, kind, i, place)
+    return largest(w, count)
+
+
+@inlined
 def _locate(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, level: int, place: int, above: bool
 ) -> float:  # fmt: skip
@@ -156,23 +203,22 @@ def _locate(
     One that has not been above zero yet, as `above` says of what is before the interval, does not fire.
     """
     row = w.window[level]
-    width = 0.5**level
+    width, before = 0.5**level, 0.0
     for c in range(NODES):
         most = -np.inf
         for j in range(count):
             most = max(most, row[j * NODES + c])
         above = above or most > 0.0
         if most < 0.0 and above:
-            b = (place + 0.25 * c) * width
-            functions(K, s, m, w, mode, kind, i, b)
-            gb = largest(w, count)
+            a, b = (place + 0.25 * (c - 1)) * width, (place + 0.25 * c) * width
+            gb = _value(K, s, m, w, mode, kind, i, count, level, b, most)
             if not gb < 0.0:
                 continue
             if c == 0:
                 return b
-            a = (place + 0.25 * (c - 1)) * width
-            functions(K, s, m, w, mode, kind, i, a)
-            return root(K, s, m, w, mode, kind, i, a, max(largest(w, count), 1e-300), b, gb)
+            ga = _value(K, s, m, w, mode, kind, i, count, level, a, before)
+            return root(K, s, m, w, mode, kind, i, a, max(ga, 1e-300), b, gb)
+        before = most
     return NEVER
 
 
@@ -196,7 +242,9 @@ def _at_zero(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, 
 def first_below(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int) -> float:
     """First place of the step where all functions of a guard are below zero; NEVER if none, NaN if one is NaN."""
     count = FUNCTIONS[kind]
-    scale = _start(K, s, m, w, mode, kind, i, count)
+    scale, clear = _start(K, s, m, w, mode, kind, i, count)
+    if clear:
+        return NEVER
     level, place, seen = 0, 0, 0
     above = kind != SWITCH or w.window[0, 0] > 0.0
     while True:

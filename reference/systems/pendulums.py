@@ -29,22 +29,16 @@ NAMES = ("length", "gravity", "radius", "gap")
 
 
 @kernels.helper
-def _between(q0: Any, q1: Any, p: Array) -> tuple[Any, Any]:
-    """Gap h and distance |d| of two neighbours."""
+def _between(q0: Any, q1: Any, p: Array) -> tuple[Any, Any, Any, Any]:
+    """Gap h and distance |d| of two neighbours, and the derivatives of h by the two angles: of |d|^2 over 2 |d|."""
     L, r, gap = p[0], p[2], p[3]
-    D = 2.0 * r + gap
-    sin_b = np.sin(0.5 * (q1 - q0))
-    X = 4.0 * L * sin_b * (D * np.cos(0.5 * (q0 + q1)) + L * sin_b)
+    D, a, b = 2.0 * r + gap, 0.5 * (q0 + q1), 0.5 * (q1 - q0)
+    sin_a, cos_a, sin_b, cos_b = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
+    X = 4.0 * L * sin_b * (D * cos_a + L * sin_b)
     d = np.sqrt(D * D + X)
-    return (gap * (4.0 * r + gap) + X) / (d + 2.0 * r), d
-
-
-@kernels.helper
-def _slopes(q0: Any, q1: Any, d: Any, p: Array) -> tuple[Any, Any]:
-    """Derivatives of h by the two angles: those of |d|^2 over 2 |d|."""
-    L, D = p[0], 2.0 * p[2] + p[3]
-    turn = L * np.sin(q1 - q0)
-    return -L * (D * np.cos(q0) + turn) / d, L * (D * np.cos(q1) + turn) / d
+    turn = 2.0 * L * sin_b * cos_b
+    left, right = cos_a * cos_b + sin_a * sin_b, cos_a * cos_b - sin_a * sin_b  # cos q0, cos q1
+    return (gap * (4.0 * r + gap) + X) / (d + 2.0 * r), d, -L * (D * left + turn) / d, L * (D * right + turn) / d
 
 
 @kernels.dynamics
@@ -60,8 +54,7 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
     """Distance of neighbouring circles."""
     for i in range(len(h)):
-        h[i], d = _between(q[i], q[i + 1], p)
-        left, right = _slopes(q[i], q[i + 1], d, p)
+        h[i], _, left, right = _between(q[i], q[i + 1], p)
         hd[i] = left * v[i] + right * v[i + 1]
 
 
@@ -72,8 +65,7 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
     for j in range(na):
         i = idx[j]
         q0, q1, v0, v1 = q[i], q[i + 1], v[i], v[i + 1]
-        h[j], d = _between(q0, q1, p)
-        left, right = _slopes(q0, q1, d, p)
+        h[j], d, left, right = _between(q0, q1, p)
         H[j, i] = left
         H[j, i + 1] = right
         bend = D * (np.sin(q0) * v0 * v0 - np.sin(q1) * v1 * v1) + L * np.cos(q1 - q0) * (v1 - v0) * (v1 - v0)
