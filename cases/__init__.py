@@ -152,6 +152,8 @@ def from_file(
         return load(fspath(path), key, **overrides, **({} if control is None else {"control": control}))
     from crossbody.cases.files.controls import under
 
+    if "tick" in overrides:
+        raise InvalidValue("from_file: tick is given beside a Control, which has its own; valid: one of them.")
     return under(load(fspath(path), key, **overrides), control)
 
 

@@ -453,6 +453,10 @@ def test_a_file_takes_a_control_from_python_or_by_name(files: Path) -> None:
 
     given = run_in(cases.from_file("arm.xml", control=Control(held, 0.02), t_end=0.2), "mujoco", "default")
     assert calls == [k * 0.02 for k in range(10)]
+    with pytest.raises(InvalidValue, match="tick is given beside a Control"):
+        cases.from_file("arm.xml", control=Control(held, 0.02), tick=0.01)
+    with pytest.raises(InvalidValue, match=r"from_file\.control"):
+        cases.from_file("arm.xml", control=held)
     assert given.inputs.values[0, 0] == pytest.approx(1.2)
     assert given.steps == 100  # of the file's step, no other between
 

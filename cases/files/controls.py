@@ -110,7 +110,8 @@ def under(case: Case, control: Control) -> Case:
         values = inputs.values.copy()
         values[:, : len(case.scene.actuators)] = 0.0
         inputs = replace(inputs, values=values)
-    return replace(case, control=control, inputs=inputs)
+    told = {"control": case.parameters.get("control") or control.label, "tick": control.tick}
+    return replace(case, control=control, inputs=inputs, parameters={**case.parameters, **told})
 
 
 def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Inputs | None]:
