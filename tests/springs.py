@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,12 @@ from crossbody.cases import Law, load
 from crossbody.cases._load import module
 
 CASE = str(Path(next(iter(crossbody.reports.suites.__path__))) / "_springs_and_walls.py")
+
+
+@cache
+def suite() -> Any:
+    """The suite's module: its kernels are loaded once, not for every draw."""
+    return module(CASE)
 
 
 def parameters_outside(seed: int, stream: int = 14) -> dict[str, Any]:
@@ -31,14 +38,14 @@ def outside(seed: int, stream: int = 14) -> Any:
 
 def system_of(case: Any) -> Any:
     """The equations of a case."""
-    return module(CASE).system(case.parameters, case.law)
+    return suite().system(case.parameters, case.law)
 
 
 def springs(M: Any, K: Any, g: Any, H: Any, c: Any, a0: float, a1: float) -> Any:
     """The system M q'' = g - K q beside walls h = H q + c that all have the same constants."""
     rows = len(H)
     law = Law(a0=np.full(rows, a0), a1=np.full(rows, a1), a2=np.zeros(rows), unilateral=np.ones(rows, dtype=bool))
-    return module(CASE).from_numbers(np.concatenate([np.ravel(part) for part in (M, K, g, c, H)]), len(M), law)
+    return suite().from_numbers(np.concatenate([np.ravel(part) for part in (M, K, g, c, H)]), len(M), law)
 
 
 def beside(x: Any, a0: float, a1: float, order: Any) -> Any:
@@ -50,7 +57,7 @@ def inside(seed: int) -> tuple[Any, float, float]:
     """Numbers of a start inside two or three walls at once, and their law."""
     rng = np.random.default_rng([15, seed])
     given = {"n": 3, "walls": int(rng.integers(2, 4)), "draw": int(rng.integers(2**32)), "stiffness": 5.0}
-    x = module(CASE).numbers(given)
+    x = suite().numbers(given)
     deep = 10.0 ** rng.uniform(-4.0, -1.0, len(x.H))
     a0 = 10.0 ** rng.uniform(2.0, 5.0)
     return x._replace(c=-deep - x.H @ x.q0), a0, 2.0 * rng.uniform(0.0, 1.0) * np.sqrt(a0)
@@ -69,13 +76,13 @@ def mirrored(seed: int) -> tuple[Any, float, float]:
     H = np.block([[along, across], [along, -across]])
     q0, v0, g = (np.r_[scale * rng.normal(size=2), 0.0, 0.0] for scale in (0.2, 2.0, 10.0))
     deep, a0 = 10.0 ** rng.uniform(-4.0, -1.0, 2), 10.0 ** rng.uniform(2.0, 5.0)
-    x = module(CASE).Numbers(block(), 5.0 * block(), g, H, -np.r_[deep, deep] - H @ q0, q0, v0)
+    x = suite().Numbers(block(), 5.0 * block(), g, H, -np.r_[deep, deep] - H @ q0, q0, v0)
     return x, a0, 2.0 * rng.uniform(0.0, 1.0) * np.sqrt(a0)
 
 
 def known() -> tuple[Any, list[float], list[float]]:
     """A wall that is left below its surface, and catches again for a moment between the nodes of a step; its start."""
-    x = module(CASE).Numbers(
+    x = suite().Numbers(
         M=np.array([[2.4391139709528056, -0.004530601845406151], [-0.004530601845406151, 2.2658772052392204]]),
         K=np.array([[5.136513058901176, -4.760670286514174], [-4.760670286514174, 20.084126160464503]]),
         g=np.array([21.20470166161674, -9.417156246292292]), H=np.array([[0.7088735823598663, -0.39017693281020477]]),
@@ -98,4 +105,4 @@ def drawn(seed: int) -> tuple[Any, list[float], list[float]]:
     q0, v0 = 0.2 * rng.normal(size=n), 2.0 * rng.normal(size=n)
     while (H @ q0 + c <= 0.0).any():
         q0 *= 0.5
-    return beside(module(CASE).Numbers(M, K, g, H, c, q0, v0), a0, a1, slice(None)), q0.tolist(), v0.tolist()
+    return beside(suite().Numbers(M, K, g, H, c, q0, v0), a0, a1, slice(None)), q0.tolist(), v0.tolist()

@@ -10,12 +10,11 @@ from many_contacts import constant
 from numpy.polynomial.chebyshev import chebvander
 from rippled_walls import rippled
 from scipy.optimize import linprog
-from springs import CASE, known, outside, parameters_outside, system_of
+from springs import known, outside, parameters_outside, suite, system_of
 from test_machines import gusty
 
 from crossbody import cases, engines
 from crossbody.cases import Law, Mode
-from crossbody.cases._load import module
 from crossbody.reference import System, ensemble, kernels, simulate
 from crossbody.reference.core import dop853_table, enclosure, esdirk, exact, filters
 from crossbody.reference.core.layout import NODES
@@ -74,7 +73,7 @@ def test_what_is_located_in_a_step_that_is_long_for_a_row_at_rest(seed, implicit
 @pytest.mark.slow
 def test_fifty_thousand_springs_and_walls_are_right_to_a_millionth():
     """Against steps of 1 ms at most, at 1e-12; the exact arcs judge those that differ."""
-    kernels, groups = module(CASE), dict[tuple[int, int], list[tuple[int, Any, Any]]]()
+    kernels, groups = suite(), dict[tuple[int, int], list[tuple[int, Any, Any]]]()
     for seed in range(50_000):
         given = parameters_outside(seed, 50_000)
         x = kernels.numbers(given)

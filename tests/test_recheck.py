@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from springs import CASE, drawn, known
+from springs import drawn, known, suite
 
 from crossbody.cases import Law, Mode
-from crossbody.cases._load import module
 from crossbody.reference import recheck, simulate
 
 
@@ -19,7 +18,7 @@ def far(system: Any, row: int) -> Any:
     p = np.array(system.p)
     p[2 * system.n**2 + system.n + row] += 1e3
     law = Law(a0=system.a0, a1=system.a1, a2=system.a2, unilateral=np.ones(system.nc, dtype=bool))
-    return module(CASE).from_numbers(p, system.n, law)
+    return suite().from_numbers(p, system.n, law)
 
 
 @pytest.mark.parametrize("samples", [None, np.linspace(0.0, 1.0, 501)], ids=["own steps", "samples"])
