@@ -20,7 +20,8 @@ from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.parts import PARTS
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.pages import grid, html, results, site
-from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.pages.styles import TRUTH
+from crossbody.reports.runs import files, jobs, output, store, study
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -75,6 +76,8 @@ def run(
     if voice.as_json():
         print(voice.rows_as_json(rows))
     else:
+        if any(case.control is not None for case in cases) and not voice.quiet():
+            show_controllers(out)
         show(rows, out)
     return exit_code(rows["verdict"], rows["regression"] if strict else ())
 
@@ -83,9 +86,16 @@ def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any
     """What decides what a command computes: the sources too, and case files of one's own."""
     from crossbody.reports.sweep.store import code
 
-    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in names if name.endswith(OF_USERS)]
+    paths = [*(name for name in names if name.endswith(OF_USERS)), *_acting(cases)]
+    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in paths]
     scenes = [[case.label, dict(case.parameters)] for case in cases]
     return {"kind": kind, "code": code(), "cases": scenes, "files": own, **more}
+
+
+def _acting(cases: Sequence[Case]) -> list[str]:
+    """Files that say what acts on the cases: tables of controls, controllers."""
+    told = [(str(case.parameters.get("ctrl", "")), str(case.parameters.get("control", ""))) for case in cases]
+    return sorted({name for table, control in told for name in (table, control.rpartition(":")[0]) if name})
 
 
 def key(number: int, case: Case) -> str:
@@ -165,6 +175,17 @@ def show(rows: pd.DataFrame, out: Path) -> None:
         text = f"more than a stored run gave: {run} {row['metric']} {row['value']:.4g} {row['unit']}"
         console.print(f"{text}, band {row['band']:.3g}", soft_wrap=True, highlight=False, markup=False)
     where(out)
+
+
+def show_controllers(out: Path) -> None:
+    """Print how much of each run's time was spent in a controller of the user's own."""
+    told = [store.peek(out / "traces" / name) for name in files.listed(out, "traces")]
+    for one in told:
+        about = one["about"]
+        if one.get("control_s") and about["engine"] != TRUTH:
+            run = f"{about['case']}:{about['variant']} {about['engine']}:{about['profile']}"
+            part = one["control_s"] / one["wall_s"]
+            print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")
 
 
 def where(out: Path) -> None:

@@ -242,7 +242,8 @@ def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Ma
     dense = engines.load(pick.engine).prepare(case, pick.profile, samples=times, **asked).run()
     if not dense.outcome.ok or dense.events != natural.events:
         return natural  # samples have changed the steps: it is another run
-    return replace(with_both_sides(dense, natural), wall_s=natural.wall_s, steps=natural.steps)
+    told = {"wall_s": natural.wall_s, "control_s": natural.control_s, "steps": natural.steps}
+    return replace(with_both_sides(dense, natural), **told)  # type: ignore[arg-type]
 
 
 def _study(case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: Trajectory) -> Study:
