@@ -20,6 +20,7 @@ from crossbody.cases._entry_points import checked_arguments
 from crossbody.cases._errors import (
     CaseUnsupported,
     ColumnMapError,
+    ControlError,
     CrossbodyError,
     EngineUnavailable,
     FormatUnavailable,
@@ -34,6 +35,7 @@ from crossbody.cases._outcome import Outcome
 
 if TYPE_CHECKING:
     from crossbody.cases._case import Case, Chaos, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
+    from crossbody.cases._control import Control
     from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
     from crossbody.cases.scene import Scene
 
@@ -43,6 +45,7 @@ _LAZY = {
     **dict.fromkeys(
         ("Case", "Chaos", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"
     ),
+    "Control": "_control",
     **dict.fromkeys(("Event", "Ledger", "Mode", "Switch", "Trajectory"), "_trajectory"),
 }
 
@@ -52,6 +55,8 @@ __all__ = [
     "Chaos",
     "Claim",
     "ColumnMapError",
+    "Control",
+    "ControlError",
     "Coordinate",
     "CrossbodyError",
     "EngineUnavailable",
@@ -127,20 +132,29 @@ def load(name: str, variant: str | None = None, **overrides: Value) -> Case:
 
 
 @checked_arguments
-def from_file(path: str | PathLike[str], key: str | None = None, **overrides: Value) -> Case:
+def from_file(
+    path: str | PathLike[str], key: str | None = None, *, control: str | Control | None = None, **overrides: Value
+) -> Case:
     """Build a case from a robot's file.
 
     Args:
         path: of an MJCF file.
         key: one of its keyframes; the first if not given.
-        overrides: t_end, a0, a1, ctrl and without, as in `crossbody.cases.files.case.PARAMETERS`.
+        control: what gives the controls of all actuators, or FILE.py:NAME of a callable, whose tick is given too.
+        overrides: t_end, a0, a1, ctrl, tick and without, as in `crossbody.cases.files.case.PARAMETERS`.
 
     Raises:
         UnknownName: if there is no such file, keyframe or parameter.
         SceneError: for what a scene does not have, by name.
         InvalidValue: if a parameter lies outside what it admits.
     """
-    return load(fspath(path), key, **overrides)
+    if control is None or isinstance(control, str):
+        return load(fspath(path), key, **overrides, **({} if control is None else {"control": control}))
+    from crossbody.cases.files.controls import under
+
+    if "tick" in overrides:
+        raise InvalidValue("from_file: tick is given beside a Control, which has its own; valid: one of them.")
+    return under(load(fspath(path), key, **overrides), control)
 
 
 @checked_arguments

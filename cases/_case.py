@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from crossbody.cases._errors import InvalidValue, SceneError, UnknownName
 from crossbody.cases._trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from crossbody.cases._control import Control
     from crossbody.cases.scene import Scene
 
 Value = float | int | str | bool
@@ -251,6 +252,7 @@ class Case:
         collisions: rule for several contacts: "sequential", "simultaneous" or "resolved".
         closed_form: the exact motion at given times, where one exists (tier A).
         inputs: what acts from outside; None for nothing.
+        control: a callable of the user's own that gives a scene's controls at its ticks, beside the inputs.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
         scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
@@ -278,6 +280,7 @@ class Case:
     collisions: str = "sequential"
     closed_form: Callable[[Floats], Trajectory] | None = None
     inputs: Inputs | None = None
+    control: Control | None = None
     claims: tuple[Claim, ...] = ()
     limits: tuple[Limit, ...] = ()
     discrete: tuple[str, ...] = ()
@@ -302,8 +305,24 @@ class Case:
             )
         if not (math.isfinite(self.t_end) and self.t_end > 0):
             raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
+        self._put_control()
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+
+    def _put_control(self) -> None:
+        """Tell a controller its inputs, and bring its ticks to the horizon and to the instants of the other inputs."""
+        control, scene, inputs = self.control, self.scene, self.inputs
+        if control is None:
+            return
+        if scene is None or not scene.actuators:
+            what = "is no scene, for which alone there is one" if scene is None else "has no actuators"
+            raise SceneError(f"Case {self.name} has a control but {what}.")
+        if inputs is not None and inputs.values[:, : len(scene.actuators)].any():
+            raise SceneError(f"Case {self.name}: inputs hold controls, and there is a control; valid: one of them.")
+        control = replace(control, names=scene.inputs, width=len(scene.actuators)).fitted(self.t_end)
+        object.__setattr__(self, "control", control)
+        if inputs is not None:
+            object.__setattr__(self, "inputs", replace(inputs, times=control.on_ticks(inputs.times)))
 
     @property
     def label(self) -> str:

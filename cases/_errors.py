@@ -4,6 +4,7 @@
     +-- UnknownName         a case, engine, profile, metric or parameter that does not exist
     +-- InvalidValue        a value outside what its name admits
     +-- SceneError          a mechanism whose parts contradict each other (shapes, start, constants)
+    +-- ControlError        a controller of the user's own that raises, or gives something else than its controls
     +-- EngineUnavailable   an engine whose third-party package is not installed
     +-- CaseUnsupported     an engine that cannot do a case, in the engine's own words
     +-- FormatUnavailable   a log format whose third-party package is not installed
@@ -59,6 +60,10 @@ class InvalidValue(CrossbodyError, ValueError):  # noqa: N818
 
 class SceneError(CrossbodyError, ValueError):
     """A mechanism or start whose parts contradict each other."""
+
+
+class ControlError(CrossbodyError, ValueError):
+    """A controller of the user's own that raises, or gives something else than its controls; it names tick and time."""
 
 
 class EngineUnavailable(CrossbodyError):  # noqa: N818

@@ -37,7 +37,7 @@ _ADVICE = {
     Outcome.TIME_LIMIT: "Raise the time limit, or loosen the tolerance.",
     Outcome.STEP_TOO_SMALL: "The step fell below the resolution of time: loosen the tolerance or lower the stiffness.",
     Outcome.DIVERGED: "The motion left every sensible bound: take a smaller step, or check signs and constants.",
-    Outcome.NOT_FINITE: "A kernel returned NaN or infinity: look at the state named beside this outcome.",
+    Outcome.NOT_FINITE: "A kernel or controller returned NaN or infinity: look at the state named beside this outcome.",
     Outcome.ILL_POSED: "The active rows or the mass matrix lost rank: the multipliers are not unique here.",
     Outcome.MODE_CYCLE: "The contacts named beside this outcome switch for ever at one instant: their laws contradict.",
     Outcome.LOST: "The motion left the region in which its controller holds: start closer, or change the controller.",

@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crossbody.cases._arrays import Bytes, Floats, frozen
 from crossbody.cases._entry_points import checked_arguments
 from crossbody.cases._outcome import Outcome
+
+if TYPE_CHECKING:
+    from crossbody.cases._case import Inputs
 
 
 class Mode(IntEnum):
@@ -99,6 +103,8 @@ class Trajectory:
         wall_s: time of the run itself, s (no preparation).
         counts: further counters of the solver (right-hand sides, rejections, ...).
         ledger: work of every row, if it was asked for.
+        inputs: what acted on it, where a controller of the user's own gave some of it; None where the case says it.
+        control_s: part of `wall_s` that was spent in that controller, s.
     """
 
     t: Floats
@@ -116,6 +122,8 @@ class Trajectory:
     wall_s: float = 0.0
     counts: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     ledger: Ledger | None = None
+    inputs: Inputs | None = None
+    control_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every shape once and make every array read-only."""

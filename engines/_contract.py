@@ -37,7 +37,7 @@ class Run(Protocol):
         settings: what was really used, for provenance (tolerance, step, solver, ...).
 
     A run may have `follows`, a case: the same scene under the machine, the collision rule and the law that the engine
-    really integrates, where they are not the case's own. Its discretisation error is then measured against those.
+    really integrates, where they are not the case's own. Its step error is then measured against those.
     """
 
     engine: str

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 from crossbody.cases import Case, CaseUnsupported
-from crossbody.cases._load import from_file
+from crossbody.cases._own_file import from_file
 from crossbody.reference import System
 
 SYSTEMS = "crossbody.reference.systems"
@@ -51,7 +51,7 @@ def system_of(case: Case) -> System:
     if case.scene is not None:
         from crossbody.reference.tree.system import system
 
-        return system(case.scene, case.law, case.q0)
+        return system(case.scene, case.law, case.q0, case.control)
     build = builder(case.mechanism)
     if build is None:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")

@@ -21,7 +21,7 @@ class Spot:
     """An equilibrium of a case, in its coordinates.
 
     Attributes:
-        q, v (n,): state.
+        q (nq,), v (n,): state.
         u (nu,): inputs of the mechanism, constant.
         rows: those that are on, with the constants of CONTACT.
         lam: their multipliers, N.
@@ -49,7 +49,7 @@ class Tangent:
 
     Attributes:
         way: how it was made, in the engine's own words.
-        slope (n, 2 n): derivative of v' by (q, v), in the case's coordinates.
+        slope (n, 2 n): derivative of v' by (q, v), in the case's coordinates, or in those of its tangent space.
         known: a known property of the engine that takes it off; empty if it should be right.
         explained: what this property alone would make of the right derivative; None where it tells no number.
     """

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases._arrays import frozen, numbers
+from crossbody.cases._control import Control
 from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._cache import embedding
 from crossbody.reference._check import check_once
@@ -83,6 +84,8 @@ def ensemble(
         UnknownName: for a parameter or constant that the system does not have.
         InvalidValue: for an option or a number of threads outside its range.
     """
+    if isinstance(system.control, Control):
+        raise SceneError("ensemble: the system has a controller in Python, one for every run; run them by `simulate`.")
     settings = replace(checked(t_end, options), samples=(), events=False)
     job = _Job(system, q0, v0, parameters or {}, law or {})
     count = len(os.sched_getaffinity(0)) if threads is None else threads

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import Mode, Trajectory, _arguments
+from crossbody.cases._control import Control
 from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
@@ -73,7 +74,7 @@ def recheck(
         system: the mechanism that moved.
         run: the motion; the denser its rows, the smaller the windows that are seen.
         rtol: relative tolerance with which it was computed: what this leaves open is not told.
-        inputs: (times, values) as they acted.
+        inputs: (times, values) as they acted, with what a controller in Python gave (`Trajectory.inputs`).
         collisions: the rule for rows with fast constants, as in `Options`.
 
     Returns:
@@ -84,7 +85,8 @@ def recheck(
     rows = np.flatnonzero(np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
     if not rows or not len(run.t) or (run.mode < 0).any():
         return ()
-    known = system.control is None and system.latched == 0 and system.velocity is None
+    told = system.control is None or (isinstance(system.control, Control) and inputs is not None)
+    known = told and system.latched == 0 and system.velocity is None
     found = _Recheck(system, run, rows, rtol, inputs, collisions).between() if known else _recorded(run, rows, rtol)
     worst: dict[tuple[int, Mode, str], Violation] = {}
     for one in found:

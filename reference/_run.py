@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
+from crossbody.cases._control import Control, NotFinite
 from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
@@ -84,6 +86,7 @@ class CompiledRun:
         self.state = self.template.copy()
         self._bytes, self._blank = (array.view(np.uint8) for array in (self.state, self.template))
         self._modes = initial_modes(system)
+        self.callback: Any = None
         self.call: Callable[..., int] = partial(program(), *system.kernels.values())
 
     def _state_template(self, natural: bool) -> Any:
@@ -116,6 +119,8 @@ class CompiledRun:
         for name in ("u", "s", "z"):
             self.work[name][:] = 0.0
         self.work["y"][:] = self.start_state
+        if self.callback is not None:
+            self.work["s"][0] = self.callback.address
 
     def slice(self, budget: int) -> int:
         """Advance by at most `budget` steps; the loop's return code."""
@@ -128,10 +133,29 @@ class CompiledRun:
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
+        self._begin_control()
         began = time.perf_counter()
         self.start()
         outcome = self._slices(began, progress)
-        return outcome, time.perf_counter() - began
+        took = time.perf_counter() - began
+        failure = None if self.callback is None else self.callback.failure
+        if failure is None:
+            return outcome, took
+        if isinstance(failure, (NotFinite, KeyboardInterrupt)):
+            return Outcome.NOT_FINITE if isinstance(failure, NotFinite) else Outcome.INTERRUPTED, took
+        raise failure
+
+    def _begin_control(self) -> None:
+        """Make this run's own copy of a controller in Python."""
+        system, state = self.system, self.state
+        if not isinstance(system.control, Control):
+            return
+        from crossbody.reference._callback import Callback
+
+        def end(t: float) -> None:
+            state["t_end"] = t
+
+        self.callback = Callback(system.control.begin(system.inputs), system.nq, system.n, end)
 
     def _slices(self, began: float, progress: Callable[[float], None] | None) -> Outcome:
         limit, budget = self.options.max_steps, SLICE
@@ -206,6 +230,10 @@ class CompiledRun:
             if self.nz
             else None,
         )  # fmt: skip
+        if self.callback is not None:
+            controller = self.callback.controller
+            given = controller.given(self.buffers["inputs_t"], self.buffers["inputs_u"])
+            run = replace(run, inputs=given, control_s=controller.seconds)
         return watched(self.system, run)
 
     def _event_list(self) -> tuple[Event, ...]:
@@ -234,6 +262,8 @@ class CompiledRun:
     def _cause(self, outcome: Outcome, q: Floats, v: Floats) -> str:
         """What an outcome's message names before time and state; empty if nothing."""
         state, marked = self.state[0], np.flatnonzero(self.buffers["history"][-1]).tolist()
+        if self.callback is not None and isinstance(self.callback.failure, NotFinite):
+            return f"{self.callback.failure} "
         if outcome is Outcome.NOT_FINITE:
             return self._blamed(q, v)
         if outcome is Outcome.MODE_CYCLE:

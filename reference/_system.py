@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from crossbody.cases import SceneError
 from crossbody.cases._arguments import flag, shown
 from crossbody.cases._arrays import frozen, full, is_number
+from crossbody.cases._control import Control
 from crossbody.cases._entry_points import checked_arguments, finite, wholes
 from crossbody.reference import kernels as kernel_types
 from crossbody.reference._indices import different
@@ -35,7 +36,7 @@ class System:
         n: number of velocities, and of positions unless nq says otherwise.
         nq: number of positions, at least n; more than n only with the kernel `velocity`.
         dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch: kernels as in
-            `crossbody.reference.kernels`.
+            `crossbody.reference.kernels`; control may be a `crossbody.cases.Control`, a callable of Python, too.
         quaternions: index in q of the first of the four entries, w first, of every quaternion. Its length is 1 in all
             that is handed over; inside a step it may differ by the tolerance, which kernels must bear.
         parameters: p of the kernels: an array, or names with values in the kernels' order.
@@ -107,6 +108,8 @@ class System:
         for name in ("gaps", "rows", "energy", "power"):
             put(self, name, getattr(_none, name) if getattr(self, name) is None else getattr(self, name))
         self._check_kernels()
+        if isinstance(self.control, Control):
+            self._put_callable(self.control)
         put(self, "tick", finite("System.tick", self.tick))
         for name in ("constant_mass", "affine"):
             put(self, name, flag(f"System.{name}", getattr(self, name)))
@@ -154,6 +157,10 @@ class System:
     def kernels(self) -> dict[str, Any]:
         """The ten functions in the order of `kernels.NAMES`; what is absent is a stand-in."""
         given = {name: getattr(self, name) for name in kernel_types.NAMES}
+        if isinstance(self.control, Control):
+            from crossbody.reference._callback import control
+
+            given["control"] = control
         return {name: getattr(_none, name, None) if kernel is None else kernel for name, kernel in given.items()}
 
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
@@ -182,6 +189,15 @@ class System:
                 raise SceneError(f"System.{name} is {shown(value)}; it must be a whole number from {low} to {LARGEST}.")
         if self.mass_block and self.n % self.mass_block:
             raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")
+
+    def _put_callable(self, control: Control) -> None:
+        """Take tick and memory of a controller in Python, and check how many inputs it sets."""
+        from crossbody.reference._callback import MEMORY
+
+        if not 0 < (control.width or self.inputs) <= self.inputs:
+            raise SceneError(f"System.control sets {control.width} inputs; valid: 1 to System.inputs = {self.inputs}.")
+        object.__setattr__(self, "tick", control.tick)
+        object.__setattr__(self, "memory", MEMORY)
 
     def _check_positions(self) -> None:
         """Check nq, and what the kernel `velocity` asks for."""

@@ -71,10 +71,12 @@ def _parameters(command: _Work) -> _Work:
     @wraps(command)
     def gathered(
         *given: Any, pairs: tuple[str, ...], t_end: float | None, law: str | None, ctrl: str | None,
-        without: str | None, push: tuple[tuple[Any, ...], ...], **others: Any,
+        control: str | None, tick: float | None, without: str | None, push: tuple[tuple[Any, ...], ...], **others: Any,
     ) -> int:  # fmt: skip
+        if tick is not None and control is None and not any(pair.startswith("control=") for pair in pairs):
+            raise click.UsageError("--tick is the time between two calls of a controller, and none is given: --control.")
         pushes = "; ".join(" ".join(map(str, one)) for one in push) or None
-        named = {"t_end": t_end, "ctrl": ctrl, "without": without, "push": pushes}
+        named = {"t_end": t_end, "ctrl": ctrl, "control": control, "tick": tick, "without": without, "push": pushes}
         own = [f"{name}={value}" for name, value in named.items() if value is not None]
         return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **others)
 
@@ -83,6 +85,12 @@ def _parameters(command: _Work) -> _Work:
         click.option("--t-end", type=float, metavar="S", help="Horizon, s; as --set t_end=S."),
         click.option("--law", metavar="a0=,a1=", help="Constants of the rows; as --set for each of them."),
         click.option("--ctrl", metavar="FILE", help="Of a robot's file: table of controls (CSV, Parquet, NPZ)."),
+        click.option(
+            "--control",
+            metavar="FILE.py:NAME",
+            help="Of a robot's file: a callable (t, q, v) -> u of your own, or a class of such.",
+        ),
+        click.option("--tick", type=float, metavar="S", help="Between two calls of it, s; 1e-3 if not given."),
         click.option(
             "--push",
             type=(str, *(float,) * 5),

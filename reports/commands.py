@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +17,11 @@ from crossbody.cases import Case, InvalidValue
 from crossbody.cases.files.reading import SUFFIXES
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
+from crossbody.reports.judging.parts import PARTS
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
-from crossbody.reports.pages import site
-from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.pages import grid, html, results, site
+from crossbody.reports.pages.styles import TRUTH
+from crossbody.reports.runs import files, jobs, output, store, study
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -31,8 +34,9 @@ OF_USERS = (".py", *SUFFIXES)
 """How names of files end that are cases."""
 GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
 WRONG = [Word.OUTSIDE, Word.CRASHED]
-WIDTH = 120  # of the table in a file or a pipe
-SHOWN = {"position": "position", "event_times": "times [s]", "energy_drift": "energy"}
+WIDTH = 140  # of the table in a file or a pipe
+SHOWN = {"position": "position", **{f"position ({part})": part for part in PARTS}}
+"""Metrics in the terminal and their heads: the parts of the worst error of position add up to it."""
 COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
 
 
@@ -72,6 +76,8 @@ def run(
     if voice.as_json():
         print(voice.rows_as_json(rows))
     else:
+        if any(case.control is not None for case in cases) and not voice.quiet():
+            show_controllers(out)
         show(rows, out)
     return exit_code(rows["verdict"], rows["regression"] if strict else ())
 
@@ -80,9 +86,16 @@ def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any
     """What decides what a command computes: the sources too, and case files of one's own."""
     from crossbody.reports.sweep.store import code
 
-    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in names if name.endswith(OF_USERS)]
+    paths = [*(name for name in names if name.endswith(OF_USERS)), *_acting(cases)]
+    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in paths]
     scenes = [[case.label, dict(case.parameters)] for case in cases]
     return {"kind": kind, "code": code(), "cases": scenes, "files": own, **more}
+
+
+def _acting(cases: Sequence[Case]) -> list[str]:
+    """Files that say what acts on the cases: tables of controls, controllers."""
+    told = [(str(case.parameters.get("ctrl", "")), str(case.parameters.get("control", ""))) for case in cases]
+    return sorted({name for table, control in told for name in (table, control.rpartition(":")[0]) if name})
 
 
 def key(number: int, case: Case) -> str:
@@ -145,7 +158,7 @@ def show(rows: pd.DataFrame, out: Path) -> None:
 
     console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
     if not voice.quiet():
-        console.print(_summary(rows))
+        console.print(_summary(rows, results.walls_of(out)))
         counts = rows["verdict"].value_counts()
         console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
     told = rows[rows["verdict"].isin(WRONG if voice.quiet() else [Word.SKIPPED, *WRONG])]
@@ -164,32 +177,46 @@ def show(rows: pd.DataFrame, out: Path) -> None:
     where(out)
 
 
+def show_controllers(out: Path) -> None:
+    """Print how much of each run's time was spent in a controller of the user's own."""
+    told = [store.peek(out / "traces" / name) for name in files.listed(out, "traces")]
+    for one in told:
+        about = one["about"]
+        if one.get("control_s") and about["engine"] != TRUTH:
+            run = f"{about['case']}:{about['variant']} {about['engine']}:{about['profile']}"
+            part = one["control_s"] / one["wall_s"]
+            print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")
+
+
 def where(out: Path) -> None:
     """The path of the report, unless nothing but what is wrong is to be said."""
     if not voice.silent():
         print(f"Report: {(out / site.PAGE).absolute()}")
 
 
-def _summary(rows: pd.DataFrame) -> Any:
+def _summary(rows: pd.DataFrame, walls: Mapping[tuple[str, str], float]) -> Any:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("case", "engine"):
         table.add_column(name, no_wrap=True)
-    for name in (*SHOWN.values(), Word.WITHIN, "expected", Word.OUTSIDE):
+    for name in (*SHOWN.values(), "run time", Word.WITHIN, "expected", Word.OUTSIDE):
         table.add_column(name, justify="right", no_wrap=True)
     for (case, variant, engine, profile), run in rows.groupby(["case", "variant", "engine", "profile"], sort=False):
-        values = run.drop_duplicates("metric").set_index("metric")["value"]
+        values = run.drop_duplicates("metric").set_index("metric")[["value", "known"]].T.to_dict()
         counts = run["verdict"].value_counts()
+        label, who = f"{case}:{variant}", f"{engine}:{profile}"
         table.add_row(
-            f"{case}:{variant}", f"{engine}:{profile}", *(_short(values.get(metric)) for metric in SHOWN),
+            label, who, *(_short(**values.get(metric, {})) for metric in SHOWN), grid.duration(walls.get((label, who))),
             *(_count(int(counts.get(word, 0)), word) for word in (Word.WITHIN, Word.EXPECTED, Word.OUTSIDE)),
         )  # fmt: skip
     return table
 
 
-def _short(value: float | None) -> str:
-    return "-" if value is None or value != value else f"{value:.1e}"
+def _short(value: float = math.nan, known: float = math.nan) -> str:
+    """A number in two digits, or below what it is known to."""
+    below, number = html.bounded(value, known)
+    return "-" if number != number else f"{below}{number:.1e}"
 
 
 def _count(count: int, word: Word) -> str:

@@ -181,11 +181,11 @@ def test_a_claimed_number_that_is_missing_is_outside(recorded: Recorded) -> None
         assert "fifth_exit" in _outside(claimed, entry, truth)
 
 
-@pytest.mark.parametrize("metric", ["ring_changes", "position (model)"])
+@pytest.mark.parametrize("metric", ["ring_changes", "largest position (model)"])
 def test_a_claim_that_judged_nothing_is_reported(metric: str, recorded: Recorded) -> None:
     case, truth, entries = recorded["bouncing_ball", "listing"]
     claim = Claim(metric=metric, expected=4.0, tier=Tier.B, source="another mechanism")
-    alone = replace(entries["reference:compiled"], refined=None)
+    alone = replace(entries["reference:compiled"], study=None)
     rows = judged(replace(case, claims=(*case.claims, claim)), [alone], truth, "")
     assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == [metric]
 

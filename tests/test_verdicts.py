@@ -175,15 +175,6 @@ def test_difference_is_relative_to_the_larger_numbers() -> None:
     assert difference([1.0], [1.0, 2.0]) == math.inf
 
 
-def test_model_error_stands_apart_from_discretisation(case: Case, motion: Trajectory) -> None:
-    refined = replace(motion, q=motion.q + 1e-3)
-    entry = Entry(engine="fake", profile="stepper", run=motion, refined=refined, settings={"dt": 1e-3})
-    rows = compare(case, [entry])
-    values = rows.set_index("metric")["value"]
-    assert values["position (model)"] == pytest.approx(1e-3, rel=1e-6)
-    assert values["position (discretisation)"] == pytest.approx(1e-3, rel=1e-2)
-
-
 @pytest.mark.parametrize(
     ("off", "word"), [(0.4, Word.OUTSIDE), (0.6, Word.EXPECTED), (1.9, Word.EXPECTED), (2.1, Word.OUTSIDE)]
 )

@@ -57,7 +57,7 @@ _KNOWN = (
     ("pinocchio", "admm", STEPPING),
 )
 # The engine at its own step against itself much finer: what remains when the model is the same.
-_DISCRETISATION = (
+_STEP = (
     ("mujoco", "matched", 2e-5, 2e-5, "Runge-Kutta 4 with located events at 1 ms"),
     ("mujoco", "default", 6e-2, 6e-3, "Euler at 2 ms, impacts on the grid"),
     ("pinocchio", "admm", 2e-2, 3e-2, "first order, impacts on the grid"),
@@ -96,8 +96,8 @@ def _all(wanted: dict[str, tuple[float, str]], bilateral: bool, height: float) -
         yield Limit(metric="constraint_drift", value=abs(height) * (1.0 + 1e-9), why=_OFF)
         for metric, value in _FIXED_STEP.items():
             yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=_FIXED)
-    for engine, profile, position, times, why in _DISCRETISATION:
+    for engine, profile, position, times, why in _STEP:
         for metric, value in (("position", position), ("event_times", times)):
-            yield Limit(metric=f"{metric} (discretisation)", value=value, engine=engine, profile=profile, why=why)
+            yield Limit(metric=f"largest {metric} (step)", value=value, engine=engine, profile=profile, why=why)
     for engine, profile, known in _OTHER_LAW:
         yield Limit(metric="audit", engine=engine, profile=profile, known=known)

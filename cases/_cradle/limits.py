@@ -81,7 +81,7 @@ _TOUCHING: Bounds = {
     "energy_integrator": (1e-6, _LOCATED),
     "position": (1e-5, _RESTING),
 }
-_DISCRETISATION: Mapping[tuple[str, str], tuple[float, str]] = {
+_STEP: Mapping[tuple[str, str], tuple[float, str]] = {
     ("mujoco", "matched"): (1e-4, "Runge-Kutta 4 with located events, twenty steps a contact, then straight lines"),
     ("pinocchio", "law"): (2e-5, "relative tolerance of 1e-10, in many short arcs where balls touch"),
 }
@@ -121,8 +121,8 @@ def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
     yield Limit(metric="momentum", value=1e-10, why=_KEPT)
     if variant == "sliders":
         yield from _peer_limits.sliders(bounds)
-        for (engine, profile), (value, why) in _DISCRETISATION.items():
-            yield Limit(metric="position (discretisation)", value=value, engine=engine, profile=profile, why=why)
+        for (engine, profile), (value, why) in _STEP.items():
+            yield Limit(metric="largest position (step)", value=value, engine=engine, profile=profile, why=why)
         yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")
     for engine, profile, known in _OTHER_PHYSICS:
         yield Limit(metric="audit", engine=engine, profile=profile, known=known)

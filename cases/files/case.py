@@ -12,10 +12,11 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
+from crossbody.cases._control import Control
 from crossbody.cases._errors import SceneError, UnknownName
 from crossbody.cases._rotations import normalised
 from crossbody.cases.files.assemble import assembled
-from crossbody.cases.files.controls import pushed, read_controls
+from crossbody.cases.files.controls import pushed, read_control, read_controls, under
 from crossbody.cases.files.reading import findings_of, model_of, scene_of
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import contacts
@@ -27,6 +28,8 @@ PARAMETERS = {
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
     "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
+    "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
+    "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
     "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
     "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
@@ -67,11 +70,12 @@ class FileCase:
         scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
-        return case_of(
+        case = case_of(
             scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),
             findings=findings_of(self.path),
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
+        return under(case, read_control(str(p["control"]), float(p["tick"]))) if p["control"] else case
 
 
 def open_file(name: str) -> FileCase:
@@ -108,6 +112,7 @@ def case_of(
     q0: Any = None,
     v0: Any = None,
     inputs: Inputs | None = None,
+    control: Control | None = None,
     t_end: float = 1.0,
     parameters: Mapping[str, Value] | None = None,
     file: str = "",
@@ -122,6 +127,7 @@ def case_of(
         q0: start (nq,); the reference pose if not given.
         v0: velocities there (nv,); at rest if not given.
         inputs: controls of the actuators, then the components of the pushes; zero if not given.
+        control: gives the controls at its ticks; those of the inputs are zero then.
         t_end: horizon, s.
         parameters: of the case.
         file: where the scene comes from.
@@ -143,7 +149,7 @@ def case_of(
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         contacts=tuple(names), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
-        file=file, findings=findings,
+        control=control, file=file, findings=findings,
     )  # fmt: skip
 
 

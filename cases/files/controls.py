@@ -1,4 +1,4 @@
-"""What acts on a robot's file from outside: controls from a table, and pushes.
+"""What acts on a robot's file from outside: controls from a table or a controller of the user's own, and pushes.
 
 A table has a column t in s, and one for every actuator by its name.
 """
@@ -6,6 +6,7 @@ A table has a column t in s, and one for every actuator by its name.
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ import numpy as np
 
 from crossbody.cases._arguments import shown
 from crossbody.cases._arrays import Floats
-from crossbody.cases._case import Inputs
-from crossbody.cases._errors import InvalidValue
+from crossbody.cases._case import Case, Inputs
+from crossbody.cases._control import Control
+from crossbody.cases._errors import InvalidValue, UnknownName
+from crossbody.cases._own_file import from_file
 from crossbody.cases._regular import open_regular
 from crossbody.cases.scene import Push, Scene
 
@@ -76,6 +79,39 @@ def _check_size(size: int) -> None:
     """Refuse what a small file would unfold to."""
     if size > LARGEST:
         raise ValueError(f"the table needs {size / 1e6:.0f} MB in memory; valid: at most {LARGEST / 1e6:.0f} MB.")
+
+
+def read_control(text: str, tick: float) -> Control:
+    """Return the controller FILE.py:NAME.
+
+    Raises:
+        InvalidValue, UnknownName, SceneError: if it is not there, cannot be imported or cannot be called.
+    """
+    file, colon, name = text.rpartition(":")
+    if not (colon and file.endswith(".py") and name.isidentifier()):
+        raise InvalidValue(f"control is {shown(text)}; valid: FILE.py:NAME of a callable of (t, q, v), or of a class.")
+    module = from_file("controller", Path(file))
+    if not hasattr(module, name):
+        raise UnknownName(f"name in {file}", name, [one for one in vars(module) if not one.startswith("_")])
+    return Control(getattr(module, name), tick)
+
+
+def under(case: Case, control: Control) -> Case:
+    """Return a scene's case with a controller in place of the controls that a keyframe holds.
+
+    Raises:
+        InvalidValue: if it has a table of controls too.
+        SceneError: for a scene without actuators.
+    """
+    if case.parameters.get("ctrl"):
+        raise InvalidValue(f"{case.label} has a table of controls (ctrl) and a controller; valid: one of them.")
+    inputs = case.inputs
+    if inputs is not None and case.scene is not None:
+        values = inputs.values.copy()
+        values[:, : len(case.scene.actuators)] = 0.0
+        inputs = replace(inputs, values=values)
+    told = {"control": case.parameters.get("control") or control.label, "tick": control.tick}
+    return replace(case, control=control, inputs=inputs, parameters={**case.parameters, **told})
 
 
 def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Inputs | None]:

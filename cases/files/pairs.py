@@ -30,6 +30,15 @@ def pairs_of(model: Any, name: Callable[[int], str], law: Callable[[Any, Any, An
     return (*given, *(_mixed(model, a, b, name, law) for a, b in _met(model) if frozenset((a, b)) not in listed))
 
 
+def constants_of(model: Any, name: Callable[[int], str]) -> dict[frozenset[str], tuple[Any, Any]]:
+    """Return solref and solimp of every pair of shapes that may touch, by their names."""
+    listed = {
+        frozenset((name(int(a)), name(int(b)))): (model.pair_solref[i], model.pair_solimp[i])
+        for i, (a, b) in enumerate(zip(model.pair_geom1, model.pair_geom2, strict=True))
+    }
+    return {frozenset((name(a), name(b))): _softness(model, a, b) for a, b in _met(model)} | listed
+
+
 def _met(model: Any) -> Iterator[tuple[int, int]]:
     """Yield the numbers of shapes that the filters let touch."""
     import mujoco
@@ -69,14 +78,9 @@ def _mixed(model: Any, a: int, b: int, name: Callable[[int], str], law: Callable
     if order:
         ruling = a if order > 0 else b
         friction, dimension = model.geom_friction[ruling], int(model.geom_condim[ruling])
-        solref, solimp = model.geom_solref[ruling], model.geom_solimp[ruling]
     else:
         friction = np.maximum(model.geom_friction[a], model.geom_friction[b])
         dimension = int(max(model.geom_condim[a], model.geom_condim[b]))
-        share, one, two = _share(model, a, b), model.geom_solref[a], model.geom_solref[b]
-        direct = one[0] <= 0.0 or two[0] <= 0.0
-        solref = np.minimum(one, two) if direct else share * one + (1.0 - share) * two
-        solimp = share * model.geom_solimp[a] + (1.0 - share) * model.geom_solimp[b]
     slide, spin, roll = map(float, friction)
     return Pair(
         name=f"{name(a)}:{name(b)}",
@@ -85,8 +89,20 @@ def _mixed(model: Any, a: int, b: int, name: Callable[[int], str], law: Callable
         margin=float(model.geom_margin[a] + model.geom_margin[b]),
         friction=(slide, slide, spin, roll, roll),
         dimension=dimension,
-        law=law(model, solref, solimp),
+        law=law(model, *_softness(model, a, b)),
     )
+
+
+def _softness(model: Any, a: int, b: int) -> tuple[Any, Any]:
+    """Return solref and solimp of two shapes: of the one of higher priority, else a mean (the lesser, if direct)."""
+    order = int(model.geom_priority[a]) - int(model.geom_priority[b])
+    if order:
+        ruling = a if order > 0 else b
+        return model.geom_solref[ruling], model.geom_solimp[ruling]
+    share, one, two = _share(model, a, b), model.geom_solref[a], model.geom_solref[b]
+    direct = one[0] <= 0.0 or two[0] <= 0.0
+    solref = np.minimum(one, two) if direct else share * one + (1.0 - share) * two
+    return solref, share * model.geom_solimp[a] + (1.0 - share) * model.geom_solimp[b]
 
 
 def _share(model: Any, a: int, b: int) -> float:

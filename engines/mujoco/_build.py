@@ -111,8 +111,9 @@ def _add_contact(spec: Any, bodies: Mapping[str, Any], contact: Contact) -> None
     """Add a pair by itself, and its shapes where no other pair has added them; nothing else touches them."""
     for shape in (contact.first, contact.second):
         if spec.geom(shape.name) is None:
+            size = shape.size if shape.type != "plane" else (0.0, 0.0, 1.0)  # without end, and a grid to be drawn
             bodies[shape.body].add_geom(
-                name=shape.name, type=getattr(mujoco.mjtGeom, f"mjGEOM_{shape.type.upper()}"), size=shape.size,
+                name=shape.name, type=getattr(mujoco.mjtGeom, f"mjGEOM_{shape.type.upper()}"), size=size,
                 pos=shape.position, quat=shape.orientation, contype=0, conaffinity=0,
             )  # fmt: skip
     spec.add_pair(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
@@ -32,6 +33,7 @@ class MujocoRun:
     settings: Mapping[str, Any]
     said: tuple[str, ...]
     follows: Case | None = None
+    rounded: str = ""
     engine: str = "mujoco"
 
     def run(self) -> Trajectory:
@@ -47,10 +49,11 @@ class MujocoRun:
             start = perf_counter()
             march.run(case.t_end)
             wall = perf_counter() - start
-        words = [march.message, *(f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys((*self.said, *warned)))]
-        message = " ".join(w for w in words if w)
+        heard = (f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys((*self.said, *warned)))
+        message = " ".join(w for w in (march.message, self.rounded, *heard) if w)
         counts = {"located": march.trials}
-        return tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
+        found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
+        return found if scene.acting is None else scene.acting.told(found)
 
     def native(self) -> float:
         """Time in which MuJoCo's own loop makes the same steps, s.
@@ -74,7 +77,8 @@ class Mujoco:
     """MuJoCo 4; see `crossbody.engines.Engine`.
 
     A mechanism is a module here with `default_step(case, profile)` and `build(case, profile, dt) -> Scene`; or, with a
-    machine of its own, `prepare(case, profile, used) -> Run`. It may say `why_not(case, profile)`.
+    machine of its own, `prepare(case, profile, used) -> Run`. It may say `why_not(case, profile)`, and have
+    `settings(case, profile)`, which `build` takes by name.
     """
 
     name = "mujoco"
@@ -109,7 +113,8 @@ class Mujoco:
         Args:
             case: the scene.
             profile: one of `profiles`.
-            settings: dt, time step, s; max_steps, bound on their number.
+            settings: dt, time step, s; max_steps, bound on their number; reader, of a file as it stands: "file", or
+                "scene" for the model that is built from the scene, with the file's options and softness.
 
         Raises:
             UnknownName: for a profile or setting that does not exist.
@@ -120,13 +125,19 @@ class Mujoco:
         if reason is not None:
             raise CaseUnsupported(reason)
         mechanism = _mechanism(case.mechanism)
-        used = _settings.chosen(self.name, profile, _known(case, mechanism.default_step(case, profile)), settings)
+        known = _known(case, mechanism.default_step(case, profile))
+        known |= getattr(mechanism, "settings", lambda *_: {})(case, profile)
+        used = _settings.chosen(self.name, profile, known, settings)
+        dt, rounded = _dividing(case, float(used["dt"])) if "dt" in used else (0.0, "")
+        used = used | ({"dt": dt} if rounded else {})
+        own = profile == "matched" and "dt" not in settings  # nobody's step was changed
         with captured() as said:
             try:
                 if hasattr(mechanism, "prepare"):
                     run: Run = mechanism.prepare(case, profile, used)
                     return run
-                scene: Scene = mechanism.build(case, profile, float(used["dt"]))
+                more = {name: value for name, value in used.items() if name not in ("dt", "max_steps")}
+                scene: Scene = mechanism.build(case, profile, float(used["dt"]), **more)
             except CrossbodyError:
                 raise  # ours, and it is a ValueError too
             except ValueError as error:
@@ -134,7 +145,7 @@ class Mujoco:
         followed = getattr(mechanism, "followed", None)
         return MujocoRun(
             case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said),
-            follows=followed(case, profile) if followed else None,
+            follows=followed(case, profile) if followed else None, rounded="" if own else rounded,
         )  # fmt: skip
 
     def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
@@ -149,6 +160,20 @@ class Mujoco:
         if reason is not None:
             raise CaseUnsupported(reason)
         return linearise(_mechanism(case.mechanism), case, spot)
+
+
+def _dividing(case: Case, dt: float) -> tuple[float, str]:
+    """Return the largest step, s, up to dt with which equal steps meet every tick, and a sentence if it is not dt.
+
+    As in a user's own loop, which calls its controller between two steps.
+    """
+    if case.control is None:
+        return dt, ""
+    tick = case.control.tick
+    step = tick / math.ceil(tick / dt * (1.0 - 1e-9))
+    if abs(step - dt) <= 1e-9 * dt:
+        return dt, ""
+    return step, f"The step is {step:g} s and not {dt:g} s, which does not divide the controller's tick of {tick:g} s."
 
 
 def _known(case: Case, step: float) -> dict[str, Parameter]:

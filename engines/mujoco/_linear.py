@@ -100,7 +100,7 @@ def _same_coordinates(mechanism: ModuleType, dt: float) -> Callable[[Case, Spot]
         scene.data.qpos[:], scene.data.qvel[:] = spot.q, spot.v
         if scene.arm is not None:
             scene.arm(spot.modes(case))
-        return Stand(model=scene.model, data=scene.data, chart=same(len(spot.q)), hook=scene.hook)
+        return Stand(model=scene.model, data=scene.data, chart=same(len(spot.v)), hook=scene.hook)
 
     return stand
 

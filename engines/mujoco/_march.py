@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Mode, Outcome
+from crossbody.cases._control import NotFinite
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._locate import Locator
 from crossbody.engines.mujoco._scene import Scene
@@ -54,19 +55,28 @@ class March:
         """Step to t_end, s, a step cut to end there and at every instant at which the inputs change."""
         scene = self.scene
         scene.start()
-        instants = list(scene.instants)
-        if instants and instants[0] == 0.0:
-            scene.change(instants.pop(0))
+        instants = [t for t in scene.instants if t < t_end]
+        if instants and instants[0] == 0.0 and not self._change(instants.pop(0)):
+            return
         self.now = self._settled(scene.modes())
         self.tape.switch(0.0, tuple(m if m == Mode.BILATERAL else int(Mode.FREE) for m in self.now), self.now)
         self.tape.record(scene.lam(), self.now)
         for instant in instants:
-            if not self._until(instant):
+            if not self._until(instant) or not self._change(instant):
                 return
-            scene.change(instant)
             self.now = self._settled(self.now)
             self.tape.record(scene.lam(), self.now)
         self._until(t_end)
+
+    def _change(self, t: float) -> bool:
+        """Put in force what acts from t on, s; whether the run goes on."""
+        try:
+            self.scene.change(t)
+        except NotFinite as failure:
+            if not self.tape.n:  # behind the start the instant stands there already
+                self.tape.record(self.scene.lam(), self.scene.modes())
+            return self._end(Outcome.NOT_FINITE, str(failure).removesuffix("."))
+        return True
 
     def _until(self, t_end: float) -> bool:
         """Step to t_end, s; whether the run goes on."""

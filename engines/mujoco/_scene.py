@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from crossbody.engines._acting import Acting
 from crossbody.engines._log import Chart, Modes, Observe
 from crossbody.engines.mujoco._globals import Hook
 
@@ -31,6 +32,7 @@ class Scene:
         chart: positions and velocities of the model -> those of the case; None where they are the same.
         instants: when the inputs change, s, increasing.
         change: puts in force what acts from such an instant on.
+        acting: what a controller of the user's own gave in the run; None where there is none.
         hook: adds to efc_aref what solref cannot say, and sets forces that depend on the state; None if nothing.
         always: whether the hook acts while all rows are free too.
         arm: opens and closes rows to suit their modes (matched profile only).
@@ -51,6 +53,7 @@ class Scene:
     chart: Chart | None = None
     instants: Sequence[float] = ()
     change: Callable[[float], None] = _nothing
+    acting: Acting | None = None
     hook: Hook | None = None
     always: bool = False
     arm: Callable[[Modes], None] | None = None

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Mode, SceneError
+from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases._arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact
+from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._drift import Drift
-from crossbody.engines.mujoco._globals import Hook
+from crossbody.engines.mujoco._file import held, rebuilt
+from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix, numbers, pose_of
 from crossbody.engines.mujoco._scene import Scene as Prepared
 
@@ -45,6 +48,13 @@ def why_not(case: Case, profile: str) -> str | None:
     except SceneError as error:
         return str(error)
     return None
+
+
+def settings(case: Case, profile: str) -> dict[str, Parameter]:
+    """Return the setting that says who reads the file: MuJoCo, or the project, which builds its scene."""
+    if profile != "default":
+        return {}
+    return {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
 
 
 def default_step(case: Case, profile: str) -> float:
@@ -74,21 +84,26 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
 
 
-def build(case: Case, profile: str, dt: float) -> Prepared:
+def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared:
     """Compile the model of one profile.
 
     Raises:
         ValueError: MuJoCo's own, for a model that it refuses.
     """
     scene = _scene(case)
-    model = _from_file(case) if profile == "default" else matched(scene)
+    if profile == "default":
+        model = held(_from_file(case))
+        model = model if reader == "file" else rebuilt(scene, model)
+    else:
+        model = matched(scene)
     data = mujoco.MjData(model)
-    rows = Rows(scene, model, data)
+    rows, acting = Rows(scene, model, data), Acting(case)
     prepared = Prepared(
-        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data), modes=rows.modes,
+        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting), modes=rows.modes,
         lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
-        observe=rows.observe(), instants=() if case.inputs is None else case.inputs.times.tolist(),
-        change=_change(case, data), hook=rows.hook() if profile == "matched" else None, always=True,
+        observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting),
+        acting=acting if case.control is not None else None,
+        hook=rows.hook() if profile == "matched" else None, always=True,
     )  # fmt: skip
     prepared.audit = _audit(case, profile, model, rows)
     return prepared
@@ -120,8 +135,9 @@ def matched(scene: Scene) -> Any:
     return model
 
 
-def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
+def _start(case: Case, model: Any, data: Any, acting: Acting) -> Callable[[], None]:
     def start() -> None:
+        acting.reset()
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = case.q0, case.v0
         mujoco.mj_forward(model, data)  # the rows that are always on stand there only then
@@ -129,15 +145,14 @@ def _start(case: Case, model: Any, data: Any) -> Callable[[], None]:
     return start
 
 
-def _change(case: Case, data: Any) -> Callable[[float], None]:
-    given, scene = case.inputs, _scene(case)
+def _change(scene: Scene, data: Any, acting: Acting) -> Callable[[float], None]:
     bodies = numbers(scene)
     pushed = [bodies[push.body] for push in scene.pushes]
 
     def change(t: float) -> None:
-        if given is None:
-            return
-        controls, pushes = np.split(given.values[np.searchsorted(given.times, t)], [len(scene.actuators)])
+        with hooked(None) if acting.controller is not None else nullcontext():  # it may compute with MuJoCo itself
+            given = acting.at(t, data.qpos, data.qvel)
+        controls, pushes = np.split(given, [len(scene.actuators)])
         data.ctrl[:] = controls
         data.xfrc_applied[:] = 0.0
         np.add.at(data.xfrc_applied[:, :3], pushed, pushes.reshape(-1, 3))

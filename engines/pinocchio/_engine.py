@@ -91,7 +91,9 @@ class PinocchioRun:
         solver, counts = self.integrate(log)
         wall = perf_counter() - start
         chart = self.scene.chart
-        return log.trajectory(self.scene.observe, solver.outcome, solver.message, solver.steps, wall, counts, chart)
+        found = log.trajectory(self.scene.observe, solver.outcome, solver.message, solver.steps, wall, counts, chart)
+        acting = self.scene.world.acting
+        return found if acting is None else acting.told(found)
 
     def audit(self) -> Mapping[str, Any]:
         """The physics read back from the model."""

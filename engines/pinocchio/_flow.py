@@ -10,6 +10,7 @@ from sksundae.cvode import CVODE
 
 from crossbody.cases import Mode, Outcome
 from crossbody.cases._arrays import Floats
+from crossbody.cases._control import NotFinite
 from crossbody.engines._log import Log
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Settled, first_modes
 from crossbody.engines.pinocchio._coordinates import Coordinates
@@ -70,9 +71,10 @@ class Flow:
     def _run(self, y: Floats, t_end: float) -> None:
         """From one change of the inputs to the next."""
         instants = [t for t in self.world.instants if t < t_end]
-        if instants and instants[0] == 0.0:
-            self.world.change(instants.pop(0), y[: self.n].copy(), y[self.n :].copy())
+        changed = not instants or instants[0] > 0.0 or self._change(instants.pop(0), y)
         y = self._switch(0.0, y, frozenset(), first=True)
+        if not changed:
+            return
         t = 0.0
         for stop in (*instants, t_end):
             y = self._until(t, y, stop)
@@ -80,8 +82,17 @@ class Flow:
             if not self.outcome.ok:
                 return
             if t < t_end:
-                self.world.change(t, y[: self.n].copy(), y[self.n :].copy())
+                if not self._change(t, y):
+                    return
                 y = self._switch(t, y, frozenset(), first=True)
+
+    def _change(self, t: float, y: Floats) -> bool:
+        """Put in force what acts from t on, s; whether the run goes on."""
+        try:
+            self.world.change(t, y[: self.n].copy(), y[self.n :].copy())
+        except NotFinite as failure:
+            self._end(Outcome.NOT_FINITE, t, y, str(failure).removesuffix("."))
+        return self.outcome.ok
 
     def _until(self, t: float, y: Floats, end: float) -> Floats:
         """The state at `end`, s, or where the run ended."""

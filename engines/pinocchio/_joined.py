@@ -68,7 +68,9 @@ class Joined:
 
         def turned(end: End) -> Floats:
             none: Floats = np.zeros((3, self.model.nv))
-            return pin.getJointJacobian(self.model, self.data, end.joint, AXES)[3:] if end.joint else none
+            return (
+                pin.getJointJacobian(self.model, self.data, end.joint, AXES).reshape(6, -1)[3:] if end.joint else none
+            )
 
         return self._stacked(
             lambda one, two: carried(one) - carried(two),

@@ -71,7 +71,8 @@ def point_jacobian(model: Any, data: Any, joint: int, point: Floats) -> Floats:
     """Jacobian (3, nv) of the velocity of a point in the world that a joint carries, after computeJointJacobians."""
     if joint == 0:
         return np.zeros((3, model.nv))
-    J = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
+    found = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
+    J = found.reshape(6, model.nv)  # of one column it is a vector
     linear: Floats = J[:3] - pin.skew(point - data.oMi[joint].translation) @ J[3:]
     return linear
 

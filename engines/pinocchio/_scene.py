@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases._arrays import Floats
+from crossbody.engines._acting import Acting
 from crossbody.engines._log import Chart, Observe
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._rows import PinRows
@@ -32,12 +33,14 @@ class World:
         instants: when the inputs change, s, increasing.
         change: (t, q, v) puts in force what acts from such an instant on.
         reset: back to the start: no input, no memory.
+        acting: what a controller of the user's own gave in the run; None where there is none.
         safe: (q, v) -> whether the state is one that the scene can reach.
     """
 
     instants: Sequence[float] = ()
     change: Callable[[float, Floats, Floats], None] = _nothing
     reset: Callable[[], None] = lambda: None
+    acting: Acting | None = None
     safe: Callable[[Floats, Floats], bool] = _finite
 
 

@@ -12,6 +12,7 @@ from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.engines import _scene as parts
+from crossbody.engines._acting import Acting
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm
@@ -74,7 +75,7 @@ def build(case: Case, algebra: str) -> Prepared:
         rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
         sizes=(np.ones(to.nq), np.ones(to.nv)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
-        world=_world(case, forces), audit=_audit(scene, pinned, forces, apply, to),
+        world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
 
@@ -166,16 +167,22 @@ def _observe(
     return observe
 
 
-def _world(case: Case, forces: parts.Forces) -> World:
-    """The inputs, from one change to the next."""
-    given = case.inputs
-    if given is None:
-        return World()
+def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
+    """The inputs, from one change to the next; a controller is asked in the scene's coordinates."""
+    acting = Acting(case)
 
-    def change(t: float, _q: Floats, _v: Floats) -> None:
-        forces.change(given.values[np.searchsorted(given.times, t)])
+    def change(t: float, q: Floats, v: Floats) -> None:
+        r = q.copy()
+        to.normalise(r)
+        forces.change(acting.at(t, to.ours(r), to.velocities(r, v)))
 
-    return World(instants=given.times.tolist(), change=change, reset=forces.still)
+    def reset() -> None:
+        forces.still()
+        acting.reset()
+
+    return World(
+        instants=acting.instants, change=change, reset=reset, acting=acting if case.control is not None else None
+    )
 
 
 def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:

@@ -33,7 +33,7 @@ def check_analytic(system: System, t: float, q: Floats, v: Floats, u: Floats) ->
             reason = next((line.strip() for line in str(error).splitlines()[1:] if line.strip()), "")
             raise SceneError(f"Kernel {name} cannot be compiled for complex numbers: {reason}. {ADVICE}") from None
     draw = np.random.default_rng(0)
-    x, sizes = np.concatenate([q, v, u]), (system.n, 2 * system.n)
+    x, sizes = np.concatenate([q, v, u]), (system.nq, system.nq + system.n)
     d = (1.0 + np.abs(x)) * draw.standard_normal(len(x))
 
     def at(x: Any) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import SceneError
+from crossbody.cases._control import Control
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
 
@@ -31,7 +32,7 @@ class Point:
     Attributes:
         system: the mechanism.
         t: time, s.
-        q, v (n,), u (nu,): state and inputs.
+        q (nq,), v (n,), u (nu,): state and inputs.
         active (na,): the rows that are on.
         p: parameters in place of the system's own; complex for a step in one of them.
         alpha (nc, 3): a0, a1, a2 in force in place of the system's slow constants.
@@ -49,7 +50,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Derivatives:
-    """First derivatives at a point, by x = (q, v) and by u.
+    """First derivatives at a point, by x = (dq, v) and by u; dq are coordinates of the tangent space (`directions`).
 
     Attributes:
         vd (n,), lam (na,): accelerations and multipliers there.
@@ -70,17 +71,60 @@ class Derivatives:
     size: Floats
 
 
-def check_coordinates(system: System) -> None:
-    """Refuse a system whose linear model would have to live on the tangent space of its positions.
+def check_held(system: System) -> None:
+    """Refuse a system whose inputs follow from its state in a way that has no derivative.
 
     Raises:
-        SceneError: if its positions are not integrals of its velocities.
+        SceneError: if a controller in Python gives its inputs.
     """
+    if isinstance(system.control, Control):
+        raise SceneError(
+            f"System.control is the controller {system.control.label} in Python, which has no derivatives; "
+            "valid: the system without it, its inputs held."
+        )
+
+
+def check_coordinates(system: System) -> None:
+    """Refuse a system whose positions are not integrals of its velocities, where the tangent space is not enough.
+
+    Raises:
+        SceneError: if so, or as `check_held`.
+    """
+    check_held(system)
     if system.velocity is not None:
         raise SceneError(
-            "System.velocity is given: q' is not v. Linear models, trims, sensitivities and estimates of forces are "
-            "there for systems whose velocities are the derivatives of their positions alone."
+            "System.velocity is given: q' is not v. Derivatives at many states and estimates of forces are there for "
+            "systems whose velocities are the derivatives of their positions alone; valid: linearise, sensitivity."
         )
+
+
+def directions(system: System, q: Floats) -> Floats:
+    """N (nq, n): how positions change with the coordinates dq of the tangent space at q, which change as v acts."""
+    if system.velocity is None:
+        return np.eye(system.n)
+    return np.stack([system.displacement(q, e) for e in np.eye(system.n)], axis=-1)
+
+
+def turning(system: System, t: float, q: Floats, v: Floats) -> Floats:
+    """T (n, n) of dq' = T dq + dv along a motion: the tangent space moves with it; 0 where q' = v, and at rest.
+
+    With q' = F(q, v) = N(q) v + r(q) and a deviation N dq of the positions, N dq' = (dF/dq) N dq - (dN/dt) dq + N dv,
+    which for a quaternion is dq' = dv - v x dq. Both derivatives are complex steps through the kernel.
+    """
+    n = system.n
+    if system.velocity is None or not v.any():
+        return np.zeros((n, n))
+    N, p = directions(system, q), np.asarray(system.p).astype(complex)
+
+    def along(d: Floats, at: Floats) -> Floats:
+        """Derivative of F(q, at) along positions d."""
+        out = np.zeros(system.nq, complex)
+        system.velocity(t, q + 1j * STEP * d, at.astype(complex), p, out)
+        return np.asarray(out.imag / STEP)
+
+    flow, still = system.rates(q, v, t), np.zeros(n)
+    bent = [along(N[:, k], v) - along(flow, e) + along(flow, still) for k, e in enumerate(np.eye(n))]
+    return np.asarray(np.linalg.lstsq(N, np.stack(bent, axis=-1), rcond=None)[0], dtype=np.float64)
 
 
 def terms(at: Point, q: Array, v: Array, u: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -161,11 +205,10 @@ def derivatives(at: Point) -> Derivatives:
     n, nu, nc = at.system.n, at.system.inputs, at.system.nc
     K, vd, lam = saddle(at)
     columns, slopes = np.zeros((n + len(lam), 2 * n + nu)), np.zeros((2 * nc, 2 * n))
-    x = np.concatenate([at.q, at.v, at.u]).astype(complex)
-    for k in range(2 * n + nu):
-        moved = x.copy()
-        moved[k] += 1j * STEP
-        q, v, u = np.split(moved, [n, 2 * n])
+    steps = 1j * STEP * np.eye(2 * n + nu)
+    N = directions(at.system, at.q)
+    for k, step in enumerate(steps):
+        q, v, u = at.q + N @ step[:n], at.v + step[n : 2 * n], at.u + step[2 * n :]
         columns[:, k] = residual(at, q, v, u, vd, lam).imag / STEP
         if k < 2 * n:
             slopes[:, k] = gaps(at, q, v).imag / STEP

@@ -14,7 +14,7 @@ from crossbody.reference._indices import different
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._analytic import check_analytic
-from crossbody.reference.linear._derivatives import Derivatives, Point, check_coordinates, derivatives
+from crossbody.reference.linear._derivatives import Derivatives, Point, check_held, derivatives, turning
 from crossbody.reference.linear._model import LinearModel
 
 OUTPUTS = ("q", "v", "gap", "lam")
@@ -29,19 +29,22 @@ def linearise(
     """First-order model dx' = A dx + B du, dy = C dx + D du of v' = M^-1 (f + H_A^T lam) about a state, lam eliminated.
 
     The derivatives are exact (complex step through the kernels); time is frozen at t. It describes small motions about
-    an equilibrium; about a moving state it is the tangent of the right-hand side there. A sampled controller
+    an equilibrium; about a moving state it is the tangent of the right-hand side there. A compiled sampled controller
     (`System.control`) is not part of it.
+
+    Where q' is not v (quaternions) it lives on the tangent space: n coordinates dq that change as the velocities act,
+    for a quaternion the rotation vector from q in body axes, so that dq' = dv - v x dq about a turning state.
 
     Args:
         system: the mechanism with the law of its rows.
-        q: positions (n,).
+        q: positions (nq,).
         v: velocities (n,), zero if not given.
         u: inputs (nu,), zero if not given.
         active: rows that are on, all others are free; those that are always on (not unilateral), if not given.
         outputs: which of "q", "v", "gap", "lam" make up y, in this order; gap and lam of every row.
         reduce: hold the active rows at rest (dh = 0, dh' = 0) instead of following their law: a minimal set of states
             without the law's own poles (Baumgarte's double pole of a closed loop, say).
-        names: of the coordinates (n,); "q[0]", ... if not given.
+        names: of the coordinates (n,); "q[0]", ..., or "dq[0]", ... on a tangent space, if not given.
         t: time, s.
         colliding: active rows that follow their fast constants (COLLISION).
 
@@ -56,18 +59,19 @@ def linearise(
     at = point(system, q, v, u, active, t, colliding)
     found = derivatives(at)
     n, nu = system.n, system.inputs
-    chosen = tuple(f"q[{i}]" for i in range(n)) if names is None else tuple(names)
+    letter, T = "q" if system.velocity is None else "dq", turning(system, t, at.q, at.v)
+    chosen = tuple(f"{letter}[{i}]" for i in range(n)) if names is None else tuple(names)
     states = (*chosen, *(f"{name}'" for name in chosen))
     if len(chosen) != n:
         raise SceneError(f"linearise.names has {len(chosen)} entries; the system has {n} coordinates.")
     C, D, read = _outputs(system, at.active, found, outputs, states)
     model = LinearModel(
-        A=np.block([[np.zeros((n, n)), np.eye(n)], [found.vd_x]]), B=np.vstack([np.zeros((n, nu)), found.vd_u]),
+        A=np.block([[T, np.eye(n)], [found.vd_x]]), B=np.vstack([np.zeros((n, nu)), found.vd_u]),
         C=C, D=D, states=states, inputs=tuple(f"u[{i}]" for i in range(nu)), outputs=read,
     )  # fmt: skip
     if not reduce:
         return model
-    whole = np.block([[np.zeros((n, n)), np.eye(n), np.zeros((n, nu))], [found.size]])
+    whole = np.block([[np.abs(T), np.eye(n), np.zeros((n, nu))], [found.size]])
     return model.restricted(np.vstack([found.gap_x[at.active], found.rate_x[at.active]]), size=whole)
 
 
@@ -81,7 +85,7 @@ def point(
         SceneError: for a state of another shape, rows that do not exist, rows that collide without being on, or
             kernels that are not analytic.
     """
-    check_coordinates(system)
+    check_held(system)
     on = np.flatnonzero(np.asarray(system.unilateral) == 0).tolist() if active is None else active
     rows = different("active", on, system.nc)
     if not set(colliding) <= set(rows.tolist()):

@@ -16,7 +16,7 @@ from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
-from crossbody.reference.linear._derivatives import Point
+from crossbody.reference.linear._derivatives import Point, turning
 from crossbody.reference.linear._linearise import point
 from crossbody.reference.linear._variation import (
     Theta,
@@ -25,6 +25,7 @@ from crossbody.reference.linear._variation import (
     gradient,
     handover_gradient,
     lam_gradient,
+    rate_slopes,
     slopes,
     theta,
 )
@@ -64,8 +65,9 @@ class Sensitivity:
 
     Attributes:
         run: the motion.
-        state (2 n,): q and v at the end.
-        by_start (2 n, 2 n): derivative by q0 and v0. Of a periodic motion over its period, the monodromy matrix.
+        state (nq + n,): q and v at the end.
+        by_start (2 n, 2 n): derivative by q0 and v0, by coordinates of the tangent spaces at both ends where q' is not
+            v (as `linearise`). Of a periodic motion over its period, the monodromy matrix.
         by_parameters (2 n, k): derivative by the parameters.
         names: of the parameters.
         jumps: the events that were passed.
@@ -99,7 +101,7 @@ def sensitivity(
 
     Args:
         system: the mechanism, without a sampled controller.
-        q0: positions at the start (n,).
+        q0: positions at the start (nq,).
         v0: velocities at the start (n,).
         t_end: horizon, s.
         parameters: by name, "p[k]", or "a0[i]", "a1[i]", "a2[i]" of row i's slow law.
@@ -121,10 +123,10 @@ def sensitivity(
     if any(switch.t > 0.0 for switch in run.switches):
         raise SceneError("sensitivity: the motion switches discrete variables; end it before the first switch.")
     walk = _Walk(at, over, rtol)
-    outcome, n = walk.along(run, t_end) if run.outcome.ok else run.outcome, system.n
+    outcome, n, nq = walk.along(run, t_end) if run.outcome.ok else run.outcome, system.n, system.nq
     if not outcome.ok:
         walk.S[:] = np.nan
-    elif not (_same(walk.x[:n], run.q) and _same(walk.x[n:], run.v)):
+    elif not (_same(walk.x[:nq], run.q) and _same(walk.x[nq:], run.v)):
         raise SceneError(AS_ONE)  # touching rows share an impulse of which one event tells
     return Sensitivity(
         run=run, state=walk.x, by_start=walk.S[:, : 2 * n], by_parameters=walk.S[:, 2 * n :], names=over.names,
@@ -138,7 +140,7 @@ def _same(end: Floats, motion: Floats) -> bool:
 
 
 class _Walk:
-    """State x (2 n,) and its derivative S (2 n, 2 n + k) on the way through a motion."""
+    """State x (nq + n,) and its derivative S (2 n, 2 n + k) on the way through a motion."""
 
     def __init__(self, at: Point, over: Theta, rtol: float) -> None:
         n = at.system.n
@@ -162,11 +164,12 @@ class _Walk:
 
     def _here(self) -> Point:
         """The present state, with the rows and constants of the present modes."""
-        system, n = self.at.system, self.at.system.n
+        system, nq = self.at.system, self.at.system.nq
         modes = [self.modes[f] if f >= 0 else m for m, f in zip(self.modes, np.asarray(system.follows), strict=True)]
         fast = (np.array(modes) == Mode.COLLISION) & (np.asarray(system.b0) > 0.0)
         return replace(
-            self.at, q=self.x[:n].copy(), v=self.x[n:].copy(), alpha=np.where(fast[:, None], system.beta, system.alpha),
+            self.at, q=self.x[:nq].copy(), v=self.x[nq:].copy(),
+            alpha=np.where(fast[:, None], system.beta, system.alpha),
             active=np.array([i for i, mode in enumerate(modes) if mode in ACTIVE], dtype=np.int64),
         )  # fmt: skip
 
@@ -174,21 +177,26 @@ class _Walk:
         """Integrate x and S between two events."""
         if not end > start:
             return
-        here, n = self._here(), self.at.system.n
-        shape = self.S.shape
+        here, system = self._here(), self.at.system
+        n, nq, shape = system.n, system.nq, self.S.shape
 
         def rate(t: float, y: Floats) -> Floats:
-            moved = replace(here, t=t, q=y[:n].copy(), v=y[n : 2 * n].copy())
+            moved = replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + n].copy())
             f, _, slope = slopes(moved, self.over)
-            S = y[2 * n :].reshape(shape)
+            S = y[nq + n :].reshape(shape)
+            tangent = S[n:]
+            if system.velocity is not None:
+                tangent = tangent + turning(system, t, moved.q, moved.v) @ S[:n]
+                tangent[:, 2 * n :] += rate_slopes(moved, self.over)
             changed = slope[:n, : 2 * n] @ S
             changed[:, 2 * n :] += slope[:n, 2 * n :]
-            return np.concatenate([f, S[n:].ravel(), changed.ravel()])
+            return np.concatenate([system.rates(moved.q, moved.v, t), f[n:], tangent.ravel(), changed.ravel()])
 
         y = np.concatenate([self.x, self.S.ravel()])
-        scale = np.concatenate([np.full(2 * n, 1e-3), np.full(self.S.size, 1e-3)])
+        scale = np.full(len(y), 1e-3)
         done: Any = solve_ivp(rate, (start, end), y, method="DOP853", rtol=self.rtol, atol=self.rtol * scale)
-        self.x, self.S = done.y[: 2 * n, -1].copy(), done.y[2 * n :, -1].reshape(shape).copy()
+        self.x, self.S = done.y[: nq + n, -1].copy(), done.y[nq + n :, -1].reshape(shape).copy()
+        self.x[:nq] = system.normalised("sensitivity", self.x[:nq])
 
     def _event(self, piece: list[Event]) -> bool:
         """Pass one event, or one frozen collision with all that it does; False if it is only grazed."""
@@ -201,8 +209,8 @@ class _Walk:
             held = [i for i in before.active.tolist() if i not in let_go]
             struck = replace(before, active=np.array([*held, event.contact], dtype=np.int64))
             after = bounced(struck, event.contact, piece[1].after is Mode.CONTACT)
-            R = gradient(after, struck, self.over)
-            jumped = after(struck, self.x[:n], self.x[n:])
+            R = np.vstack([R[:n], gradient(after, struck, self.over)])
+            jumped = np.concatenate([struck.q, after(struck, struck.q, struck.v)])
         guard = None if start else self._guard(event, before)
         old, _, _ = slopes(before, self.over)
         for e in piece:

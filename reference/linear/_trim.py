@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,7 @@ from crossbody.cases._entry_points import checked_arguments
 from crossbody.reference._indices import different
 from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
-from crossbody.reference.linear._derivatives import STEP, Point, terms
+from crossbody.reference.linear._derivatives import STEP, Point, directions, terms
 from crossbody.reference.linear._linearise import point
 
 STEPS = 50
@@ -26,7 +26,7 @@ class Trim:
     """A steady motion v' = 0.
 
     Attributes:
-        q, v (n,), u (nu,): state and inputs.
+        q (nq,), v (n,), u (nu,): state and inputs.
         lam (na,): multipliers of the active rows, N.
         active (na,): these rows.
         residual: largest part of an equation's terms that is left.
@@ -57,11 +57,11 @@ def trim(
 
     Args:
         system: the mechanism.
-        q: positions (n,), a guess for those that are free.
+        q: positions (nq,), a guess for those that are free.
         v: velocities (n,), zero if not given.
         u: inputs (nu,), zero if not given.
         active: rows that are on; those that are always on, if not given.
-        free: coordinates that may move; all of them if not given.
+        free: coordinates that may move, of the tangent space where q' is not v; all of them if not given.
         rates: velocities that may change: of cyclic coordinates, which nothing depends on.
         inputs: inputs that may change.
         t: time, s.
@@ -74,9 +74,9 @@ def trim(
     places = different("trim.free", range(n) if free is None else free, n)
     moved = [places, n + different("trim.rates", rates, n), 2 * n + different("trim.inputs", inputs, nu)]
     unknown = np.concatenate([*moved, np.arange(2 * n + nu, 2 * n + nu + na)])
-    x = np.concatenate([at.q, at.v, at.u, np.zeros(na)])
+    x = np.concatenate([at.q if system.velocity is None else np.zeros(n), at.v, at.u, np.zeros(na)])
     x[2 * n + nu :] = _multipliers(at, x)
-    outcome, left, force = _solved(at, x, unknown)
+    at, outcome, left, force = _solved(at, x, unknown)
     lam = x[2 * n + nu :]
     pulls = (
         (lam < -1e3 * SETTLED * force)
@@ -84,15 +84,35 @@ def trim(
         & (np.asarray(system.a0)[at.active] > 0)
     )
     return Trim(
-        q=x[:n], v=x[n : 2 * n], u=x[2 * n : 2 * n + nu], lam=lam, active=at.active, residual=left, outcome=outcome,
-        pulling=tuple(at.active[pulls].tolist()),
+        q=_placed(at, x[:n]), v=x[n : 2 * n], u=x[2 * n : 2 * n + nu], lam=lam, active=at.active, residual=left,
+        outcome=outcome, pulling=tuple(at.active[pulls].tolist()),
     )  # fmt: skip
+
+
+def _placed(at: Point, d: Array) -> Array:
+    """Positions (nq,) of the unknowns d (n,): q themselves, or a chart of the tangent space about the guess."""
+    system = at.system
+    if system.velocity is None:
+        return d
+    q: Array = at.q + directions(system, at.q) @ d
+    for entries in system.quaternion_entries:
+        q[entries] /= np.sqrt(np.sum(q[entries] ** 2))  # of a complex step too
+    return q
+
+
+def _sizes(at: Point, x: Floats) -> Floats:
+    """How large the unknowns are: those on a tangent space by the positions that they turn and shift."""
+    sizes = np.abs(x)
+    if at.system.velocity is not None:
+        sizes[: at.system.n] += np.abs(directions(at.system, at.q)).T @ np.abs(at.q)
+    return sizes
 
 
 def _balance(at: Point, x: Array) -> tuple[Array, Floats]:
     """The equations that must vanish, and the size of their terms."""
     n, nu = at.system.n, at.system.inputs
-    q, v, u, lam = np.split(x, [n, 2 * n, 2 * n + nu])
+    d, v, u, lam = np.split(x, [n, 2 * n, 2 * n + nu])
+    q = _placed(at, d)
     _, f, H, h, _ = terms(at, q, v, u)
     a0, _, a2 = at.system.alpha[at.active].T
     stiff = (a0 > 0.0) | (a2 > 0.0)
@@ -105,33 +125,44 @@ def _balance(at: Point, x: Array) -> tuple[Array, Floats]:
 def _multipliers(at: Point, x: Floats) -> Floats:
     """The multipliers that balance the forces best."""
     n = at.system.n
-    _, f, H, _, _ = terms(at, *np.split(x[: 2 * n + at.system.inputs], [n, 2 * n]))
+    d, v, u = np.split(x[: 2 * n + at.system.inputs], [n, 2 * n])
+    _, f, H, _, _ = terms(at, _placed(at, d), v, u)
     if not (np.isfinite(f).all() and np.isfinite(H).all()):
         return np.zeros(len(H))
     return np.asarray(np.linalg.lstsq(H.T, -f, rcond=None)[0], dtype=np.float64)
 
 
-def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Outcome, float, float]:
-    """Improve x in place; how it ended, what is left, and the size of the forces."""
+def _recentred(at: Point, x: Floats) -> Point:
+    """The point with its chart about where x has come to, x in place; itself where positions are the unknowns."""
+    if at.system.velocity is None:
+        return at
+    moved = replace(at, q=_placed(at, x[: at.system.n]))
+    x[: at.system.n] = 0.0
+    return moved
+
+
+def _solved(at: Point, x: Floats, unknown: Index) -> tuple[Point, Outcome, float, float]:
+    """Improve x in place; the point of its chart, how it ended, what is left, and the size of the forces."""
     value, size = _balance(at, x)
     if not np.isfinite(value).all():
-        return Outcome.NOT_FINITE, np.inf, np.inf
+        return at, Outcome.NOT_FINITE, np.inf, np.inf
     J = _jacobian(at, x, unknown)
     # Forces that vanish in equilibrium leave no scale of their own: what they are made of does.
-    size[: at.system.n] = max(size[0], (np.abs(J[: at.system.n]) @ np.abs(x[unknown])).max(initial=0.0))
+    size[: at.system.n] = max(size[0], (np.abs(J[: at.system.n]) @ _sizes(at, x)[unknown]).max(initial=0.0))
     least, left = size, float(np.abs(value / size).max(initial=0.0))
     for _ in range(STEPS):
         if left <= SETTLED:
-            return Outcome.FINISHED, left, size[0]
+            return at, Outcome.FINISHED, left, size[0]
         if not np.isfinite(J).all():
-            return Outcome.ILL_POSED, left, size[0]
+            return at, Outcome.ILL_POSED, left, size[0]
         step: Floats = np.linalg.lstsq(J / size[:, None], -value / size, rcond=1e-12)[0].astype(np.float64)
         better = _searched(at, x, unknown, step, left, least)
         if better is None:
             break
         value, size, left = better
+        at = _recentred(at, x)
         J = _jacobian(at, x, unknown)
-    return (Outcome.FINISHED if left <= 1e3 * SETTLED else Outcome.STEP_LIMIT), left, size[0]
+    return at, (Outcome.FINISHED if left <= 1e3 * SETTLED else Outcome.STEP_LIMIT), left, size[0]
 
 
 def _jacobian(at: Point, x: Floats, unknown: Index) -> Floats:

@@ -18,7 +18,7 @@ from crossbody.cases import UnknownName
 from crossbody.cases._closed_forms import damping_ratio, restitution
 from crossbody.reference._kinds import Array, Floats
 from crossbody.reference._system import System
-from crossbody.reference.linear._derivatives import STEP, Point, dense, gaps, residual, saddle, terms
+from crossbody.reference.linear._derivatives import STEP, Point, dense, directions, gaps, residual, saddle, terms
 
 HANDOVER = 0.01
 """Elastic part of lam at which COLLISION becomes CONTACT (spec 1.2)."""
@@ -64,20 +64,19 @@ def theta(system: System, names: Sequence[str]) -> Theta:
 
 
 def gradient(function: Callable[[Point, Array, Array], Array], at: Point, over: Theta) -> Floats:
-    """Derivative of function(at, q, v) by (q, v, theta), by complex step; the last axis is that of the variables."""
+    """Derivative of function(at, q, v) by (dq, v, theta), by complex step; the last axis is that of the variables."""
     n, columns = at.system.n, []
-    x = np.concatenate([at.q, at.v]).astype(complex)
-    for k in range(2 * n):
-        moved = x.copy()
-        moved[k] += 1j * STEP
-        columns.append(function(at, moved[:n], moved[n:]).imag / STEP)
+    N = directions(at.system, at.q)
+    for step in 1j * STEP * np.eye(2 * n):
+        columns.append(function(at, at.q + N @ step[:n], at.v + step[n:]).imag / STEP)
     for k in range(len(over.places)):
-        columns.append(np.asarray(function(over.moved(at, k), x[:n], x[n:])).imag / STEP)
+        q, v = at.q.astype(complex), at.v.astype(complex)
+        columns.append(np.asarray(function(over.moved(at, k), q, v)).imag / STEP)
     return np.stack(columns, axis=-1)
 
 
 def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
-    """Right-hand side f (2 n,), multipliers (na,), and the derivatives of (v', lam) by (q, v, theta).
+    """Rates (v, v') (2 n,), multipliers (na,), and the derivatives of (v', lam) by (dq, v, theta).
 
     Raises:
         SceneError: where the active rows are redundant or a value is not finite.
@@ -85,6 +84,18 @@ def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
     K, vd, lam = saddle(at)
     columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
     return np.concatenate([at.v, vd]), lam, -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
+
+
+def rate_slopes(at: Point, over: Theta) -> Floats:
+    """Derivative (n, k) of dq' by the parameters at fixed q and v, where the kernel `velocity` reads them."""
+    system, columns = at.system, [np.zeros(at.system.nq)]
+    for k in range(len(over.places)):
+        p, out = over.moved(at, k).p, np.zeros(system.nq, complex)
+        if p is not None:  # else it is one of the law
+            system.velocity(at.t, at.q.astype(complex), at.v.astype(complex), p, out)
+        columns.append(out.imag / STEP)
+    found = np.linalg.lstsq(directions(system, at.q), np.stack(columns, axis=-1), rcond=None)[0]
+    return np.asarray(found[:, 1:], dtype=np.float64)
 
 
 def gap_gradient(at: Point, over: Theta, i: int, *, rate: bool = False) -> Floats:
@@ -125,7 +136,7 @@ def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
 
 
 def bounced(at: Point, i: int, captured: bool) -> Callable[[Point, Array, Array], Array]:
-    """The map (q, v) -> (q, v+) of a frozen collision of row i while the other active rows stay held (spec 1.2)."""
+    """The map (q, v) -> v+ of a frozen collision of row i while the other active rows stay held (spec 1.2)."""
     j = at.active.tolist().index(i)
     b0, b1, _ = at.system.beta[i]
     share = 1.0 if captured else 1.0 + restitution(damping_ratio(float(b0), float(b1)))
@@ -134,6 +145,7 @@ def bounced(at: Point, i: int, captured: bool) -> Callable[[Point, Array, Array]
         blocks, _, H, _, _ = terms(here, q, v, at.u)
         X = np.linalg.solve(dense(blocks), H.T)
         impulse = np.linalg.solve(H @ X, np.eye(len(H))[j])
-        return np.concatenate([q, v - share * (H[j] @ v) * (X @ impulse)])
+        after: Array = v - share * (H[j] @ v) * (X @ impulse)
+        return after
 
     return after

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from math import isfinite
 from types import MappingProxyType
 
 import numpy as np
 
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
+from crossbody.cases._control import Control, NotFinite
 from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
@@ -87,6 +89,7 @@ class SundialsRun:
         self.next_sample = self.next_input = self.next_tick = 0
         self.retries = self.still = 0
         self.ended_rows: list[int] = []
+        self.failed = ""  # what a controller in Python gave that is not finite
         self.told = 0  # events of which the mechanism's `switch` knows
 
     def _machine(self, e: Equations) -> LevelMachine:
@@ -96,6 +99,8 @@ class SundialsRun:
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
+        control = self.system.control
+        self.controller = control.begin(self.system.inputs) if isinstance(control, Control) else None
         began = time.perf_counter()
         self.start()
         outcome = Outcome.FINISHED
@@ -286,15 +291,35 @@ class SundialsRun:
         """Put the inputs that hold from now on in force; the next instant at which they change."""
         s, system = self.state, self.system
         while self.next_input < len(self.inputs_t) and self.inputs_t[self.next_input] <= s.t:
-            self.equations.u[:] = self.inputs_u[self.next_input]
+            now = self.inputs_u[self.next_input]
+            if system.control is None:
+                self.equations.u[:] = now
+            else:  # by its change, so that what a controller holds on top stays
+                self.equations.u += now - (self.inputs_u[self.next_input - 1] if self.next_input else 0.0)
             self.next_input += 1
         if system.control is not None and self.next_tick * system.tick <= s.t:
-            self.equations.control(s.t, s.q, s.v)
+            self._control(s)
             self.next_tick += 1
         stops = [self.options.t_end, *self.inputs_t[self.next_input : self.next_input + 1].tolist()]
         if system.control is not None:
             stops.append(self.next_tick * system.tick)
         return float(min(stops))
+
+    def _control(self, s: State) -> None:
+        """Let the sampled controller set the inputs.
+
+        Raises:
+            Ended: NOT_FINITE if one in Python gives NaN or infinity.
+        """
+        if self.controller is None:
+            self.equations.control(s.t, s.q, s.v)
+            return
+        try:
+            given = self.controller(s.t, s.q, s.v)
+        except NotFinite as failure:
+            self.failed = f"{failure} "
+            raise Ended(Outcome.NOT_FINITE) from None
+        self.equations.u[: self.controller.width] = given[: self.controller.width]
 
     def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
         """What was recorded, as a Trajectory."""
@@ -318,6 +343,9 @@ class SundialsRun:
             counts=MappingProxyType({"rhs": self.scene.evaluations}),
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
         )  # fmt: skip
+        if self.controller is not None:
+            given = self.controller.given(self.inputs_t, self.inputs_u)
+            run = replace(run, inputs=given, control_s=self.controller.seconds)
         return watched(self.system, run)
 
     def _message(self, outcome: Outcome) -> str:
@@ -326,7 +354,7 @@ class SundialsRun:
         s = self.state
         rows = f"Rows {self.ended_rows}, " if self.ended_rows else ""
         if outcome is Outcome.NOT_FINITE:
-            rows = self._blamed()
+            rows = self.failed or self._blamed()
         elif outcome is Outcome.ILL_POSED and self.ended_rows:
             rows = dependence(self.system, np.array(self.ended_rows), s.q, s.v)
         return f"{outcome.advice} {rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}."

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Law
+from crossbody.cases._control import Control
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
 from crossbody.reference._kinds import Floats
@@ -16,7 +17,7 @@ from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import tabulate
 
 
-def system(scene: Scene, law: Law, q0: Floats | None = None) -> System:
+def system(scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None) -> System:
     """Return the equations of a scene; nothing is compiled for it.
 
     Args:
@@ -24,6 +25,7 @@ def system(scene: Scene, law: Law, q0: Floats | None = None) -> System:
         law: of its rows.
         q0: an assembled start (nq,), at which rows of loops that follow from others are found and left out; without it
             none is.
+        control: of the user's own, which gives the controls.
 
     Raises:
         SceneError: for a scene that the kernels cannot do.
@@ -33,7 +35,7 @@ def system(scene: Scene, law: Law, q0: Floats | None = None) -> System:
     fields: dict[str, Any] = dict(
         n=scene.nv, nq=scene.nq, parameters=table.p, **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
-        inputs=len(scene.inputs), scratch=table.scratch, **KERNELS,
+        inputs=len(scene.inputs), scratch=table.scratch, control=control, **KERNELS,
     )  # fmt: skip
     whole = System(**fields)
     if q0 is None or not scene.loops:

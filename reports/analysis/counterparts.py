@@ -73,7 +73,7 @@ def _ways(name: str, place: Place) -> tuple[Tangent, ...]:
 
 def _compared(place: Place, way: Tangent) -> tuple[dict[str, Any], list[dict[str, float]]]:
     """One way beside the reference: its row, and its poles."""
-    n = len(place.trim.q)
+    n = len(place.trim.v)
     full = place.linearised(reduce=False).A
     expected, own = (_poles(place, A) for A in (full, np.vstack([np.eye(n, 2 * n, n), way.slope])))
     own = own[_nearest(expected, own)]

@@ -27,8 +27,9 @@ def equilibria(found: Sequence[Place], case: Case) -> pd.DataFrame:
     rows = []
     for place in found:
         t = place.trim
-        named = list(zip([c.name for c in case.coordinates], t.q.tolist(), t.v.tolist(), strict=True))
-        values = [*((k, x) for k, x, _ in named), *((f"{k}'", rate) for k, _, rate in named if rate)]
+        values = list(zip([c.name for c in case.coordinates], t.q.tolist(), strict=True))
+        rates = zip([f"{c.name}'" for c in case.velocities], t.v.tolist(), strict=True)
+        values += [(name, rate) for name, rate in rates if rate]
         values += [(f"u[{i}]", x) for i, x in enumerate(t.u.tolist())]
         values += [(f"lam {case.contacts[i]}", x) for i, x in zip(t.active.tolist(), t.lam.tolist(), strict=True)]
         rows += [{"place": place.name, "outcome": t.outcome.value, "variable": k, "value": x} for k, x in values]

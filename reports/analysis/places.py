@@ -61,7 +61,7 @@ class Place:
 
     def linearised(self, *, reduce: bool) -> LinearModel:
         """The model from all inputs to q and v: of all states, or of those that the rows leave."""
-        names, found = [coordinate.name for coordinate in self.case.coordinates], self.trim
+        names, found = [coordinate.name for coordinate in self.case.velocities], self.trim
         return linearise(
             self.system, found.q, found.v, found.u, found.active.tolist(), outputs=("q", "v"), names=names,
             reduce=reduce, t=self.t,
@@ -103,7 +103,7 @@ def _place(
     found = trim(made, case.q0 if q is None else q, v, active=active, free=free, rates=rates, inputs=inputs, t=t)
     model = None
     if found.outcome.ok:
-        names = [coordinate.name for coordinate in case.coordinates]
+        names = [coordinate.name for coordinate in case.velocities]
         model = linearise(made, found.q, found.v, found.u, active, names=names, reduce=held, t=t)
     return Place(
         name=name, case=case, system=made, trim=found, model=model, t=t, held=held, powered=system is None

@@ -24,7 +24,7 @@ from crossbody.reports.voice import progress
 
 SHOWN = {
     "bench": ["case", "engine", "profile", "knob", "setting", "error", "honesty", "error_between", "median_ms",
-              "iqr_ms", "call_ms", "native_ms", "outcome"],
+              "iqr_ms", "call_ms", "native_ms", "control_ms", "outcome"],
     "orders": ["case", "engine", "profile", "knob", "order", "promised", "says"],
     "headline": ["case", "engine", "profile", "tier", "best_error", "engine_ms", "reference_ms", "ratio",
                  "ratio_native", "least_ratio", "ahead", "says"],

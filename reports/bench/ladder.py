@@ -59,6 +59,7 @@ class Ladder:
         knob = next((name for name in LADDERS if name in plain.settings), "")
         if not knob:
             yield "", math.nan, plain
+        met: set[float] = set()
         for setting in LADDERS.get(knob, ())[:: self.effort.every]:
             if self._too_long():
                 return
@@ -68,7 +69,10 @@ class Ladder:
                     run = engines.load(self.pick.engine).prepare(self.case, self.pick.profile, **given)
                 except InvalidValue:  # finer than the engine admits
                     return
-                yield knob, setting, run
+                used = float(run.settings[knob])  # a controller's tick may ask for a smaller step
+                if used not in met:
+                    met.add(used)
+                    yield knob, used, run
 
     def climbed(self, took: float, steps: int) -> None:
         """Tell what the rung cost: wall time, s, and steps."""

@@ -28,8 +28,8 @@ from crossbody.reports.runs.jobs import Pick
 
 COLUMNS = (
     "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "touches",
-    "error_between", "honesty", "median_ms", "iqr_ms", "call_ms", "native_ms", "interpreted", "cores", "repeats",
-    "steps", "outcome", "promised",
+    "error_between", "honesty", "median_ms", "iqr_ms", "call_ms", "native_ms", "control_ms", "interpreted",
+    "cores", "repeats", "steps", "outcome", "promised",
 )  # fmt: skip
 
 
@@ -55,12 +55,14 @@ class Rung:
     inner: list[float] = field(default_factory=list)
     call: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
+    control: list[float] = field(default_factory=list)
 
     def note(self, run: Trajectory, took: float, cores: float) -> None:
         """One timed run: its own clock, the whole call, s, and processor time over wall time."""
         self.inner.append(run.wall_s or took)
         self.call.append(took)
         self.cpu.append(cores)
+        self.control.append(run.control_s)
 
 
 def _rungs(
@@ -140,7 +142,8 @@ def bench(
     Returns:
         One row a rung, columns `COLUMNS`; errors and honesty (error over tolerance) are ratios, event times in s;
         error_between is the position's on one grid for all, interpreted what of a run is Python, and native_ms the time
-        of the engine's own loop over the same steps without that;
+        of the engine's own loop over the same steps without that, and without a controller in Python, whose part of
+        the median is control_ms;
         cores is processor time over wall time: 1 for one thread.
     """
     effort = Effort(repeats=effort) if isinstance(effort, int) else effort
@@ -160,7 +163,8 @@ def _row(case: Case, rung: Rung) -> dict[str, Any]:
         "honesty": rung.errors["error"] / rung.setting if rung.knob == "rtol" else math.nan,
         "median_ms": median, "iqr_ms": high - low, "call_ms": 1e3 * float(np.median(rung.call)),
         "native_ms": 1e3 * min((rung.run.native() for _ in range(NATIVE)), default=math.nan)
-        if hasattr(rung.run, "native") else math.nan, "interpreted": rung.interpreted,
+        if hasattr(rung.run, "native") else math.nan, "control_ms": 1e3 * float(np.median(rung.control)),
+        "interpreted": rung.interpreted,
         "cores": float(np.median(rung.cpu)), "repeats": len(rung.call), "steps": rung.first.steps,
         "outcome": rung.first.outcome.value, "promised": rung.promised,
     }  # fmt: skip

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from crossbody.cases import Case, Claim, InvalidValue, Limit, Tier, Trajectory, UnknownName
+from crossbody.cases import Case, Claim, InvalidValue, Limit, Trajectory, UnknownName
 from crossbody.cases._arguments import instance, shown
 from crossbody.cases._arrays import Floats
 from crossbody.cases._defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
+from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, splits
 from crossbody.reports.judging.stored import Deviations, defaults, deviations, differing, words
-from crossbody.reports.judging.truth import Truth, from_run, truth_of
+from crossbody.reports.judging.truth import Truth, truth_of
 from crossbody.reports.judging.verdict import (
     Regression,
     Verdict,
@@ -34,9 +35,8 @@ if TYPE_CHECKING:
 
 TRUTH = "truth"
 """Engine and metric of the row that judges the truth itself."""
-SPLIT = ("position", "event_times")
-"""Errors that are told apart into model and discretisation."""
-PARTS = ("model", "discretisation")
+LARGEST = "largest"
+"""Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 FLOOR = 0.5
 """A number is judged where at least this part of the time for which the truth must be trusted was compared."""
 REACHED = 1e-9
@@ -56,7 +56,7 @@ class Entry:
         run: the motion; None if it was skipped.
         skipped: why, in one sentence.
         audit: what reached the engine beside the reference.
-        refined: the same engine with a much finer step or tolerance, to tell model from discretisation.
+        study: runs of the same engine with other steps or tolerances, which tell the parts of its error.
         stepped: ends of the run's own steps, s, where `run` was asked for other instants; None where they are its own.
         own: truth of the equations that the engine really integrates; None where they are the case's own.
         hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
@@ -70,7 +70,7 @@ class Entry:
     run: Trajectory | None = None
     skipped: str = ""
     audit: tuple[AuditRow, ...] = ()
-    refined: Trajectory | None = None
+    study: Study | None = None
     stepped: Floats | None = None
     own: Truth | None = None
     hidden: Mapping[str, str] = field(default_factory=dict)
@@ -120,10 +120,18 @@ def table(rows: Iterable[Verdict]) -> pd.DataFrame:
     return pd.DataFrame([row.row() for row in rows], columns=list(Verdict.__dataclass_fields__))
 
 
+def part_of(metric: str, part: str) -> str:
+    """Name of the row that says how much of the worst error of a metric a part is."""
+    return f"{metric} ({part})"
+
+
+PART_ROWS = tuple(part_of(metric, part) for metric in SPLIT for part in PARTS)
+LARGEST_PARTS = tuple(f"{LARGEST} {name}" for name in PART_ROWS)
+
+
 def judges_parts(case: Case, engine: str, profile: str) -> bool:
-    """Whether a limit asks for the model or the discretisation error of an engine."""
-    names = (f"{name} ({part})" for name in SPLIT for part in PARTS)
-    return any(limit_for(limits_of(case), name, engine, profile) is not None for name in names)
+    """Whether a limit asks for a part of the error of an engine."""
+    return any(limit_for(limits_of(case), name, engine, profile) is not None for name in LARGEST_PARTS)
 
 
 def check_names(case: Case) -> None:
@@ -136,7 +144,7 @@ def check_names(case: Case) -> None:
     from crossbody import engines
     from crossbody.cases import _registry
 
-    known = {*metrics.names(), "audit", "*", *(f"{name} ({part})" for name in SPLIT for part in PARTS)}
+    known = {*metrics.names(), "audit", "*", *LARGEST_PARTS}
     for kind, named in (("claims", case.claims), ("limits", case.limits)):
         for name in (each.metric for each in named):
             if name not in known:
@@ -268,7 +276,7 @@ def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
     found = {
         row.metric: deviation(row.value, claims.get(row.metric))
         for row in rows
-        if row.metric not in ("finished", "settings", "audit")
+        if row.metric not in ("finished", "settings", "audit", *PART_ROWS)
         and not (math.isnan(row.limit) and not math.isnan(row.value))
     }
     return found | {f"audit {row.quantity}": row.difference for row in entry.audit if not row.ok}
@@ -384,25 +392,27 @@ def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, cas
 
 
 def _split(judge_: _Judge) -> Iterator[Verdict]:
-    """Discretisation error apart from model error (refined against the truth).
-
-    Discretisation is the run against the truth of the equations that the engine follows, or against its refined self.
-    """
+    """How much of the worst error is the importer's, the model's and the step's, and the largest of each anywhere."""
     entry = judge_.entry
-    if entry.refined is None or entry.run is None:
+    if entry.run is None or (entry.study is None and entry.own is None):
         return
-    sides = [(PARTS[0], judge_.truth, entry.refined)]
-    if entry.own is not None:
-        sides.append((PARTS[1], entry.own, entry.run))
-    elif "dt" in entry.settings:  # a tolerance is refined to rounding: what is left is the model error alone
-        sides.append((PARTS[1], from_run(entry.refined, Tier.D, "the same engine refined"), entry.run))
-    for name in SPLIT:
-        metric = metrics.load(name)
-        for label, against, run in sides:
-            try:
-                value, compared = _value(metric, name, against, run, judge_.case)
-            except Exception as error:
-                yield judge_.row(f"{name} ({label})", math.nan, metric.UNIT, Word.CRASHED, crash(error))
-                continue
-            if value is not None:
-                yield judge_.judged(f"{name} ({label})", value, metric.UNIT, against, compared)
+    try:
+        found = splits(judge_.case, judge_.truth, entry.run, entry.study or Study(), entry.own)
+    except Exception as error:
+        yield judge_.row(part_of("position", "step"), math.nan, "1", Word.CRASHED, crash(error))
+        return
+    for name, parts in found.items():
+        yield from (row for part in PARTS for row in _part(judge_, name, part, parts, metrics.load(name).UNIT))
+
+
+def _part(judge_: _Judge, name: str, part: str, found: Split, unit: str) -> Iterator[Verdict]:
+    row = part_of(name, part)
+    if part in found.missing:
+        yield judge_.row(row, math.nan, unit, Word.INFO, f"Not measured. {found.missing[part]}")
+    if part not in found.there:
+        return
+    why = f"Of the error of {found.where}. {found.says if part != 'importer' else ''}".strip()
+    known = found.known[part]
+    yield judge_.row(row, found.there[part], unit, Word.INFO, why, known=known)
+    against = judge_.truth if part != "step" or judge_.entry.own is None else judge_.entry.own
+    yield replace(judge_.judged(f"{LARGEST} {row}", found.largest[part], unit, against, 1.0), known=known)

@@ -30,5 +30,6 @@ def violated(case: Case, run: Trajectory, rtol: float) -> tuple[Violation, ...] 
         prepared: Any = load("reference").prepare(case, "compiled")
     except CaseUnsupported:
         return None
-    inputs = None if case.inputs is None else (case.inputs.times, case.inputs.values)
+    acted = case.inputs if case.control is None else run.inputs
+    inputs = None if acted is None else (acted.times, acted.values)
     return recheck(prepared.system, run, rtol=rtol, inputs=inputs, collisions=case.collisions)

@@ -124,7 +124,7 @@ def cache_of_one(function: Callable[[Floats], Trajectory]) -> Callable[[Floats],
 def law_of(followed: Case) -> Truth | None:
     """The truth of the equations that an engine really integrates, where they are not the case's own (spec 4.1).
 
-    Against it an engine has a discretisation error alone. It is known by the reference itself (tier D).
+    Against it an engine has a step error alone. It is known by the reference itself (tier D).
 
     Args:
         followed: the case with the engine's machine and collision rule (`follows` of its run).

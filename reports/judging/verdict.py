@@ -58,6 +58,7 @@ class Verdict:
         band: largest distance from `expected` that is no regression, ten times what a stored run of this version gave;
             NaN where none is stored.
         regression: "kept" or "lost" by that band; empty without one.
+        known: what the number is known to, of a part of an error; NaN where nothing is said. One below it is none.
     """
 
     case: str
@@ -77,6 +78,7 @@ class Verdict:
     compared: float = 1.0
     band: float = math.nan
     regression: str = ""
+    known: float = math.nan
 
     def row(self) -> dict[str, Any]:
         """As plain values."""

@@ -23,7 +23,7 @@ from crossbody.reports.metrics._equations import equations, finite, spread
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from crossbody.cases import Case, Trajectory
+    from crossbody.cases import Case, Inputs, Trajectory
     from crossbody.reference import System
     from crossbody.reports.judging.truth import Truth
 
@@ -33,10 +33,17 @@ NEEDS = "lam"
 
 
 def multipliers(
-    system: System, case: Case, t: float, q: Floats, v: Floats, rows: NDArray[np.intp], fast: NDArray[np.bool_]
+    system: System,
+    case: Case,
+    t: float,
+    q: Floats,
+    v: Floats,
+    rows: NDArray[np.intp],
+    fast: NDArray[np.bool_],
+    inputs: Inputs | None = None,
 ) -> Floats:
     """Lam (len(rows),) that the law asks for at one state with those rows active, `fast` with those of COLLISION."""
-    M, f = system.terms(q, v, u=_held(case, t), t=t)
+    M, f = system.terms(q, v, u=_held(case.inputs if inputs is None else inputs, t), t=t)
     H, h, Hdv = (part[rows] for part in system.constraint(q, v))
     law = case.law
     a0, a1 = (np.where(fast, b, a)[rows] for a, b in ((law.a0, law.b0), (law.a1, law.b1)))
@@ -47,12 +54,12 @@ def multipliers(
     return np.asarray(found, dtype=np.float64)
 
 
-def _held(case: Case, t: float) -> Floats | None:
+def _held(inputs: Inputs | None, t: float) -> Floats | None:
     """The inputs (nu,) at an instant that is none of their own."""
-    if case.inputs is None:
+    if inputs is None:
         return None
-    at = int(np.searchsorted(case.inputs.times, t, side="right")) - 1
-    return np.asarray(case.inputs.values[at] if at >= 0 else np.zeros(case.inputs.values.shape[1]))
+    at = int(np.searchsorted(inputs.times, t, side="right")) - 1
+    return np.asarray(inputs.values[at] if at >= 0 else np.zeros(inputs.values.shape[1]))
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -61,18 +68,19 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     None where nothing closes, and where a controller or discrete variables act that a row of the run does not show.
     """
     system = equations(case)
-    if system is None or system.control is not None or system.switch is not None:
+    if system is None or (system.control is not None and run.inputs is None) or system.switch is not None:
         return None
     if np.isnan(run.lam).any() or not finite(run):
         return math.nan
     closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
     told = np.asarray(closed.any(axis=1))
-    if case.inputs is not None:  # where they jump, a sample does not say on which side it stands
-        told &= ~np.isin(run.t, case.inputs.times)
+    inputs = case.inputs if run.inputs is None else run.inputs
+    if inputs is not None:  # where they jump, a sample does not say on which side it stands
+        told &= ~np.isin(run.t, inputs.times)
     worst, scale = 0.0, 0.0
     for i in spread(run, told):
         rows = np.flatnonzero(closed[i])
-        lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION)
+        lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION, inputs)
         worst = max(worst, float(np.max(np.abs(run.lam[i, rows] - lam))))
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / scale if scale else None

@@ -30,11 +30,11 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if not inside.any():
         return None
     off = differences(run.q[inside], exact.q, case.quaternions)
-    return float(np.max(off / _scale(truth.trajectory, case)))
+    return float(np.max(off / scale_of(truth.trajectory, case)))
 
 
-def _scale(exact: Trajectory, case: Case) -> Floats:
-    """Largest |q_truth| of each coordinate (n,); of all that share its unit, for one that rests but for rounding.
+def scale_of(exact: Trajectory, case: Case) -> Floats:
+    """Return the largest |q_truth| (n,) of each coordinate; of its like, for one that rests but for rounding.
 
     Where all of these rest, what the case says of their size. Errors below 1e-12, what absolute tolerances are, pass
     the usual limit of 1e-6.

@@ -23,7 +23,8 @@ PLOTTED = 900_000
 """Room for all plots of a page, bytes; the samples of each line follow from it."""
 RUNS = columns(
     who="Engine", outcome="Outcome", steps=("Steps [1]", Kind.NUMBER), events=("Transitions [1]", Kind.NUMBER),
-    wall_ms=("Run time [ms]", Kind.NUMBER), samples=("Samples stored [1]", Kind.NUMBER),
+    wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
+    samples=("Samples stored [1]", Kind.NUMBER),
     settings=("Settings", Kind.LONG),
 )  # fmt: skip
 AUDIT = columns(
@@ -126,7 +127,8 @@ def _run(trace: Trace) -> dict[str, Any]:
     settings = trace.about.get("settings", {})
     return {
         "who": label(trace), "outcome": f"{run.outcome.value} {run.message}".strip(), "steps": run.steps,
-        "events": len(run.events), "wall_ms": 1e3 * run.wall_s if run.wall_s else None, "samples": len(run.t),
+        "events": len(run.events), "wall_ms": 1e3 * run.wall_s if run.wall_s else None,
+        "control_ms": 1e3 * run.control_s if run.control_s else None, "samples": len(run.t),
         "settings": ", ".join(f"{k} = {v}" for k, v in settings.items() if k != "samples"),
     }  # fmt: skip
 

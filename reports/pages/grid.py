@@ -7,12 +7,25 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from crossbody.reports.judging.parts import PARTS
 from crossbody.reports.judging.verdict import Word
-from crossbody.reports.pages.html import number
+from crossbody.reports.pages.html import bounded, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
-KEY = ("finished", "audit", "position", "velocity", "event_times", "lam_impulse", "energy_drift", "energy_integrator")
+SHARES = tuple(f"position ({part})" for part in PARTS)
+"""Parts of the worst error of position: they stand in the table of a case although nothing judges them."""
+KEY = (
+    "finished",
+    "audit",
+    "position",
+    *SHARES,
+    "velocity",
+    "event_times",
+    "lam_impulse",
+    "energy_drift",
+    "energy_integrator",
+)
 """Metrics that stand first in the table of a case."""
 
 
@@ -124,6 +137,7 @@ def _cost(wall: float | None, least: float) -> Cell:
 
 def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
     judged = [row for row in rows if row["verdict"] in WORST]
+    judged += [row for row in rows if judged and row["metric"] in SHARES]
     units = {row["metric"]: row["unit"] for row in judged or rows}
     order = sorted(units, key=lambda name: KEY.index(name) if name in KEY else len(KEY))
     values = {who: {row["metric"]: row for row in mine[who]} for who in engines}
@@ -138,9 +152,10 @@ def _value(row: Row | None, page: str) -> Cell:
         return Cell(title="no such number")
     limit = row["limit"]
     allowed = f", limit {number(limit)}" if limit is not None and limit == limit else ""
-    title = f"{row['who']}, {row['metric']}: {number(row['value'])} {row['unit']}{allowed}. {row['why']}"
+    below, value = bounded(row["value"], row["known"])
+    title = f"{row['who']}, {row['metric']}: {below}{number(value)} {row['unit']}{allowed}. {row['why']}"
     anchor = f"{row['who']}~{row['metric']}"
-    return Cell(title=title, word=row["verdict"], text=short(row["value"]), page=page, anchor=anchor)
+    return Cell(title=title, word=row["verdict"], text=below + short(value), page=page, anchor=anchor)
 
 
 def short(value: float | None) -> str:

@@ -66,7 +66,7 @@ def environment() -> Environment:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    made.filters |= {"number": number, "slug": slug, "plot": plot}
+    made.filters |= {"number": number, "bounded": bounded, "slug": slug, "plot": plot}
     made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST, "json": json_text}
     return made
 
@@ -166,6 +166,12 @@ def file_name(label: str) -> str:
 def slug(text: str) -> str:
     """A text as a class or an id."""
     return re.sub(r"[^A-Za-z0-9_-]+", "-", text)
+
+
+def bounded(value: float | None, known: float | None) -> tuple[str, float]:
+    """Return a sign and what a number is known to where it is below that, else nothing and the number."""
+    number, limit = (math.nan if x is None else x for x in (value, known))
+    return ("< ", limit) if abs(number) < limit else ("", number)
 
 
 def number(value: Any) -> str:

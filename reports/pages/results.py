@@ -21,7 +21,8 @@ from crossbody.reports.runs.study import check_fields, read_json
 
 COLUMNS = tuple(Verdict.__dataclass_fields__)
 NUMBER = (int, float, type(None))
-JUDGED = {name: NUMBER if name in ("value", "expected", "limit", "compared", "band") else (str,) for name in COLUMNS}
+NUMBERS = ("value", "expected", "limit", "compared", "band", "known")
+JUDGED = {name: NUMBER if name in NUMBERS else (str,) for name in COLUMNS}
 AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
 
 
@@ -159,6 +160,11 @@ def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], di
         ) for label in labels
     )  # fmt: skip
     return found, walls
+
+
+def walls_of(out: Path) -> dict[tuple[str, str], float]:
+    """Run times of a folder, s, by case:variant and engine:profile."""
+    return _cases(out, verdicts_of(out))[1]
 
 
 def _wanted(verdicts: pd.DataFrame) -> dict[str, list[str]]:

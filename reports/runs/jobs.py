@@ -23,18 +23,25 @@ from crossbody.cases import (
 )
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
+from crossbody.reports.judging.parts import RATIO, Study
 from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
 from crossbody.reports.runs import watch
 
 DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
-FINER_STEP = 4.0
 FINEST_TOLERANCE = 1e-12
+LOOSER = 10.0
+"""A tolerance of a study over the tightest: how far their runs are apart tells what the tightest is known to."""
+MANY_STEPS, HALVINGS = 10_000, 5
+"""A step is halved twice for its study, and up to five times while that takes no more steps; a run that has more by
+itself is studied at twice and four times its step."""
 _EXAMPLES = {"--set": "a1=0", "--setting": "dt=1e-4"}
 TRUTHS = 3.0
 """A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
-REFINED_S = 20.0
-"""Time that a refinement may take, s: an integrator that grinds to a halt at 1e-12 has none."""
+STUDY_S = 20.0
+"""Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
+READER = "reader"
+"""Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +137,7 @@ def run_case(
         settings: of the engines, by name; each takes those that it knows.
         truth: of the case, where it is known already.
         limit: time after which an engine that has not come back is ended with its process, s; from the command line.
-        refine: whether engines are refined to tell model from discretisation even where no limit judges a part.
+        refine: whether the parts of errors are told even where no limit judges one.
 
     Raises:
         UnknownName: for a setting that none of them knows.
@@ -203,15 +210,16 @@ def _ran(
     hidden = {**engines.hidden(engines.load(pick.engine), prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     natural: Trajectory = prepared.run()
+    run = _dense(case, pick, prepared, natural, asked)
     return Entry(
         engine=pick.engine,
         profile=pick.profile,
         settings=prepared.settings,
         default=not any(name in prepared.settings for name in asked),
-        run=_dense(case, pick, prepared, natural, asked),
+        run=run,
         stepped=natural.t,
         audit=rows,
-        refined=_refined(case, pick, prepared.settings) if refine else None,
+        study=_study(case, pick, prepared, natural, run) if refine and natural.outcome.ok else None,
         hidden=hidden,
         own=law_of(followed) if refine and (followed := getattr(prepared, "follows", None)) is not None else None,
     )
@@ -234,19 +242,54 @@ def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Ma
     dense = engines.load(pick.engine).prepare(case, pick.profile, samples=times, **asked).run()
     if not dense.outcome.ok or dense.events != natural.events:
         return natural  # samples have changed the steps: it is another run
-    return replace(with_both_sides(dense, natural), wall_s=natural.wall_s, steps=natural.steps)
+    told = {"wall_s": natural.wall_s, "control_s": natural.control_s, "steps": natural.steps}
+    return replace(with_both_sides(dense, natural), **told)  # type: ignore[arg-type]
 
 
-def _refined(case: Case, pick: Pick, settings: Mapping[str, Any]) -> Trajectory | None:
-    """The same engine with a step four times finer or the tightest tolerance; None if it has neither."""
-    if "dt" in settings:
-        finer = {"dt": float(settings["dt"]) / FINER_STEP}
-    elif "rtol" in settings:
-        finer = {"rtol": min(max(FINEST_TOLERANCE, case.tight), float(settings["rtol"]))}
-    else:
-        return None
-    if "time_limit" in settings:
-        finer["time_limit"] = REFINED_S
-    engine = engines.load(pick.engine)
-    run = engine.prepare(case, pick.profile, **finer).run()
-    return run if run.outcome.ok and math.isfinite(float(run.t[-1])) else None
+def _study(case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: Trajectory) -> Study:
+    """The other runs of an engine that tell the parts of its error; those of its model where its equations are known.
+
+    Where it reads the file by itself they are of the model that is built from the scene.
+    """
+    settings = prepared.settings
+
+    def run(**changed: Any) -> Trajectory | str:
+        limit = {"time_limit": STUDY_S} if "time_limit" in settings else {}
+        try:
+            found: Trajectory = engines.load(pick.engine).prepare(case, pick.profile, **changed, **limit).run()
+        except CaseUnsupported as error:
+            return str(error)
+        said = ", ".join(f"{name} {value}" for name, value in changed.items() if name != "samples")
+        return found if found.outcome.ok else f"A run with {said} ends {found.outcome.value}."
+
+    of_scene = {READER: "scene"} if settings.get(READER) == "file" else {}
+    size = {name: float(settings[name]) for name in ("dt", "rtol") if name in settings}
+    samples = {"samples": np.array(judged.t)} if "samples" in settings else {}
+    built = run(**of_scene, **size) if of_scene else None
+    of_scene = {} if isinstance(built, str) else of_scene
+    told: dict[str, Any] = {"why_built": built} if isinstance(built, str) else {"built": built}
+    if getattr(prepared, "follows", None) is not None:
+        return Study(**told)
+    if not size:
+        return Study(why="It has neither a step nor a tolerance that could be refined.", **told)
+    setting = next(iter(size))
+    for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
+        known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
+        runs = [known.get(one) or run(**of_scene, **{setting: one}, **samples) for one in sizes]
+        if not (failed := [one for one in runs if isinstance(one, str)]):
+            return Study(setting=setting, sizes=sizes, runs=tuple(runs), **told)  # type: ignore[arg-type]
+    return Study(why=failed[0], **told)
+
+
+def _sizes(setting: str, size: float, steps: int, tight: float) -> list[tuple[float, ...]]:
+    """Steps or tolerances of a study, falling; where a second one stands it is for when a run of the first fails."""
+    if setting == "rtol":
+        tightest = min(max(FINEST_TOLERANCE, tight), size)
+        return [(LOOSER * tightest, tightest)]
+    if steps > MANY_STEPS:
+        return [(RATIO**2 * size, RATIO * size, size), _halved(size, 2)]
+    return [_halved(size, min(max(2, int(math.log2(MANY_STEPS / max(steps, 1)))), HALVINGS))]
+
+
+def _halved(size: float, times: int) -> tuple[float, ...]:
+    return tuple(size / RATIO**k for k in range(times + 1))

@@ -61,7 +61,7 @@ def save(path: Path, trace: Trace) -> None:
         "about": dict(trace.about),
         "events": [[e.t, e.contact, int(e.before), int(e.after), e.impulse] for e in run.events],
         "outcome": run.outcome.value, "message": run.message, "steps": run.steps, "wall_s": run.wall_s,
-        "counts": dict(run.counts),
+        "counts": dict(run.counts), "control_s": run.control_s,
     }  # fmt: skip
     columns = pa.table(data).replace_schema_metadata({_KEY: json.dumps(about, default=_plain).encode()})
     pq.write_table(columns, path, compression="zstd")
@@ -182,7 +182,7 @@ def _loaded(path: Path) -> Trace:
         ledger=_ledger(data),
         events=tuple(_event(*given) for given in about["events"]),
         outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"], wall_s=about["wall_s"],
-        counts=about["counts"],
+        counts=about["counts"], control_s=float(about.get("control_s", 0.0)),
     )  # fmt: skip
     truth = _motion(data, "truth_") if "truth_q0" in data.column_names else None
     return Trace(about=about["about"], run=run, truth=truth)

@@ -28,7 +28,8 @@ TIMINGS = columns(
     error_between=("Position on one grid [1]", Kind.NUMBER),
     honesty=("Error over tolerance [1]", Kind.NUMBER), median_ms=("Median [ms]", Kind.NUMBER),
     iqr_ms=("IQR [ms]", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER),
-    native_ms=("Its own loop [ms]", Kind.NUMBER), interpreted=("Interpreted", Kind.LONG),
+    native_ms=("Its own loop [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
+    interpreted=("Interpreted", Kind.LONG),
     cores=("Cores [1]", Kind.NUMBER),
     repeats=("Repeats", Kind.NUMBER), outcome="Outcome",
 )  # fmt: skip

@@ -1,0 +1,66 @@
+"""A file as it stands, at any step: what MuJoCo makes of it by its own step, and the same from its scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+
+from crossbody.cases.files import mjcf
+from crossbody.cases.files.pairs import constants_of
+from crossbody.cases.scene import Scene
+from crossbody.engines.mujoco._build import compiled, spec_of
+
+RAISED = ("eq_solref", "jnt_solref", "tendon_solref_lim", "pair_solref", "geom_solref")
+"""Time constants that MuJoCo raises to two steps."""
+
+
+def held(model: Any) -> Any:
+    """Return the model with time constants of rows raised to two of the file's steps, and no more with the step.
+
+    MuJoCo raises them to two of the steps that it takes (refsafe), so that a study of steps would be one of laws too.
+    It does so to the mean of two shapes, which it is the same to do to each unless one alone is below: then the model
+    stays as it is.
+    """
+    off = int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
+    if model.opt.disableflags & off:
+        return model
+    least = 2.0 * model.opt.timestep
+    constants = model.geom_solref[:, 0]
+    touching = (model.geom_contype | model.geom_conaffinity) != 0
+    low = touching & (constants > 0.0) & (constants < least)
+    if low.any() and (touching & (constants > least)).any():
+        return model
+    for name in RAISED:
+        values = getattr(model, name).reshape(-1, 2)
+        values[(values[:, 0] > 0.0) & (values[:, 0] < least), 0] = least
+    model.opt.disableflags |= off
+    return model
+
+
+def rebuilt(scene: Scene, model: Any) -> Any:
+    """Return the model that is built from a scene, with the options and the softness of the rows of the file's model.
+
+    What it and the file's model differ in is what one of both readers has made of the file.
+    """
+    spec = spec_of(scene)
+    made = compiled(spec, scene)
+    for name in (name for name in dir(made.opt) if not name.startswith("_")):
+        value = getattr(model.opt, name)
+        if not callable(value):
+            if hasattr(value, "shape"):
+                getattr(made.opt, name)[:] = value
+            else:
+                setattr(made.opt, name, value)
+    on = model.eq_active0.astype(bool)
+    made.eq_solref[:], made.eq_solimp[:] = model.eq_solref[on], model.eq_solimp[on]
+    for name in ("jnt_solref", "jnt_solimp", "tendon_solref_lim", "tendon_solimp_lim"):
+        getattr(made, name)[:] = getattr(model, name)
+    soft = constants_of(model, mjcf.names(model, "geom"))
+    for i in range(made.npair):
+        made.pair_solref[i], made.pair_solimp[i] = soft[frozenset((_geom(made, 1, i), _geom(made, 2, i)))]
+    return made
+
+
+def _geom(model: Any, which: int, i: int) -> str:
+    return str(model.geom(int(getattr(model, f"pair_geom{which}")[i])).name)

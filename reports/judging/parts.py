@@ -1,0 +1,360 @@
+"""An engine's error in parts: of its importer, of its model, of its step.
+
+Errors are vectors (samples, components), relative as in the metric `position`, on the truth's clock: events are laid on
+each other, so that behind an event that moved states are compared at equal time since it. At every sample
+
+    whole = importer + model + step
+
+    importer    the engine's reader against the same engine and step on the model that is built from the scene
+    model       the engine's converged motion against the truth
+    step        the engine at its step against its own converged motion
+
+The converged motion is the truth of the equations that the engine follows, where those are known; else it follows from
+three steps or more, each half of the one before, by the order that they show: without one nothing is extrapolated. Of
+an engine with a tolerance instead of a step it is the run at the tightest. What a part is known to stands beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import turned
+from crossbody.reports.metrics._align import clock, matched
+from crossbody.reports.metrics.position import scale_of
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.judging.truth import Truth
+
+PARTS = ("importer", "model", "step")
+SPLIT = ("position", "event_times")
+"""Metrics whose error is told apart."""
+RATIO = 2.0
+"""Of one step of a study to the next."""
+FLAT = 1e-10
+"""Differences of runs below it, relative, are rounding that has added up: they show no order."""
+LEAST_RATIO = 2.0**0.5
+"""Of the differences of neighbouring steps: with less, half an order, nothing converges soon enough to be foretold."""
+UNLIKE = 0.3
+"""Part of the differences that may be other than a power of the step (root of the mean square)."""
+ROUNDING = 1e-12
+"""What runs of two models that are the same to rounding may differ by, relative or s."""
+SAMPLES = 2000
+"""Samples at which runs are compared."""
+REACHED = 1e-9
+"""Part of the horizon by which the last sample of a run may miss it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Study:
+    """Runs of one engine that tell the parts of its error.
+
+    Attributes:
+        setting: what differs between them: "dt" or "rtol".
+        sizes: of it, falling: three steps or more in the ratio 2, or two tolerances, the last of which is the tightest.
+        runs: one for each.
+        built: the engine at its own settings on the model that is built from the scene; None without its own reader.
+        why: why there are no runs, in a sentence.
+        why_built: why there is no such run although the engine has a reader of its own.
+    """
+
+    setting: str = ""
+    sizes: tuple[float, ...] = ()
+    runs: tuple[Trajectory, ...] = ()
+    built: Trajectory | None = None
+    why: str = ""
+    why_built: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Split:
+    """The parts of one metric's error.
+
+    Attributes:
+        where: component and instant at which the whole error is largest, in words.
+        there: part -> its share of the whole error there, along that; they add up to it.
+        largest: part -> its largest anywhere.
+        known: part -> what both are known to.
+        says: how the converged motion is known.
+        missing: part -> why it is not known.
+    """
+
+    where: str
+    there: Mapping[str, float]
+    largest: Mapping[str, float]
+    known: Mapping[str, float]
+    says: str
+    missing: Mapping[str, str]
+
+
+class NotMeasuredError(Exception):
+    """A part of an error that is not known, with the sentence that says why."""
+
+
+def splits(case: Case, truth: Truth, run: Trajectory, study: Study, own: Truth | None = None) -> dict[str, Split]:
+    """Tell the parts of the errors of an engine: metric -> its parts, without those where there is nothing to compare.
+
+    Args:
+        case: what was run.
+        truth: what the whole error is measured against.
+        run: the engine as it was judged.
+        study: its other runs.
+        own: the truth of the equations that the engine follows, where they are not the case's.
+    """
+    positions = Positions(case, truth, run, math.inf if own is None else own.trusted)
+    laid: dict[str, Positions | Events] = {"position": positions, "event_times": Events(case, truth, run)}
+    told = {metric: _split(one, metric, positions, study, own) for metric, one in laid.items() if one.whole.size}
+    return told if positions.whole.size else {}
+
+
+def _split(laid: Positions | Events, metric: str, positions: Positions, study: Study, own: Truth | None) -> Split:
+    here, says = laid.whole, ""
+    errors: dict[str, Floats] = {}
+    known: dict[str, float] = {}
+    missing = {"importer": study.why_built} if study.why_built else {}
+    try:
+        if study.built is not None:
+            here = laid(study.built)
+            errors["importer"], known["importer"] = laid.whole - here, ROUNDING
+        errors["step"], known["step"], says = _step(laid, positions, here, study, own)
+    except NotMeasuredError as why:
+        missing |= dict.fromkeys(PARTS[1:], str(why))
+    else:
+        errors["model"] = here - errors["step"]
+        known["model"] = max(known["step"], laid.truth.agreement.get(metric, 0.0))
+    where, along = laid.worst()
+    return Split(
+        where=where, there={part: along(error) for part, error in errors.items()},
+        largest={part: float(np.max(laid.sizes(error))) for part, error in errors.items()},
+        known=known, says=says, missing=missing,
+    )  # fmt: skip
+
+
+def _step(
+    laid: Positions | Events, positions: Positions, here: Floats, study: Study, own: Truth | None
+) -> tuple[Floats, float, str]:
+    """Return the step's error, what it is known to, and how its converged motion is.
+
+    Raises:
+        NotMeasuredError: where it is not known.
+    """
+    if own is not None:
+        return laid.against(own), max(own.agreement.values(), default=0.0), own.source
+    if not study.runs:
+        raise NotMeasuredError(study.why)
+    errors = [laid(run) for run in study.runs]
+    if study.setting != "dt":
+        looser, tight = errors
+        text = f"Converged at {study.setting} = {study.sizes[-1]:g}."
+        return here - tight, _most(looser - tight), text
+    ratio, seen = observed([positions(run) for run in study.runs], study.sizes)
+    limit, known = extrapolated(errors[-3:], ratio)
+    if math.isinf(ratio):
+        return here - limit, known, f"Runs at steps of {_listed(study.sizes)} s differ by rounding."
+    order = f"Order {math.log(ratio) / math.log(RATIO):.2f}, observed between steps of {_listed(seen)} s"
+    return here - limit, known, f"{order}; the limit is known to {known:.1e}."
+
+
+def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, Sequence[float]]:
+    """Return by how much differences fall from one pair of runs to the next, and the three steps that tell it.
+
+    It is the factor that makes both fields of differences most alike, of the finest three runs that differ by more
+    than rounding; infinite where none do.
+
+    Args:
+        errors: of three runs or more (samples, components), the coarsest first.
+        sizes: their steps, which fall by `RATIO`.
+
+    Raises:
+        NotMeasuredError: where the fields are not alike, or the factor is too small: there is no order.
+    """
+    for k in range(len(errors) - 3, -1, -1):
+        first, second = errors[k] - errors[k + 1], errors[k + 1] - errors[k + 2]
+        if max(_most(first), _most(second)) > FLAT:
+            break
+    else:
+        return math.inf, sizes
+    tiny = np.finfo(float).tiny
+    ratio = float(np.sum(first * second) / max(float(np.sum(second * second)), tiny))
+    unlike = float(np.linalg.norm(first - ratio * second) / max(float(np.linalg.norm(first)), tiny))
+    if ratio >= LEAST_RATIO and unlike <= UNLIKE:
+        return ratio, sizes[k : k + 3]
+    raise NotMeasuredError(
+        f"No order between steps of {_listed(sizes[k : k + 3])} s, so nothing is extrapolated: the differences fall "
+        f"{ratio:.2g} times from one pair to the next, and {unlike:.0%} of them is no power of the step."
+    )
+
+
+def _listed(sizes: Sequence[float]) -> str:
+    return ", ".join(f"{size:.4g}" for size in sizes)
+
+
+def extrapolated(errors: Sequence[Floats], ratio: float) -> tuple[Floats, float]:
+    """Return the limit of three runs whose differences fall by a ratio, and what it is known to.
+
+    That is the distance between the limits of the coarser pair and of the finer one: what the coarser one is off by.
+    """
+    coarse, middle, fine = errors
+    if math.isinf(ratio):
+        return fine, 2.0 * max(_most(coarse - middle), _most(middle - fine))
+    limit = fine - (middle - fine) / (ratio - 1.0)
+    return limit, _most(middle - (coarse - middle) / (ratio - 1.0) - limit)
+
+
+def _most(error: Floats) -> float:
+    return float(np.max(np.abs(error), initial=0.0))
+
+
+class Positions:
+    """Errors of positions of the runs of one engine, at the same samples.
+
+    A rotation is three components, the vector in body axes that leads from the truth's to the run's, rad, in the first
+    three entries of its quaternion.
+
+    Attributes:
+        whole: that of the run that is judged (samples, components).
+    """
+
+    def __init__(self, case: Case, truth: Truth, run: Trajectory, until: float = math.inf) -> None:
+        self.case, self.truth, self.run = case, truth, run
+        self.laid: dict[int, Floats] = {}
+        self.scale = scale_of(truth.trajectory, case)
+        for at in case.quaternions:
+            self.scale[at : at + 4] = 1.0  # rad
+        t, end = clock(truth, run), min(float(truth.trajectory.t[-1]), truth.trusted, until)
+        inside = np.flatnonzero(t <= end)
+        error = self._error(run.q[inside], truth.at(t[inside]).q) if len(inside) else np.zeros((0, 0))
+        kept = np.unique(np.linspace(0, max(len(inside) - 1, 0), min(len(inside), SAMPLES)).astype(np.intp))
+        if error.size:  # the worst sample is one of them
+            kept = np.union1d(kept, [np.unravel_index(int(np.argmax(self.sizes(error))), error.shape)[0]])
+        self.samples, self.whole, self.end = inside[kept], error[kept], end
+        self.t = t[self.samples]
+
+    def __call__(self, run: Trajectory) -> Floats:
+        """Return the error of a run at the same instants of the truth's clock; each is laid there once.
+
+        Raises:
+            NotMeasuredError: if it ends before.
+        """
+        if id(run) not in self.laid:
+            self.laid[id(run)] = self._lay(run)
+        return self.laid[id(run)]
+
+    def _lay(self, run: Trajectory) -> Floats:
+        """Return the error of a run.
+
+        Between its samples the error is interpolated, which is smaller and smoother than the motion: by a cubic through
+        the rates of both, where positions have rates of their own, else by a straight line.
+        """
+        t = clock(self.truth, run)
+        if not len(t) or t[-1] < self.t[-1] - REACHED * self.case.t_end:
+            raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
+        behind = np.clip(np.searchsorted(t, self.t), 0, len(t) - 1)
+        before = np.maximum(behind - 1, 0)
+        needed = np.unique(np.concatenate([before, behind]))
+        exact = self.truth.at(np.minimum(t[needed], float(self.truth.trajectory.t[-1])))
+        error = self._error(run.q[needed], exact.q)
+        a, b = (np.searchsorted(needed, side) for side in (before, behind))
+        width = (t[behind] - t[before])[:, None]
+        wide = np.where(width > 0.0, width, 1.0)
+        x = np.clip(np.where(width > 0.0, (self.t - t[before])[:, None] / wide, 1.0), 0.0, 1.0)
+        found: Floats = error[a] + x * (error[b] - error[a])
+        if self.case.quaternions:
+            return found
+        own = (run.t[behind] - run.t[before])[:, None] / wide  # the run's clock over the truth's
+        left, right = ((run.v[needed[i]] * own - exact.v[i]) * width / self.scale for i in (a, b))
+        slope = error[b] - error[a]
+        found += x * (1.0 - x) * ((1.0 - x) * (left - slope) + x * (slope - right))
+        return found
+
+    def against(self, own: Truth) -> Floats:
+        """Return the error of the judged run against another truth, on its clock."""
+        t = np.minimum(clock(own, self.run)[self.samples], float(own.trajectory.t[-1]))
+        return self._error(self.run.q[self.samples], own.at(t).q)
+
+    def _error(self, q: Floats, exact: Floats) -> Floats:
+        error = q - exact
+        for at in self.case.quaternions:
+            entries = slice(at, at + 4)
+            error[:, at : at + 3] = turned(q[:, entries], exact[:, entries])
+            error[:, at + 3] = 0.0
+        scaled: Floats = error / self.scale
+        return scaled
+
+    def sizes(self, error: Floats) -> Floats:
+        """Return |error|, that of a rotation in the first entry of its quaternion."""
+        sizes = np.abs(error)
+        for at in self.case.quaternions:
+            sizes[:, at] = np.linalg.norm(error[:, at : at + 3], axis=1)
+            sizes[:, at + 1 : at + 4] = 0.0
+        return sizes
+
+    def worst(self) -> tuple[str, Callable[[Floats], float]]:
+        """Return where the whole error is largest, in words, and what gives the share of a part there."""
+        sizes = self.sizes(self.whole)
+        i, j = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
+        entries = slice(j, j + 3) if j in self.case.quaternions else slice(j, j + 1)
+        along = self.whole[i, entries] / (sizes[i, j] or 1.0)
+        where = f"{self.case.coordinates[j].name} at t = {self.t[i]:.6g} s"
+        return where, lambda error: float(error[i, entries] @ along)
+
+
+class Events:
+    """Errors of the instants of touches and releases that a run shares with the truth, s: (events, 1).
+
+    Attributes:
+        whole: that of the run that is judged.
+    """
+
+    def __init__(self, case: Case, truth: Truth, run: Trajectory) -> None:
+        self.case, self.truth, self.run = case, truth, run
+        self.whole = self._shifts(truth, run)
+
+    def __call__(self, run: Trajectory) -> Floats:
+        """Return the error of the same instants of another run.
+
+        Raises:
+            NotMeasuredError: if it has others.
+        """
+        return self._same(self._shifts(self.truth, run))
+
+    def against(self, own: Truth) -> Floats:
+        """Return the error of the judged run against another truth.
+
+        Raises:
+            NotMeasuredError: if that has other events.
+        """
+        return self._same(self._shifts(own, self.run))
+
+    def _shifts(self, truth: Truth, run: Trajectory) -> Floats:
+        pairs = matched(truth, run)
+        found = [b.touch - a.touch for a, b in pairs]
+        found += [b.release - a.release for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+        shifts = np.array(found).reshape(-1, 1)
+        return shifts if np.isfinite(shifts).all() else np.zeros((0, 1))
+
+    def _same(self, shifts: Floats) -> Floats:
+        if shifts.shape != self.whole.shape:
+            raise NotMeasuredError(
+                f"A run of its study shares {len(shifts)} events with the truth, not {len(self.whole)}."
+            )
+        return shifts
+
+    def sizes(self, error: Floats) -> Floats:
+        """Return |error|."""
+        return np.abs(error)
+
+    def worst(self) -> tuple[str, Callable[[Floats], float]]:
+        """Return where the whole error is largest, in words, and what gives the share of a part there."""
+        i = int(np.argmax(np.abs(self.whole)))
+        sign = -1.0 if self.whole[i, 0] < 0.0 else 1.0
+        pairs = matched(self.truth, self.run)
+        ended = [a.release for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+        t = [*(a.touch for a, _ in pairs), *ended][i]
+        return f"{'touch' if i < len(pairs) else 'release'} at t = {t:.6g} s", lambda error: sign * float(error[i, 0])
