@@ -32,10 +32,12 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     yield "mode_residual", 0.0, "an identity at every sample"
     yield "law_residual", 1e-6, "the law's own equation at every state, with the rounding of stiff rows"
     yield "lam_impulse_path", 1e-5, _FASTER
+    yield "contact_work", 1e-6, _TOLERANCE
     if case.law.unilateral.any():
         yield "gap_error", 1e-6, _TOLERANCE
         yield "complementarity", 1e-6, "contacts push only, to the precision of the released instant"
         yield "event_times", 1e-6, _TOLERANCE
+        yield "mode_times", 1e-6, _TOLERANCE
         yield "touch_count", 0.0, _COUNT
         yield "release_count", 0.0, _COUNT
     if (~case.law.unilateral & (case.law.a0 > 0.0)).any():

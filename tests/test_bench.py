@@ -183,6 +183,24 @@ def test_headline_takes_the_cheapest_run_that_is_as_accurate() -> None:
     assert found.loc["lost", "says"] == "reaches no error: at rtol = 0.001 its run ends finished"
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_the_ratio_at_an_error_is_to_the_cheapest_run_of_the_reference_that_is_no_worse(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ours, theirs = (
+        [
+            ("reference" if k else "other", 1e-3, 10.0 ** rng.uniform(-12.0, -2.0), rng.uniform(1.0, 9.0))
+            for _ in range(12)
+        ]
+        for k in (1, 0)
+    )
+    found = headline(table(*ours, *theirs)).iloc[0]
+    ratios = {e: ms / min((x for *_, mine, x in ours if mine <= e), default=np.nan) for *_, e, ms in theirs}
+    assert found["best_error"] == min(ratios)
+    assert found["ratio"] == pytest.approx(ratios[min(ratios)], nan_ok=True)
+    least = np.nan if any(np.isnan(x) for x in ratios.values()) else min(ratios.values())
+    assert found["least_ratio"] == pytest.approx(least, nan_ok=True)
+
+
 def test_an_engine_with_other_events_reaches_no_error() -> None:
     rows = table(("reference", 1e-4, 1e-5, 1.0), ("other", 1e-3, np.inf, 1.0), ("other", 1e-6, np.inf, 1.0))
     says = headline(rows.assign(touches=[0.0, 5.0, 2.0]))["says"][0]

@@ -7,11 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, load
+from crossbody import engines
+from crossbody.cases import Case, Tier, Value, load
 from crossbody.cases._cradle.impact import delassus, pushes
 from crossbody.cases._cradle.motion import Motion
 from crossbody.cases._cradle.rules import RULES, answer, block, simultaneous
 from crossbody.cases._cradle.scene import Row
+from crossbody.reports import metrics
+from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.truth import from_run, sample_times
+from crossbody.reports.runs import jobs
 
 ONE = Row(masses=np.full(5, 0.1), lifted=1, speed=1.0, gap=0.0, a0=1e6, zeta=0.0)
 THREE = replace(ONE, masses=np.ones(3))
@@ -143,3 +148,76 @@ def test_collapse_in_no_time_ends() -> None:
     row = replace(ONE, zeta=3.0)
     motion = Motion(row, "sequential")
     np.testing.assert_allclose(motion.final, 0.2, atol=1e-9)
+
+
+def drawn(seed: int) -> dict[str, Value]:
+    """A row of damped balls; damping beyond which touching ones collide without end is among it."""
+    rng = np.random.default_rng([15, seed])
+    n = int(rng.integers(2, 8))
+    return {
+        "n": n, "lifted": int(rng.integers(1, n)),
+        "zeta": float(rng.uniform(0, 1.2)) if rng.random() < 0.9 else 0.0,
+        "gap": float(rng.choice([0.0, 10.0 ** rng.uniform(-5, -2)])),
+        "collisions": str(rng.choice(["sequential", "simultaneous"])),
+    }  # fmt: skip
+
+
+def apart(seed: int, solver: str) -> dict[str, float]:
+    """What a solver of the law says of a drawn row against the closed form."""
+    case = load("newtons_cradle", "sliders", **drawn(seed))
+    motion = case.closed_form
+    assert motion is not None
+    truth = replace(from_run(motion(sample_times(motion(np.zeros(1)), case.t_end, 101, 3)), Tier.A, ""), at=motion)
+    run = engines.load("reference").prepare(case, solver, time_limit=60.0).run()
+    names = (
+        "position",
+        "touch_count",
+        "release_count",
+        "lam_impulse_path",
+        "energy_drift",
+        "gap_error",
+        "contact_work",
+    )
+    found = {name: metrics.load(name).measure(truth, run, case) for name in names}
+    return {name: abs(value) for name, value in found.items() if value is not None}
+
+
+@pytest.mark.parametrize(("solver", "seeds"), [("compiled", range(30)), ("cvode", range(8))])
+def test_every_solver_meets_the_closed_form_of_any_damped_row(solver: str, seeds: range) -> None:
+    """Contacts are counted alike even where they accumulate: 33 were told too many at a damping ratio of .7."""
+    assert {seed: wrong for seed in seeds if max((wrong := apart(seed, solver)).values()) > 1e-6} == {}
+
+
+def test_balls_that_do_not_touch_are_not_held_against_those_that_do() -> None:
+    case = load("newtons_cradle", "sliders", n=3, lifted=2, zeta=0.2, gap=1e-3, collisions="simultaneous")
+    found = jobs.run_case(case, jobs.picks(("reference:compiled",)), refine=False)
+    assert [row.metric for row in judged(case, found.entries, found.truth, "") if row.verdict == "outside"] == []
+
+
+@pytest.mark.slow
+def test_all_but_few_random_rows_meet_the_closed_form() -> None:
+    """Where rounding decides which of two gaps closes first, the motions part: one row in fifty."""
+    assert sum(max(apart(seed, "compiled").values()) > 1e-6 for seed in range(40, 400)) < 18
+
+
+@pytest.mark.parametrize(("n", "zeta"), [(3, 2.0), (4, 0.9), (5, 0.7), (6, 0.7)])
+def test_touching_balls_of_small_restitution_collide_as_often_as_their_rates_say(n: int, zeta: float) -> None:
+    """By hand: the fastest gap turns to -e of its rate, both beside it close by (1 + e)/2 of it; down to 1e-9.
+
+    They collide without end where e < tan(pi/4 (1 - 2/n))^2: .072, .17, .26 and .33 of three, four, five and six balls.
+    """
+    row = replace(ONE, masses=np.ones(n), zeta=zeta)
+    e = row.e
+    assert e < np.tan(0.25 * np.pi * (1.0 - 2.0 / n)) ** 2
+    rates, count = np.zeros(n + 1), 0  # of approach, with a gap beyond either end
+    rates[1] = 1.0
+    while rates[1:n].max() > 1e-9 and count < 100_000:
+        k = 1 + int(np.argmax(rates[1:n] >= rates[1:n].max() * (1.0 - 1e-12)))
+        hit, rates[k] = rates[k], -e * rates[k]
+        rates[k - 1] += 0.5 * (1.0 + e) * hit
+        rates[k + 1] += 0.5 * (1.0 + e) * hit
+        rates[0] = rates[n] = 0.0
+        count += 1
+    motion = Motion(row, "sequential")
+    assert len(motion.events) == 2 * count
+    assert motion.final == pytest.approx(np.full(n, 1.0 / n), abs=1e-9)

@@ -390,3 +390,17 @@ def test_what_never_settles_ends(solver: str) -> None:
     run = simulate(squeezed, [0.0] * 3, [1.0, 0.0, -1.0], 0.1, solver=solver, collisions="sequential")
     assert run.outcome is Outcome.MODE_CYCLE
     assert "Rows [0, 1]" in run.message
+
+
+@pytest.mark.parametrize("solver", INDEPENDENT)
+def test_of_touching_rows_the_fastest_collides_first_however_near_the_others_are(solver: str) -> None:
+    """Rates of approach within some percent of each other: every collision and its impulse, in their order."""
+    for seed in range(12):
+        rng = np.random.default_rng([51, seed])
+        system = colliding(sliders(5, masses=rng.uniform(0.5, 2.0, 5).tolist()), 0.2)
+        v0 = -np.cumsum(rng.uniform(0.9, 1.1, 5))
+        ours, other = (
+            simulate(system, 0.0 * v0, v0, 1e-6, solver=each, collisions="sequential") for each in ("compiled", solver)
+        )
+        assert labels(ours) == labels(other), seed
+        assert [e.impulse for e in ours.events] == pytest.approx([e.impulse for e in other.events], rel=1e-9), seed

@@ -8,7 +8,7 @@ import pytest
 from crossbody.cases import InvalidValue
 from crossbody.hw import Sensor, unlagged
 from crossbody.hw.replaying import measures as _measures
-from crossbody.hw.replaying.impacts import impacts, least_of, matched
+from crossbody.hw.replaying.impacts import Impacts, impacts, least_of, matched
 from crossbody.hw.replaying.rates import derivatives, felt
 from crossbody.hw.replaying.sensors import lagged
 from crossbody.hw.replaying.whiteness import autocorrelation, crosscorrelation
@@ -34,6 +34,18 @@ def test_delay_is_found_to_a_part_of_a_sample(late: float) -> None:
 
     found = _measures.delay(signal(t - late) + 2e-5 * np.random.default_rng(1).standard_normal(4000), signal(t), STEP)
     assert found == pytest.approx(late, abs=5e-5)
+
+
+@pytest.mark.parametrize("part", [-0.24, -0.15, -0.05, 0.05, 0.15, 0.24, 0.3])
+def test_a_delay_is_looked_for_up_to_a_quarter_of_the_record(part: float) -> None:
+    """Steps at random, which no lag but the right one explains; what is later than a quarter is not told."""
+    late = round(part * 2000)
+    whole = np.cumsum(np.random.default_rng(3).standard_normal(4000))
+    found = _measures.delay(whole[1000 - late : 3000 - late], whole[1000:3000], STEP)
+    if abs(part) <= 0.25:
+        assert found == pytest.approx(late * STEP, abs=STEP)
+    else:
+        assert not abs(found) > 0.25 * 2000 * STEP
 
 
 def test_delay_of_what_does_not_move_is_unknown() -> None:
@@ -106,6 +118,18 @@ def test_a_held_acceleration_is_felt_as_the_polynomials_show_it() -> None:
     rows = np.arange(40, 150)
     for seen, d in ((y, 0.0), (late, delay)):
         np.testing.assert_allclose(derivatives(t, seen, rows=rows)[2], felt(t, a, d, 25, 3, rows), atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_impacts_belong_together_up_to_a_twentieth_of_a_second(seed: int) -> None:
+    """Half a second from one to the next; each is off by a drawn time, those beyond .05 s are not the same impact."""
+    rng = np.random.default_rng(seed)
+    t, jump = 0.5 * np.arange(1, 13), rng.uniform(0.5, 2.0, 12)
+    late, harder = rng.uniform(0.01, 0.05, 12) * rng.choice([-4.0, -1.1, -0.9, 0.9, 1.1, 4.0], 12), rng.normal(size=12)
+    offsets, jumps = matched(Impacts(t=t, jump=jump), Impacts(t=t + late, jump=jump + harder))
+    same = np.abs(late) <= 0.05
+    np.testing.assert_allclose(offsets, late[same], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(jumps, harder[same], rtol=0.0, atol=1e-12)
 
 
 def test_impacts_are_found_matched_and_measured() -> None:

@@ -98,6 +98,19 @@ def test_energy_is_accounted_for(name: str, rtol: float, solver: str) -> None:
     assert np.abs(change - made).max() <= WITHIN * rtol * max(1.0, np.abs(found.energy).max())
 
 
+@pytest.mark.parametrize("solver", INDEPENDENT)
+@pytest.mark.parametrize("name", SCENES)
+def test_every_account_agrees(name: str, solver: str) -> None:
+    """Work of each row by itself, of the inputs and of damping: their sum alone could hide which did it."""
+    ours, other = (run(name, each, 1e-10).ledger for each in ("compiled", solver))
+    assert ours is not None
+    assert other is not None
+    scale = max(1.0, float(np.abs(run(name, "compiled", 1e-10).energy).max()))
+    for account in ("contact", "input", "dissipated"):
+        off = np.abs(getattr(other, account) - getattr(ours, account)).max(initial=0.0)
+        assert off <= 1e-6 * scale, account
+
+
 @pytest.mark.parametrize("name", ["pendulum", "pendulum at a wall", "delta robot"])
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_rigid_bilateral_rows_give_the_motion_of_index_one(name: str, rtol: float) -> None:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from springs import drawn, known
 
-from crossbody.cases import Mode
+from crossbody.cases import Mode, Outcome
 from crossbody.reference import simulate
 from crossbody.reference.sundials import roots
+from crossbody.reference.sundials.run import SundialsRun
 
 BOUNDED = {"rtol": 1e-12, "max_step": 1e-3}  # a step of a millisecond has no room for an event between its nodes
 
@@ -50,6 +51,19 @@ def test_random_springs_and_walls_end_where_short_steps_do(solver: str) -> None:
 def test_many_random_springs_and_walls_end_where_short_steps_do() -> None:
     wrong = {seed: error for seed in range(2000) if not (error := compared(seed, "cvode")) < 1e-6}
     assert not wrong
+
+
+@pytest.mark.parametrize("solver", ["cvode", "ida"])
+def test_a_run_that_never_goes_on_from_a_change_of_its_inputs_ends(
+    solver: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever leaves a stop where it was, steps of no length are counted: an outcome, and no hang."""
+    take = SundialsRun._take_inputs
+    monkeypatch.setattr(SundialsRun, "_take_inputs", lambda run: max(min(take(run), 0.25), run.state.t))
+    system, q0, v0 = known()
+    run = simulate(system, q0, v0, 1.0, solver=solver, time_limit=20.0)
+    assert run.outcome is Outcome.STEP_TOO_SMALL
+    assert run.t[-1] == 0.25
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -298,6 +298,15 @@ def test_the_largest_difference_counts() -> None:
     assert difference([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]) == 0.25
 
 
+@pytest.mark.parametrize("metric", ["start_error", "mode_residual"])
+def test_no_known_property_explains_where_a_run_starts_and_modes_that_no_event_left(metric: str) -> None:
+    for each in (load(name, variant) for name in cases_.names() for variant in cases_.variants(name)):
+        limits = limits_of(each)
+        for one in limits:
+            found = limit_for(limits, metric, one.engine, one.profile)
+            assert found is None or not found.known, (each.label, one.engine, one.profile)
+
+
 def test_every_case_is_limited_in_all_that_it_has() -> None:
     every = {
         "start_error",
@@ -308,8 +317,8 @@ def test_every_case_is_limited_in_all_that_it_has() -> None:
         "energy_residual",
         "rate_residual",
     }
-    rows = {"gap_residual", "mode_residual", "law_residual", "lam_impulse_path"}
-    opening = {"gap_error", "complementarity", "event_times", "touch_count", "release_count"}
+    rows = {"gap_residual", "mode_residual", "law_residual", "lam_impulse_path", "contact_work"}
+    opening = {"gap_error", "complementarity", "event_times", "mode_times", "touch_count", "release_count"}
     for name in cases_.names():
         for variant in cases_.variants(name):
             each = load(name, variant)

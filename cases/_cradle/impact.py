@@ -4,7 +4,8 @@
     simultaneous   all at once: impulses J >= 0, h'+ + e h'- >= 0, and J is 0 where that is not 0 (Newton's law of
                    impact as a linear complementarity problem; Moreau 1988)
 
-Both are exact: a collision that takes no time moves nothing.
+Both are exact: a collision that takes no time moves nothing. Touching balls of small restitution collide without end
+at one instant, each time slower (Bernu and Mazighi 1990): by the law's own measure (`STILL`) there is a last one.
 """
 
 from __future__ import annotations
@@ -21,13 +22,15 @@ from crossbody.cases._arrays import Floats
 Touching = NDArray[np.bool_]
 Impulses = dict[int, float]
 """Row -> impulse, N s, of all rows that act at once."""
-Impact = Callable[[Floats, Floats, Touching, float], Iterator[Impulses]]
+Impact = Callable[[Floats, Floats, Touching, float, float], Iterator[Impulses]]
 
-SLOW = 1e-12
-"""A gap that closes slower than this part of the fastest ball stands still; equal rates are ties within it."""
+TIE = 1e-12
+"""Rates are equal within this part of the fastest ball."""
+STILL = 1e-9
+"""A gap whose rate is below this part of the fastest one seen so far stands still."""
 
 
-def sequential(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[Impulses]:
+def sequential(masses: Floats, v: Floats, touching: Touching, e: float, slow: float) -> Iterator[Impulses]:
     """The impulse of each collision in turn; v (n,) is moved on in place before each is told.
 
     Args:
@@ -35,14 +38,15 @@ def sequential(masses: Floats, v: Floats, touching: Touching, e: float) -> Itera
         v (n,): speeds, m/s.
         touching (n - 1,): which neighbours touch.
         e: restitution.
+        slow: rate below which a gap stands still, m/s.
     """
-    slow = SLOW * float(np.max(np.abs(v), initial=0.0))
+    tie = TIE * float(np.max(np.abs(v), initial=0.0))
     while True:
         rates = np.where(touching, np.diff(v), np.inf)
         worst = float(rates.min())
         if worst >= -slow:
             return
-        row = int(np.argmax(rates <= worst + slow))
+        row = int(np.argmax(rates <= worst + tie))
         a, b = masses[row : row + 2]
         yield _push(masses, v, {row: float((1.0 + e) * a * b / (a + b) * (v[row] - v[row + 1]))})
 
@@ -55,11 +59,10 @@ def _push(masses: Floats, v: Floats, impulses: Impulses) -> Impulses:
     return impulses
 
 
-def simultaneous(masses: Floats, v: Floats, touching: Touching, e: float) -> Iterator[Impulses]:
-    """All impulses at once, and again if some approach then; arguments as of `sequential`."""
-    slow = SLOW * float(np.max(np.abs(v), initial=0.0))
-    rows = np.flatnonzero(touching)
-    while len(rows) and float(np.diff(v)[rows].min()) < -slow:
+def simultaneous(masses: Floats, v: Floats, touching: Touching, e: float, slow: float) -> Iterator[Impulses]:
+    """All impulses of what touches and does not part, and again if some approach then; arguments as of `sequential`."""
+    while (touching & (np.diff(v) < -slow)).any():
+        rows = np.flatnonzero(touching & (np.diff(v) <= slow))
         impulses = pushes(delassus(masses)[np.ix_(rows, rows)], (1.0 + e) * np.diff(v)[rows])
         yield _push(masses, v, dict(zip(rows.tolist(), impulses.tolist(), strict=True)))
 

@@ -109,8 +109,8 @@ def _bounds(variant: str, rule: str, gap: float) -> Bounds:
         return bounds
     # Whether a row that passes an impulse on without having closed counts as a touch is a matter of convention.
     kept = {metric: bound for metric, bound in bounds.items() if metric != "touch_count"}
-    kept["pattern_simultaneous"] = kept.pop("pattern_distance")
-    return kept
+    pattern = kept.pop("pattern_distance")
+    return kept | ({"pattern_simultaneous": pattern} if gap == 0.0 else {})  # apart, not all collide at once
 
 
 def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:

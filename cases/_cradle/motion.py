@@ -5,28 +5,32 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases._cradle.impact import RULES, SLOW, Touching
+from crossbody.cases._cradle.impact import RULES, STILL, TIE, Touching
 from crossbody.cases._cradle.scene import Row
 from crossbody.cases._outcome import Outcome
 from crossbody.cases._pieces import pieces
 from crossbody.cases._trajectory import Event, Ledger, Mode, Trajectory
 
 MAX_IMPACTS = 100_000
+TOUCH = 64.0 * float(np.finfo(np.float64).eps)
+"""A gap this small, of the largest coordinate and at least of 1 m, is closed."""
 
 
 @dataclass(slots=True)
 class _Course:
-    """Pieces of straight motion (start, x, v, work done by each row so far), and the impacts between them."""
+    """Pieces of straight motion (start, x, v, work of each row), impacts, and the fastest rate of a gap so far, m/s."""
 
     starts: list[float] = field(default_factory=list)
     x: list[Floats] = field(default_factory=list)
     v: list[Floats] = field(default_factory=list)
     work: list[Floats] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    fastest: float = 0.0
     full: bool = False
 
     def add(self, t: float, x: Floats, v: Floats, work: Floats) -> None:
@@ -65,8 +69,9 @@ class Motion:
         while True:
             course.add(t, x, v, work)
             if self._collide(t, v, touching, work, course):
+                self._come_together(x, v, touching, STILL * course.fastest)
                 course.add(t, x, v, work)
-            wait = self._advance(x, v, touching)
+            wait = self._advance(x, v, touching, STILL * course.fastest)
             course.full = len(course.events) >= 2 * MAX_IMPACTS
             if math.isinf(wait) or course.full:
                 return course
@@ -78,20 +83,35 @@ class Motion:
         A collision is told of a row that closed; one that stood still and passes an impulse on has none of its own.
         """
         before, rates = len(course.events), np.diff(v)
-        for impulses in self.impact(self.row.masses, v, touching, self.row.e):
+        course.fastest = max(course.fastest, float(np.abs(rates).max()))
+        for impulses in self.impact(self.row.masses, v, touching, self.row.e, STILL * course.fastest):
             after = np.diff(v)
             for row, impulse in impulses.items():
                 work[row] += 0.5 * impulse * (rates[row] + after[row])
-            closed = {i: p for i, p in impulses.items() if p > 0.0 and rates[i] < -SLOW * self.row.speed}
+            closed = {i: p for i, p in impulses.items() if p > 0.0 and rates[i] < -STILL * course.fastest}
             course.events += _collisions(t, closed)
+            course.fastest = max(course.fastest, float(np.abs(after).max()))
             rates = after
             if len(course.events) >= 2 * MAX_IMPACTS:
                 break
         return len(course.events) > before
 
-    def _advance(self, x: Floats, v: Floats, touching: Touching) -> float:
-        """Move to the next touch; the time that it takes, s, infinite if no gap closes any more."""
-        rates, slow = np.diff(v), SLOW * float(np.max(np.abs(v)))
+    def _closed(self, x: Floats) -> Touching:
+        """Gaps that count as closed: collisions that follow each other ever faster end there at one instant."""
+        return np.asarray(self.row.gap + np.diff(x) <= TOUCH * max(1.0, float(np.abs(x).max())))
+
+    def _come_together(self, x: Floats, v: Floats, touching: Touching, slow: float) -> None:
+        """Give balls that touch and stand still against each other one speed, to which collisions without end lead."""
+        still = (touching | self._closed(x)) & (np.abs(np.diff(v)) <= slow)
+        touching |= still
+        m, first = self.row.masses, np.concatenate([[0], np.flatnonzero(~still) + 1, [self.row.n]])
+        for a, b in pairwise(first.tolist()):
+            if b - a > 1:
+                v[a:b] = m[a:b] @ v[a:b] / m[a:b].sum()
+
+    def _advance(self, x: Floats, v: Floats, touching: Touching, slow: float) -> float:
+        """Move to the next touch; the time that it takes, s, infinite if no gap closes faster than `slow`, m/s."""
+        rates = np.diff(v)
         touching &= rates <= slow
         gaps = np.maximum(self.row.gap + np.diff(x), 0.0)
         closing = ~touching & (rates < -slow)
@@ -99,7 +119,7 @@ class Motion:
         wait = float(times.min())
         if math.isfinite(wait):
             x += v * wait
-            touching |= times <= wait * (1.0 + SLOW)
+            touching |= (times <= wait * (1.0 + TIE)) | self._closed(x)
         return wait
 
     @property

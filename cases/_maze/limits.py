@@ -19,6 +19,7 @@ _LOG = "read between the samples of a run"
 _SMALL = "a tolerance of 1e-9 in the height, over that through which the ball moves, a part of its circle's radius"
 _TOLERATED, _DEFAULT = 1e-9, 1e-6
 """Default tolerance, and the limit that every case has on energies over the largest kinetic one."""
+_ENERGIES = ("energy_drift", "energy_integrator", "contact_work")
 _CLAIMED: Mapping[str, tuple[float, str]] = {
     "swing_period": (1e-6, _LOG),
     "unstable_pole": (1e-6, _TOLERANCE),
@@ -48,7 +49,9 @@ def limits(variant: str, claims: Iterable[Claim], fallen: float) -> tuple[Limit,
     """
     bounds = {**_ALWAYS, **{claim.metric: _CLAIMED[claim.metric] for claim in claims}}
     if _TOLERATED / fallen > _DEFAULT:
-        bounds |= {metric: (_TOLERATED / fallen, _SMALL) for metric in ("energy_drift", "energy_integrator")}
+        bounds |= {
+            metric: (_TOLERATED / fallen, _SMALL) for metric in ("energy_drift", "energy_integrator", "contact_work")
+        }
     return (
         *(Limit(metric=metric, value=value, why=why) for metric, (value, why) in bounds.items()),
         *_of_engines(variant),

@@ -196,6 +196,7 @@ class SundialsRun:
             self.state.t = stop
             if self._next_sample() <= stop:
                 self._sample(self.equations.accelerate(stop, before.q, before.v)[1])
+            self._check_progress(moved=False)
             return False
         try:
             state, fired = arc.step(stop, min(stop, self._next_sample()))

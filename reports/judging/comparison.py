@@ -41,7 +41,7 @@ FLOOR = 0.5
 """A number is judged where at least this part of the time for which the truth must be trusted was compared."""
 REACHED = 1e-9
 """Part of the horizon by which the end of a record may miss it: steps that do not add up to it exactly."""
-BY_EVENTS = ("event_times", "restitution_error")
+BY_EVENTS = ("event_times", "mode_times", "restitution_error")
 """Metrics that match events with the truth's, as far as that is trusted."""
 
 

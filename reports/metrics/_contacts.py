@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases._trajectory import Mode, Trajectory
+from crossbody.cases._trajectory import Event, Mode, Trajectory
 
 CLOSED = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """One contact: row, instant of touch and of release (infinite if it lasts to the end), s."""
+    """One contact of a row.
+
+    Attributes:
+        row: which.
+        touch: when it begins, s.
+        release: when it ends, s; infinite if it lasts to the end.
+        settled: when its COLLISION hands over to CONTACT, s; infinite if it does not.
+        free: when the row is FREE behind it, s: at its release or, let go below the surface, later; infinite if never.
+    """
 
     row: int
     touch: float
     release: float = np.inf
+    settled: float = np.inf
+    free: float = np.inf
+
+    def behind(self, event: Event) -> Contact:
+        """The contact with a later event of its row."""
+        ends = event.before in CLOSED and event.after not in CLOSED
+        return replace(
+            self,
+            release=event.t if ends else self.release,
+            settled=event.t if (event.before, event.after) == (Mode.COLLISION, Mode.CONTACT) else self.settled,
+            free=event.t if event.after == Mode.FREE else self.free,
+        )
 
 
 def contacts(run: Trajectory) -> tuple[Contact, ...]:
@@ -29,14 +49,13 @@ def contacts(run: Trajectory) -> tuple[Contact, ...]:
     if not run.events and run.mode.size and np.all(run.mode == -1):
         return _by_sign(run)
     found: list[Contact] = []
-    open_rows: dict[int, int] = {}
+    last: dict[int, int] = {}
     for event in run.events:
         if event.after in CLOSED and event.before not in CLOSED:
-            open_rows[event.contact] = len(found)
+            last[event.contact] = len(found)
             found.append(Contact(event.contact, event.t))
-        elif event.before in CLOSED and event.after not in CLOSED and event.contact in open_rows:
-            at = open_rows.pop(event.contact)
-            found[at] = Contact(event.contact, found[at].touch, event.t)
+        elif event.contact in last:
+            found[last[event.contact]] = found[last[event.contact]].behind(event)
     return tuple(found)
 
 

@@ -37,14 +37,12 @@ def with_collisions(run: Trajectory, events: Sequence[Event]) -> Floats:
     """The same with the impulses of collisions that took no time (n, nc), N s.
 
     Args:
-        run: its multipliers.
+        run: its multipliers; of several samples at the instant of a collision the last is behind it.
         events: those of the motion, in the run's time.
     """
     total = cumulative(run)
-    near = SAME * float(run.t[-1]) if len(run.t) else 0.0
     for event in events:
-        if event.impulse:  # of two samples at that instant the second is behind the step
-            last = int(np.searchsorted(run.t, event.t + near, side="right")) - 1
-            behind = last if last >= 0 and run.t[last] >= event.t - near else last + 1
-            total[behind:, event.contact] += event.impulse
+        if event.impulse:
+            first, behind = (int(np.searchsorted(run.t, event.t, side=side)) for side in ("left", "right"))
+            total[max(first, behind - 1) :, event.contact] += event.impulse
     return total

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
+ROUNDING = 1e-6
+"""Gaps that never open beyond this part of the largest coordinate are known to its tolerance alone."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -29,4 +31,5 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     smooth = away(exact, [switch.t for switch in truth.trajectory.switches], case.t_end)
     off = float(np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], initial=0.0))
     scale = float(np.max(np.abs(truth.trajectory.gap[:, rows])))
+    scale = max(scale, ROUNDING * float(np.max(np.abs(truth.trajectory.q), initial=0.0)))
     return off / scale if scale else off

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.metrics._impulse import away, with_collisions
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -22,8 +22,9 @@ NEEDS = "lam"
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time included.
 
-    Releases are matched too, as lam jumps there: a sample on the wrong side would count for half its step. NaN where
-    lam is not known; None where nothing presses; N s where only the run's does.
+    Releases are matched too, as lam jumps there: a sample on the wrong side would count for half its step. Instants of
+    collisions that take no time are left out, as in `velocity`. NaN where lam is not known; None where nothing presses;
+    N s where only the run's does.
     """
     inside, exact = aligned(truth, run, releases=True)
     if not inside.any():
@@ -32,5 +33,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     theirs = with_collisions(exact, truth.trajectory.events)
     scale = float(np.max(np.abs(theirs), initial=0.0))
-    off = float(np.max(np.abs(with_collisions(run, run.events)[inside] - theirs), initial=0.0))
+    smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
+    smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
+    off = float(np.max(np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth], initial=0.0))
     return off / scale if scale else off or None

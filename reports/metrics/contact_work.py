@@ -1,0 +1,36 @@
+"""Work of every row against the truth's on matched arcs, over the largest kinetic energy."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.reports.metrics._align import aligned
+from crossbody.reports.metrics._impulse import away
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reports.judging.truth import Truth
+
+UNIT = "1"
+CLAIMED = False
+NEEDS = "ledger"
+
+
+def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Max over samples and rows of |W - W_truth| / max T_truth; NaN without an account, None where the truth has none.
+
+    The sum over all rows is in `energy_integrator`; here each row has its own. Instants of collisions that take no time
+    are left out, as in `energy_drift`.
+    """
+    inside, exact = aligned(truth, run)
+    scale = float(truth.trajectory.energy[:, 0].max())
+    if exact.ledger is None or scale == 0.0 or not inside.any() or not run.gap.shape[1]:
+        return None
+    if run.ledger is None:
+        return math.nan
+    smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
+    off = np.abs(run.ledger.contact[inside] - exact.ledger.contact)[smooth]
+    return float(np.max(off, initial=0.0)) / scale
