@@ -74,7 +74,9 @@ def _parameters(command: _Work) -> _Work:
         control: str | None, tick: float | None, without: str | None, push: tuple[tuple[Any, ...], ...], **others: Any,
     ) -> int:  # fmt: skip
         if tick is not None and control is None and not any(pair.startswith("control=") for pair in pairs):
-            raise click.UsageError("--tick is the time between two calls of a controller, and none is given: --control.")
+            raise click.UsageError(
+                "--tick is the time between two calls of a controller, and none is given: --control."
+            )
         pushes = "; ".join(" ".join(map(str, one)) for one in push) or None
         named = {"t_end": t_end, "ctrl": ctrl, "control": control, "tick": tick, "without": without, "push": pushes}
         own = [f"{name}={value}" for name, value in named.items() if value is not None]
