@@ -10,7 +10,7 @@ from known_errors import ERRORS, OFF, account, right, scene
 from known_values import VALUES
 
 from crossbody import cases
-from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
+from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
 from crossbody.cases._defaults import limits_of
 from crossbody.cases._delta import pose
 from crossbody.reports import metrics
@@ -163,3 +163,18 @@ def test_a_touch_of_another_row_ends_the_matching() -> None:
     events = tuple(replace(e, contact=swapped.get(e.contact, e.contact)) for e in truth.trajectory.events)
     assert isinstance(events[0], Event)
     assert matched(truth, replace(truth.trajectory, events=events)) == []
+
+
+def test_a_row_that_comes_free_where_a_variable_changes_has_another_gap_behind() -> None:
+    case, truth = right("linear ball")
+    run = truth.trajectory
+    k = next(i for i, e in enumerate(run.events) if e.before is Mode.BALLISTIC)
+    t = run.events[k].t
+    jumped = replace(
+        run,
+        gap=run.gap + np.where(run.t > t, 1.0, 0.0)[:, None],
+        switches=(Switch(t=t, variable=0, before=0, after=1),),
+    )
+    late = replace(run, events=(*run.events[:k], replace(run.events[k], t=t + 1e-7), *run.events[k + 1 :]))
+    assert measure("mode_times", case, replace(truth, trajectory=jumped), late) == 0.0
+    assert measure("mode_times", case, replace(truth, trajectory=replace(jumped, switches=())), late) > 0.0

@@ -36,8 +36,12 @@ def _opened(truth: Trajectory, a: Contact, b: Contact) -> float:
     """How far the gap of the truth opens from one freedom to the other, over its fastest rate, s.
 
     A row that is let go where its multiplier vanishes rises as the cube of the time: its instant is known to the cube
-    root of its depth alone, and nothing in the motion depends on it.
+    root of its depth alone, and nothing in the motion depends on it. Where a discrete variable changes in between, the
+    row's gap is another one: that instant is judged as a change of the variable.
     """
+    first, last = sorted((a.free, b.free))
+    if any(first <= switch.t <= last for switch in truth.switches):
+        return 0.0
     gap, (here, there) = truth.gap[:, a.row], np.interp([a.free, b.free], truth.t, truth.gap[:, a.row])
     dt = np.diff(truth.t)
     fastest = float(np.max(np.abs(np.diff(gap)[dt > 0.0] / dt[dt > 0.0]), initial=0.0))
