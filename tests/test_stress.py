@@ -338,8 +338,9 @@ def test_a_row_that_has_collapsed_passes_an_impulse_on_as_one_that_touches(n: in
     run = engines.load("reference").prepare(case, "compiled").run()
     assert case.closed_form is not None
     truth = case.closed_form(run.t)
-    assert np.max(np.abs(run.q - truth.q)) < 1e-9 * np.max(np.abs(truth.q))
+    # Collisions end at rates of 1e-9 of the fastest, 1 m/s: more is not known of a rate, nor of how far it leads.
     assert np.max(np.abs(run.v[-1] - truth.v[-1])) < 1e-9
+    assert np.max(np.abs(run.q - truth.q)) < 1e-9 * run.t[-1]
     assert run.v[-1].sum() == pytest.approx(lifted, rel=1e-12)  # momentum: equal masses, 1 m/s
 
 
