@@ -25,38 +25,40 @@ START, SECOND = np.arange(2)  # stages, as values
 @compiled
 def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> int:
     """k[stage] = (q', v'), and the powers of the ledger if it is kept."""
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], OWN) != 0:
+    q, v = y[: s.nq], y[s.nq :]
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
         return 1
-    keep(K, s, m, w, t, y, stage)
+    keep(K, s, m, w, t, q, v, stage)
     return 0
 
 
 @inlined
-def keep(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> None:
+def keep(K: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array, stage: int) -> None:
     """k[stage] = (q', v') from the acceleration in the workspace, and the powers."""
     n, nq, k, vd = s.n, s.nq, w.k[stage], w.vd
     if s.has_velocity:
-        K.velocity(t, y[:nq], y[nq:], m.p, k[:nq])
+        K.velocity(t, q, v, m.p, k[:nq])
+        for i in range(n):
+            k[nq + i] = vd[i]
     else:
         for i in range(n):
-            k[i] = y[n + i]
-    for i in range(n):
-        k[nq + i] = vd[i]
+            k[i] = v[i]
+            k[n + i] = vd[i]
     if s.ledger:
-        powers(K, s, m, w, t, y, stage)
+        powers(K, s, m, w, t, q, v, stage)
 
 
 @inlined
-def powers(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int) -> None:
+def powers(K: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array, stage: int) -> None:
     """kz[stage] = power of every row's multiplier, of the inputs, of the damping."""
-    nc = s.nc
+    nc, kz, idx, la, hda, e = s.nc, w.kz[stage], w.idx, w.la, w.hda, w.e
     for i in range(nc):
-        w.kz[stage, i] = 0.0
+        kz[i] = 0.0
     for j in range(s.na):
-        w.kz[stage, w.idx[j]] = w.la[j] * w.hda[j]
-    K.power(t, y[: s.nq], y[s.nq :], w.u, m.p, w.e)
-    w.kz[stage, nc] = w.e[0]
-    w.kz[stage, nc + 1] = w.e[1]
+        kz[idx[j]] = la[j] * hda[j]
+    K.power(t, q, v, w.u, m.p, e)
+    kz[nc] = e[0]
+    kz[nc + 1] = e[1]
 
 
 @compiled

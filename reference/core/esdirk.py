@@ -231,7 +231,7 @@ def _stage(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> int:
                 w.k[stage, a] = (w.ys[a] - w.place[a]) / g if s.has_velocity else w.ys[nq + a]
             keep_velocity(s, w, stage)
             if s.ledger:
-                powers(K, s, m, w, t, w.ys, stage)
+                powers(K, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], stage)
             return 0
         before = size
     return 2

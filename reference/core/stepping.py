@@ -70,7 +70,7 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         s.t_old = s.t
         known = dense.put_on_rows(K, s, m, w, 1.0, w.y1, dense.tolerated(s))
         if known:
-            dop853.keep(K, s, m, w, t, w.y1, end)
+            dop853.keep(K, s, m, w, t, w.y1[:nq], w.y1[nq:], end)
     if not known and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     scatter(s, w, w.lams[last])
