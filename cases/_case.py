@@ -173,6 +173,13 @@ class Inputs:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
 
+    def at(self, t: float | Floats) -> Floats:
+        """Return the values (..., nu) that hold at instants t, s."""
+        last = np.asarray(np.searchsorted(self.times, t, side="right")) - 1
+        found: Floats = np.zeros((*last.shape, len(self.names)))
+        found[last >= 0] = self.values[last[last >= 0]]
+        return found
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:

@@ -166,14 +166,14 @@ class Controller:
 
     def given(self, times: Floats, values: Floats) -> Inputs:
         """Return what acted on the run: these inputs (m,), (m, nu), and on top of them the controller's."""
-        own = np.array(self.times)
-        every = np.union1d(times, own)
-        table = np.zeros((len(every), len(self.u)))
-        for at, rows in ((times, values), (own, np.array(self.values).reshape(len(own), len(self.u)))):
-            last = np.searchsorted(at, every, side="right") - 1
-            table[last >= 0] += rows[last[last >= 0]]
         names = self.control.names or tuple(f"u[{i}]" for i in range(len(self.u)))
-        return Inputs(names=names, times=every, values=table)
+        own = np.array(self.values).reshape(-1, len(self.u))
+        parts = [
+            Inputs(names=names, times=times, values=values),
+            Inputs(names=names, times=np.array(self.times), values=own),
+        ]
+        every = np.union1d(parts[0].times, parts[1].times)
+        return Inputs(names=names, times=every, values=parts[0].at(every) + parts[1].at(every))
 
     def _checked(self, t: float, found: Any) -> Floats:
         try:

@@ -58,8 +58,7 @@ class Acting:
         Raises:
             ControlError, NotFinite: as `Controller`.
         """
-        last = int(np.searchsorted(self.times, t, side="right")) - 1
-        total: Floats = self.values[last].copy() if last >= 0 else np.zeros(self.values.shape[1])
+        total = np.zeros(self.values.shape[1]) if self.case.inputs is None else self.case.inputs.at(t)
         if self.controller is not None:
             total += self.controller(t, q, v) if t in self.ticks else self.controller.u
         return total

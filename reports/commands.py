@@ -17,7 +17,7 @@ from crossbody.cases import Case, InvalidValue
 from crossbody.cases.files.reading import SUFFIXES
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
-from crossbody.reports.judging.parts import PARTS
+from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.pages import grid, html, results, site
 from crossbody.reports.pages.styles import TRUTH
@@ -35,7 +35,7 @@ OF_USERS = (".py", *SUFFIXES)
 GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
 WRONG = [Word.OUTSIDE, Word.CRASHED]
 WIDTH = 140  # of the table in a file or a pipe
-SHOWN = {"position": "position", **{f"position ({part})": part for part in PARTS}}
+SHOWN = {"position": "position", **{part_of("position", part): part for part in PARTS}}
 """Metrics in the terminal and their heads: the parts of the worst error of position add up to it."""
 COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
 

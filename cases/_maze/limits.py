@@ -49,9 +49,7 @@ def limits(variant: str, claims: Iterable[Claim], fallen: float) -> tuple[Limit,
     """
     bounds = {**_ALWAYS, **{claim.metric: _CLAIMED[claim.metric] for claim in claims}}
     if _TOLERATED / fallen > _DEFAULT:
-        bounds |= {
-            metric: (_TOLERATED / fallen, _SMALL) for metric in ("energy_drift", "energy_integrator", "contact_work")
-        }
+        bounds |= dict.fromkeys(_ENERGIES, (_TOLERATED / fallen, _SMALL))
     return (
         *(Limit(metric=metric, value=value, why=why) for metric, (value, why) in bounds.items()),
         *_of_engines(variant),

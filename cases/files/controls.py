@@ -133,8 +133,7 @@ def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Input
     times = np.unique([*own, *(t for _, _, span in given for t in span if np.isfinite(t))])
     values = np.zeros((len(times), len(scene.inputs)))
     if inputs is not None:
-        last = np.searchsorted(inputs.times, times, side="right") - 1
-        values[last >= 0, : len(inputs.names)] = inputs.values[last[last >= 0]]
+        values[:, : len(inputs.names)] = inputs.at(times)
     pushes = values[:, len(scene.actuators) :].reshape(len(times), -1, 3)
     for i, (_, force, (start, end)) in enumerate(given):
         pushes[(times >= start) & (times < end), i] = force

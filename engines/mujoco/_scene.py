@@ -32,7 +32,7 @@ class Scene:
         chart: positions and velocities of the model -> those of the case; None where they are the same.
         instants: when the inputs change, s, increasing.
         change: puts in force what acts from such an instant on.
-        acting: what a controller of the user's own gave in the run; None where there is none.
+        acting: what acts on a case's scene from outside, controllers included; None elsewhere.
         hook: adds to efc_aref what solref cannot say, and sets forces that depend on the state; None if nothing.
         always: whether the hook acts while all rows are free too.
         arm: opens and closes rows to suit their modes (matched profile only).

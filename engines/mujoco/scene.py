@@ -102,7 +102,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting), modes=rows.modes,
         lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting),
-        acting=acting if case.control is not None else None,
+        acting=acting,
         hook=rows.hook() if profile == "matched" else None, always=True,
     )  # fmt: skip
     prepared.audit = _audit(case, profile, model, rows)

@@ -33,7 +33,7 @@ class World:
         instants: when the inputs change, s, increasing.
         change: (t, q, v) puts in force what acts from such an instant on.
         reset: back to the start: no input, no memory.
-        acting: what a controller of the user's own gave in the run; None where there is none.
+        acting: what acts on a case's scene from outside, controllers included; None elsewhere.
         safe: (q, v) -> whether the state is one that the scene can reach.
     """
 

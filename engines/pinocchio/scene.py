@@ -180,9 +180,7 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
         forces.still()
         acting.reset()
 
-    return World(
-        instants=acting.instants, change=change, reset=reset, acting=acting if case.control is not None else None
-    )
+    return World(instants=acting.instants, change=change, reset=reset, acting=acting)
 
 
 def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:

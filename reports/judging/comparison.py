@@ -16,7 +16,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, splits
+from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
 from crossbody.reports.judging.stored import Deviations, defaults, deviations, differing, words
 from crossbody.reports.judging.truth import Truth, truth_of
 from crossbody.reports.judging.verdict import (
@@ -118,11 +118,6 @@ def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> 
 def table(rows: Iterable[Verdict]) -> pd.DataFrame:
     """Verdicts as a tidy table; the columns are there even without a row."""
     return pd.DataFrame([row.row() for row in rows], columns=list(Verdict.__dataclass_fields__))
-
-
-def part_of(metric: str, part: str) -> str:
-    """Name of the row that says how much of the worst error of a metric a part is."""
-    return f"{metric} ({part})"
 
 
 PART_ROWS = tuple(part_of(metric, part) for metric in SPLIT for part in PARTS)

@@ -93,6 +93,11 @@ class Split:
     missing: Mapping[str, str]
 
 
+def part_of(metric: str, part: str) -> str:
+    """Name of the row that says how much of the worst error of a metric a part is."""
+    return f"{metric} ({part})"
+
+
 class NotMeasuredError(Exception):
     """A part of an error that is not known, with the sentence that says why."""
 

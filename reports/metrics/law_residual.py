@@ -43,7 +43,8 @@ def multipliers(
     inputs: Inputs | None = None,
 ) -> Floats:
     """Lam (len(rows),) that the law asks for at one state with those rows active, `fast` with those of COLLISION."""
-    M, f = system.terms(q, v, u=_held(case.inputs if inputs is None else inputs, t), t=t)
+    acting = case.inputs if inputs is None else inputs
+    M, f = system.terms(q, v, u=None if acting is None else acting.at(t), t=t)
     H, h, Hdv = (part[rows] for part in system.constraint(q, v))
     law = case.law
     a0, a1 = (np.where(fast, b, a)[rows] for a, b in ((law.a0, law.b0), (law.a1, law.b1)))
@@ -52,14 +53,6 @@ def multipliers(
     inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
     found = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
     return np.asarray(found, dtype=np.float64)
-
-
-def _held(inputs: Inputs | None, t: float) -> Floats | None:
-    """The inputs (nu,) at an instant that is none of their own."""
-    if inputs is None:
-        return None
-    at = int(np.searchsorted(inputs.times, t, side="right")) - 1
-    return np.asarray(inputs.values[at] if at >= 0 else np.zeros(inputs.values.shape[1]))
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from crossbody.reports.judging.parts import PARTS
+from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages.html import bounded, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
-SHARES = tuple(f"position ({part})" for part in PARTS)
+SHARES = tuple(part_of("position", part) for part in PARTS)
 """Parts of the worst error of position: they stand in the table of a case although nothing judges them."""
 KEY = (
     "finished",
