@@ -71,11 +71,12 @@ def differences(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
 
 def matrices(quaternions: Floats) -> Floats:
     """Return the rotations (..., 3, 3) of quaternions (..., 4), w first, of any length but 0."""
-    w, x, y, z = np.moveaxis(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True), -1, 0)
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    found: Floats = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    q = np.asarray(quaternions)
+    w, x, y, z = (q[..., k] for k in range(4))
+    two = 2.0 / (w * w + x * x + y * y + z * z)
+    X, Y, Z = two * x, two * y, two * z
+    found: Floats = np.empty((*q.shape[:-1], 3, 3))
+    found[..., 0, 0], found[..., 0, 1], found[..., 0, 2] = 1.0 - Y * y - Z * z, X * y - Z * w, X * z + Y * w
+    found[..., 1, 0], found[..., 1, 1], found[..., 1, 2] = X * y + Z * w, 1.0 - X * x - Z * z, Y * z - X * w
+    found[..., 2, 0], found[..., 2, 1], found[..., 2, 2] = X * z - Y * w, Y * z + X * w, 1.0 - X * x - Y * y
     return found

@@ -12,8 +12,8 @@ from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference._system import System, initial_modes
 
 NOISE = 1e-3
-"""Of the largest row's size: a row that a motion does not move (the end of a capsule on its hinge) is off by rounding of
-positions as the others are, and has no size of its own."""
+"""Of the largest row's size: a row that no motion moves (the end of a capsule on its hinge) has no size of its own,
+and is off by the rounding of positions as the others are."""
 
 
 class State:

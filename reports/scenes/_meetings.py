@@ -11,6 +11,8 @@ from crossbody.reports.scenes._kinematics import Pose
 Placed = tuple[Shape, Pose]
 """A shape and its pose in the world."""
 
+UP = np.array([0.0, 0.0, 1.0])
+
 
 def meeting(first: Placed, second: Placed, place: int) -> tuple[Floats, Floats]:
     """Return the point (n, 3), m, and the unit normal (n, 3) from the first shape to the second.
@@ -35,20 +37,19 @@ def meeting(first: Placed, second: Placed, place: int) -> tuple[Floats, Floats]:
 def _lowest(solid: Placed, place: int, normal: Floats) -> Floats:
     """Return the point of a solid that is lowest along a normal, for one of its places."""
     shape, (centre, rotation) = solid
-    size, x, y, z = np.asarray(shape.size), *np.moveaxis(rotation, 2, 0)
-    signs = [1.0 if place >> bit & 1 else -1.0 for bit in range(3)]
+    size, signs = np.asarray(shape.size), np.array([1.0 if place >> bit & 1 else -1.0 for bit in range(3)])
+    n = _inside(rotation, normal)
     if shape.type == "sphere":
-        return centre - size[0] * normal
-    if shape.type == "capsule":
-        return centre + signs[0] * size[1] * z - size[0] * normal
-    if shape.type == "cylinder":
-        down = np.sum(normal * z, axis=1, keepdims=True) * z - normal
-        return centre + signs[0] * size[1] * z + size[0] * _unit(down)
-    if shape.type == "box":
-        return centre + signs[0] * size[0] * x + signs[1] * size[1] * y + signs[2] * size[2] * z
-    scaled = size * _inside(rotation, normal)
-    found: Floats = centre - _outside(rotation, size * _unit(scaled))
-    return found
+        local = -size[0] * n
+    elif shape.type == "capsule":
+        local = signs[0] * size[1] * UP - size[0] * n
+    elif shape.type == "cylinder":
+        local = signs[0] * size[1] * UP - size[0] * _unit(n * (1.0 - UP))
+    elif shape.type == "box":
+        local = np.tile(signs * size, (len(n), 1))
+    else:
+        local = -size * _unit(size * n)
+    return centre + _outside(rotation, local)
 
 
 def _nearest(solid: Placed, point: Floats) -> Floats:
