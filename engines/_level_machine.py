@@ -122,7 +122,7 @@ class LevelMachine:
         vd, lam = self.rows.accelerate(q, v, modes)
         press, noise = self.rows.pressure(q, v, vd)
         G = np.diag(self.rows.delassus(q))
-        self._unmoved = set(np.flatnonzero(G <= UNMOVED * G.max(initial=0.0)).tolist())
+        self._unmoved = set(np.flatnonzero(UNMOVED * G.max(initial=0.0) >= G).tolist())
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
         return View(h, hd, lam, allowed, press > noise)
 
