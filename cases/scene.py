@@ -112,7 +112,7 @@ class Joint(_Named):
         type: free, ball, slide or hinge.
         axis, anchor: in body axes, unit and m.
         reference: coordinate at the pose of `Body.position`, m or rad; slide and hinge alone.
-        range: lowest and highest coordinate, m or rad; of a ball joint 0 and the largest angle.
+        range: lowest and highest coordinate, m or rad; of a ball joint 0 (it becomes -inf) and the largest angle.
         margin: distance to the bound at which its row begins to act.
         armature: added to the joint's inertia, kg m^2 or kg.
         damping: b0, b1, b2 of the force -(b0 v + b1 v |v| + b2 v^3).
@@ -153,6 +153,20 @@ class Joint(_Named):
         size = 4 if self.type in ("ball", "free") else 1
         rest = UPRIGHT if size == 4 and len(self.rest) == 1 else self.rest
         object.__setattr__(self, "rest", _vector(f"Joint {self.name!r}: rest", rest, size))
+        if size == 4 and self.limited:
+            self._put_angle()
+
+    def _put_angle(self) -> None:
+        """Check the bound of a ball joint, and leave it alone: no angle is below 0."""
+        low, high = self.range
+        if self.type == "free":
+            raise SceneError(f"Joint {self.name!r}: a free joint has no bounds; range is {list(self.range)}.")
+        if low > 0.0 or not high > max(self.margin, 0.0):
+            raise SceneError(
+                f"Joint {self.name!r}: range is {list(self.range)} and margin {self.margin:g}; a ball joint has 0 and "
+                "its largest angle, rad, above the margin: at no angle nothing says which way is back."
+            )
+        object.__setattr__(self, "range", (-math.inf, high))
 
     @property
     def limited(self) -> bool:

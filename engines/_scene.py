@@ -51,6 +51,11 @@ def places(scene: Scene) -> tuple[dict[str, int], dict[str, int]]:
     return q, v
 
 
+def angle_of(quaternion: Floats) -> Floats:
+    """Return the rotation vector (..., 3), rad, of a quaternion (..., 4), at most half a turn long."""
+    return turned(quaternion, np.array([1.0, 0.0, 0.0, 0.0]))
+
+
 def tendons(scene: Scene) -> Floats:
     """Return dl/dx (nt, nv) of the tendons."""
     T = np.zeros((len(scene.tendons), scene.nv))
@@ -209,8 +214,8 @@ class Rows:
         """Return h (nc,)."""
         x = self.forces.x(q)
         h = [self._loop(i, x)[0] for i in range(len(self.ends))]
-        for part, row in self._bounded():
-            (low, high), length = part.range, float(row @ x)
+        for part, length, _, _ in self._bounded(q, np.zeros(self.scene.nv)):
+            low, high = part.range
             h += [length - low - part.margin] if np.isfinite(low) else []
             h += [high - length - part.margin] if np.isfinite(high) else []
         return np.array(h)
@@ -219,24 +224,40 @@ class Rows:
         """Return H (nc, nv)."""
         x = self.forces.x(q)
         H = [self._loop(i, x)[1] for i in range(len(self.ends))]
-        for part, row in self._bounded():
+        for part, _, row, _ in self._bounded(q, np.zeros(self.scene.nv)):
             H += [sign * row for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
         return np.array(H).reshape(-1, len(x))
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (nc,)."""
         x = self.forces.x(q)
-        drift = np.zeros(len(self.heights(q)))
-        for i, (_, (second, _)) in enumerate(self.ends):
-            drift[i] = -self._loop(i, x)[2] * (second @ v) ** 2
-        return drift
+        drift = [-self._loop(i, x)[2] * float(second @ v) ** 2 for i, (_, (second, _)) in enumerate(self.ends)]
+        for part, _, _, bend in self._bounded(q, v):
+            drift += [sign * bend for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
+        return np.array(drift)
 
-    def _bounded(self) -> list[tuple[Joint | Tendon, Floats]]:
-        """What may have bounds, with the derivative (nv,) of its coordinate or length, but distances of points."""
-        unit, place = np.eye(self.scene.nv), self.forces.place
-        rows = [*(unit[place[joint.name]] for joint in self.scene.joints), *self.forces.T]
-        found = zip(self.scene.bounded, rows, strict=True)
-        return [(part, row) for part, row in found if isinstance(part, Joint) or part.joints]
+    def _bounded(self, q: Floats, v: Floats) -> list[tuple[Joint | Tendon, float, Floats, float]]:
+        """What may have bounds, but distances of points: coordinate or length, its derivative (nv,), its rate's drift."""
+        unit, forces, x = np.eye(self.scene.nv), self.forces, self.forces.x(q)
+        found: list[tuple[Joint | Tendon, float, Floats, float]] = []
+        for joint in self.scene.joints:
+            first = forces.place[joint.name]
+            if joint.type == "ball" and joint.limited:
+                found.append((joint, *self._angle(joint, q, v)))
+            else:
+                found.append((joint, float(x[first]), unit[first], 0.0))
+        lengths = zip(self.scene.tendons, forces.T, strict=True)
+        return [*found, *((tendon, float(row @ x), row, 0.0) for tendon, row in lengths if tendon.joints)]
+
+    def _angle(self, joint: Joint, q: Floats, v: Floats) -> tuple[float, Floats, float]:
+        """Return the angle of a ball joint, its derivative along v (nv,), and its second along a steady v."""
+        row, moved = np.zeros(self.scene.nv), self.forces.moved(joint)
+        vector = angle_of(q[self.forces.at[joint.name] :][:4])
+        angle = float(np.linalg.norm(vector))
+        row[moved] = vector / angle if angle > 0.0 else 0.0
+        across = v[moved] - row @ v * row[moved]
+        bend = float(across @ across) / (2.0 * np.tan(angle / 2.0)) if angle > 0.0 else 0.0
+        return angle, row, bend
 
     def _end(self, kind: str, name: str) -> tuple[Floats, float]:
         """Return the derivative (nv,) of a coordinate or a length, zero without a name, and what it is at rest."""

@@ -95,9 +95,15 @@ def _joint(rng: np.random.Generator, name: str, body: str, kind: str) -> Joint:
         damping=tuple(rng.uniform(0.0, 0.3, 3)) if kind != "free" else (0.0, 0.0, 0.0),
         stiffness=tuple(rng.uniform(0.0, 2.0, 3)) if kind != "free" else (0.0, 0.0, 0.0),
         rest=(float(rng.normal()),) if single else _unit(rng, 4),
-        range=(-20.0, 25.0) if single and rng.random() < 0.3 else (-np.inf, np.inf), margin=0.01,
+        range=_range(rng, name, kind), margin=0.01,
         force_range=(-2.0, 3.0) if single and rng.random() < 0.3 else (-np.inf, np.inf),
     )  # fmt: skip
+
+
+def _range(rng: np.random.Generator, name: str, kind: str) -> tuple[float, float]:
+    if kind == "ball" and name.endswith("0"):
+        return (0.0, 1.5)
+    return (-20.0, 25.0) if kind in SINGLE and rng.random() < 0.3 else (-np.inf, np.inf)
 
 
 def _strings(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Tendon, ...]:

@@ -314,6 +314,51 @@ def test_bounds_are_rows_that_open_and_close(tmp_path: Path) -> None:
     assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() <= 1e-7
 
 
+BALL = """
+<mujoco><compiler angle="radian"/><option timestep="1e-3"/><worldbody><body pos="0 0 1"><joint name="ball" type="ball"
+damping=".05" limited="true" range="0 {range}" solreflimit="-{K} -20" solimplimit="1 1 .001"/>
+<geom type="capsule" fromto="0 0 0 .1 0 -.4" size=".03" mass="1"/><geom size=".05" pos="0 .1 -.2" mass=".5"/>
+</body></worldbody><keyframe><key qpos="1 .1 .2 .1" qvel="{v}"/></keyframe></mujoco>
+"""
+
+
+def ball_joint(folder: Path, **fields: Any) -> str:
+    path = folder / "ball.xml"
+    path.write_text(BALL.format(**fields), encoding="utf-8")
+    return str(path)
+
+
+def test_a_ball_joint_meets_its_bound_alike_in_every_engine(tmp_path: Path) -> None:
+    case = cases.load(ball_joint(tmp_path, range=0.9, K=4000, v="5 -6 4"), t_end=0.3)
+    assert case.contacts == ("ball high",)
+    asked: Any = [("reference", "compiled"), ("reference", "cvode"), ("reference", "ida"), ("pinocchio", "law")]
+    runs = [engines.load(name).prepare(case, profile, rtol=1e-11).run() for name, profile in asked]
+    touches = [np.array([event.t for event in run.events]) for run in runs]
+    assert len(touches[0]) == 3
+    for run, times in zip(runs, touches, strict=True):
+        assert np.abs(times - touches[0]).max() <= 1e-9
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= 1e-8
+    # A step of MuJoCo's is first order where it meets the bound, and its row is gone where it stops pushing.
+    case = dataclasses.replace(case, t_end=0.19)
+    run = engines.load("mujoco").prepare(case, "matched", dt=1e-4).run()
+    ours = engines.load("reference").prepare(case, "compiled").run()
+    assert np.abs(run.q[-1] - ours.q[-1]).max() <= 1e-4
+
+
+def test_the_bound_of_a_ball_joint_turns_round_at_half_a_turn(tmp_path: Path) -> None:
+    """Too soft to hold, it is turned through: what has pushed back pushes on, from an instant that is located."""
+    case = cases.load(ball_joint(tmp_path, range=2.9, K=1, v="0 24 0"), t_end=0.3)
+    runs = [engines.load("reference").prepare(case, name, rtol=1e-11).run() for name in ("compiled", "cvode", "ida")]
+    for run in runs:
+        assert run.outcome is Outcome.FINISHED
+        flips = [switch.t for switch in run.switches if switch.t > 0.0]
+        assert len(flips) == 1
+        at = np.searchsorted(run.t, flips[0])
+        assert abs(run.q[at, 0]) <= 1e-10
+        assert run.mode[at, 0] == cases.Mode.CONTACT
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= 1e-8
+
+
 @pytest.mark.parametrize("safe", ["enable", "disable"])
 @pytest.mark.parametrize("draw", range(10))
 def test_a_bound_has_the_stiffness_and_damping_that_mujoco_gives_it(draw: int, safe: str) -> None:

@@ -78,6 +78,8 @@ def _add_joint(body: Any, joint: Joint) -> None:
     )  # fmt: skip
     added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
     added.limited, added.range = _bounds(joint.range)
+    if joint.type == "ball":
+        added.range[0] = 0.0
     added.actfrclimited, added.actfrcrange = _bounds(joint.force_range)
     added.solref_limit, added.solimp_limit = _solref(joint.law), IMPEDANCE
 

@@ -19,7 +19,7 @@ from crossbody.cases.scene_contacts import Contact
 from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Modes, Observe
-from crossbody.engines._scene import Forces
+from crossbody.engines._scene import Forces, angle_of
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._drift import Drift
@@ -225,6 +225,8 @@ class Rows:
     def _place(self, j: int, kind: int, part: int) -> int:
         """Return which bound an active row is: of a joint the upper one has a falling gap, of a tendon it is nearer."""
         J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
+        if kind == LIMITS[0] and self.scene.joints[part].type == "ball":
+            return self.places[kind, part, True]
         if kind == LIMITS[0]:
             return self.places[kind, part, bool(J.sum() < 0.0)]
         (low, high), length = self.scene.tendons[part].range, self.data.ten_length[part]
@@ -232,15 +234,17 @@ class Rows:
         return self.places[kind, part, bool(off[1] < off[0])]
 
     def hook(self) -> Hook | None:
-        """Return what gives contacts and strings the part of the law that MuJoCo leaves out; None without such rows."""
-        strings = {i for i, tendon in enumerate(self.scene.tendons) if tendon.bodies}
-        if not strings and not self.touching.count:
+        """Return what gives contacts, strings and bounds of ball joints what MuJoCo leaves out; None without such rows."""
+        joints, tendons = self.scene.joints, self.scene.tendons
+        bent = {(int(LIMITS[0]), i): i for i, joint in enumerate(joints) if joint.type == "ball" and joint.limited}
+        bent |= {(int(LIMITS[1]), i): len(joints) + i for i, tendon in enumerate(tendons) if tendon.bodies}
+        if not bent and not self.touching.count:
             return None
         drift, first = Drift(self.scene, self.model, self.touching), self.nc - self.touching.count
 
         def hook(_model: Any, data: Any) -> None:
             acting = [(j, int(data.efc_type[j]), int(data.efc_id[j])) for j in range(data.ne, data.nefc)]
-            acting = [one for one in acting if one[1] == TOUCH or (one[1] == LIMITS[1] and one[2] in strings)]
+            acting = [one for one in acting if one[1] == TOUCH or one[1:] in bent]
             if not acting:
                 return
             lengths, touches = drift(data.qpos, data.qvel)
@@ -249,7 +253,7 @@ class Rows:
                     data.efc_aref[j] -= touches[self._touch(part) - first]
                 else:
                     upper = self._place(j, kind, part) == self.places.get((kind, part, True))
-                    data.efc_aref[j] -= (-1.0 if upper else 1.0) * lengths[part]
+                    data.efc_aref[j] -= (-1.0 if upper else 1.0) * lengths[bent[kind, part]]
 
         return hook
 
@@ -265,12 +269,14 @@ class Rows:
 
         def heights(q: Floats) -> list[float]:
             h: list[float] = []
-            x_all = forces.x(q)
-            lengths = [*(x_all[forces.place[joint.name]] for joint in self.scene.joints), *data.ten_length]
-            for part, x in zip(self.scene.bounded, lengths, strict=True):
+            x = forces.x(q)
+            lengths = [float(np.linalg.norm(angle_of(q[forces.at[joint.name] :][:4]))) if joint.type == "ball"
+                       else x[forces.place[joint.name]] for joint in self.scene.joints]  # fmt: skip
+            lengths += list(data.ten_length)
+            for part, length in zip(self.scene.bounded, lengths, strict=True):
                 low, high = part.range
-                h += [x - low - part.margin] if np.isfinite(low) else []
-                h += [high - x - part.margin] if np.isfinite(high) else []
+                h += [length - low - part.margin] if np.isfinite(low) else []
+                h += [high - length - part.margin] if np.isfinite(high) else []
             return h
 
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:

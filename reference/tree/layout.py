@@ -9,7 +9,7 @@ FREE, BALL, SLIDE, HINGE = range(4)
 NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, AT_PAIR = (
     0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13,
 )  # fmt: skip
-RESTING, POSED, PUSHES, AT_PUSH, HEAD = 14, 15, 16, 17, 18
+RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, HEAD = 14, 15, 16, 17, 18, 19
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (
@@ -26,7 +26,7 @@ PUSHED, PUSH = 0, 4
 COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
-LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING = range(8)
+LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING, BALL_LIMIT = range(9)
 LED, LEADS, POLYNOMIAL = 1, 4, 7  # of a coupling: coordinate and velocity, or tendon; where it rests; coefficients
 OF_POSES = (CONNECT, CONTACT, TURN, STRING)
 

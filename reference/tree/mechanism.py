@@ -11,7 +11,7 @@ from crossbody.reference._kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.pairs.rows import gradient, touch
-from crossbody.reference.tree import forces, layout, loops, strings, sweeps
+from crossbody.reference.tree import balls, forces, layout, loops, strings, sweeps
 from crossbody.reference.tree.points import point, pull
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
@@ -83,12 +83,14 @@ def _along(p: Array, kind: int, o: int, slope: Any, H: Array) -> None:
 
 
 @kernels.helper
-def _row(q: Array, v: Array, p: Array, i: int) -> tuple[Any, Any, Any]:
+def _row(q: Array, v: Array, p: Array, i: int) -> Any:
     """Return gap, rate and H' v of row i."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     kind = int(p[o].real)
     if kind == layout.LIMIT:
         return p[o + 1] * (q[int(p[o + 2].real)] - p[o + 4]), p[o + 1] * v[int(p[o + 3].real)], 0.0 * v[0]
+    if kind == layout.BALL_LIMIT:
+        return balls.bound(q, v, p, o)
     if kind == layout.TENDON_LIMIT:
         at = forces.tendon(p, int(p[o + 2].real))
         return p[o + 1] * (forces.length(q, p, at) - p[o + 3]), p[o + 1] * forces.rate(v, p, at), 0.0 * v[0]
@@ -105,6 +107,8 @@ def _gradient(q: Array, v: Array, p: Array, i: int, H: Array) -> None:
     kind = int(p[o].real)
     if kind == layout.LIMIT:
         H[int(p[o + 3].real)] = p[o + 1]
+    elif kind == layout.BALL_LIMIT:
+        balls.bound_columns(q, p, o, H)
     elif kind == layout.TENDON_LIMIT:
         forces.pull(p, forces.tendon(p, int(p[o + 2].real)), p[o + 1] + 0.0 * q[0], H)
     else:

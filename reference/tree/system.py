@@ -13,6 +13,7 @@ from crossbody.cases.scene import Scene
 from crossbody.reference import System
 from crossbody.reference._kinds import Floats
 from crossbody.reference._redundant import redundant
+from crossbody.reference.tree import balls
 from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import tabulate
 
@@ -31,9 +32,18 @@ def system(scene: Scene, law: Law, q0: Floats | None = None, control: Control | 
         SceneError: for a scene that the kernels cannot do.
     """
     table = tabulate(scene)
-    turning = {"velocity": velocity, "quaternions": table.quaternions} if table.quaternions else {}
+    turning: dict[str, Any] = {}
+    if table.quaternions:
+        turning = {"velocity": velocity, "quaternions": table.quaternions}
+    if table.sides:
+        turning |= {
+            "watch": balls.watch,
+            "switch": balls.switch,
+            "guards": table.sides,
+            "discrete": np.zeros(table.sides),
+        }
     fields: dict[str, Any] = dict(
-        n=scene.nv, nq=scene.nq, parameters=table.p, **turning,
+        n=scene.nv, nq=scene.nq, parameters=table.p[: len(table.p) - table.sides], **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
         inputs=len(scene.inputs), scratch=table.scratch, control=control, **KERNELS,
     )  # fmt: skip
