@@ -318,8 +318,8 @@ class Actuator(_Named):
         gear: one number; of a ball or free joint, as many as it has velocities.
         gain: g0, g1, g2.
         bias: b0, b1, b2.
-        armature: gear^2 armature is added to the joint's, kg m^2.
-        damping: -gear^2 damping v acts on the joint.
+        armature: gear^2 armature is added to the joint's, kg m^2; a tendon cannot have it.
+        damping: -gear^2 damping v acts on the joint, or along the tendon.
         control_range, force_range: bounds of u, and of the force.
     """
 
@@ -333,6 +333,14 @@ class Actuator(_Named):
     control_range: Vector = UNBOUNDED
     force_range: Vector = UNBOUNDED
     sizes: ClassVar[dict[str, int]] = {"gain": 3, "bias": 3, "control_range": 2, "force_range": 2}
+
+    def __post_init__(self) -> None:
+        """Check that a tendon's inertia is not asked for."""
+        _Named.__post_init__(self)
+        if self.tendon and self.armature:
+            raise SceneError(
+                f"Actuator {self.name!r} has armature on a tendon, which would join branches in M: not done."
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -434,6 +442,11 @@ class Scene:
         """Return the length of a tendon at the reference pose."""
         rest = {joint.name: joint.reference for joint in self.joints}
         return sum(c * rest[name] for name, c in zip(tendon.joints, tendon.coefficients, strict=True))
+
+    def acts_along(self, tendon: Tendon) -> bool:
+        """Return whether a spring, a damper or an actuator acts along a tendon."""
+        driven = any(actuator.tendon == tendon.name for actuator in self.actuators)
+        return driven or any(tendon.stiffness) or any(tendon.damping)
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ of free and ball joints, whose springs act along the rotation from where they re
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -66,6 +67,10 @@ def tendons(scene: Scene) -> Floats:
     return T
 
 
+Stretch = tuple[Floats, Floats, Floats]
+"""Lengths (nt,) of tendons, their rates, and their derivatives (nt, nv) along v."""
+
+
 @dataclass(slots=True)
 class Forces:
     """Forces of a scene's springs, dampers and actuators.
@@ -76,8 +81,9 @@ class Forces:
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
         u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N.
-        T (nt, nv): dl/dx of the tendons.
-        A (nu, nv): dl/dx of the actuators, gear included.
+        T (nt, nv): dl/dx of the tendons, 0 of those between points.
+        A (nu, nv): dl/dx of the actuators on joints, gear included.
+        spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics; None without them.
     """
 
     scene: Scene
@@ -88,6 +94,7 @@ class Forces:
     pushes: Floats = field(init=False)
     T: Floats = field(init=False)
     A: Floats = field(init=False)
+    spans: Callable[[Floats, Floats], Stretch] | None = None
 
     def __post_init__(self) -> None:
         """Lay out which joint each part moves."""
@@ -97,12 +104,9 @@ class Forces:
         self.single = np.array([(self.at[name], self.place[name]) for name in single], dtype=int).reshape(-1, 2).T
         self.u, self.pushes = np.zeros(len(scene.actuators)), np.zeros((len(scene.pushes), 3))
         self.T = tendons(scene)
-        named = {tendon.name: row for tendon, row in zip(scene.tendons, self.T, strict=True)}
         self.A = np.zeros((len(scene.actuators), n))
         for row, actuator in zip(self.A, scene.actuators, strict=True):
-            if actuator.tendon:
-                row[:] = actuator.gear[0] * named[actuator.tendon]
-            else:
+            if not actuator.tendon:
                 moved = self.moved(next(joint for joint in scene.joints if joint.name == actuator.joint))
                 row[moved] = actuator.gear[: moved.stop - moved.start]
 
@@ -156,10 +160,32 @@ class Forces:
                 turn = self.turned(joint, q)
                 angle = float(np.linalg.norm(turn)) or 1.0
                 total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
-        for row, tendon in zip(self.T, self.scene.tendons, strict=True):
-            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, row @ x))
-            total -= row * (spring + drag(tendon.damping, row @ v))
-        return total + self.actuated(x, v)
+        stretch = self.stretch(q, v)
+        for tendon, length, rate, row in zip(self.scene.tendons, *stretch, strict=True):
+            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, length))
+            total -= row * (spring + drag(tendon.damping, rate))
+        for actuator, (row, _, rate) in zip(self.scene.actuators, self.strokes(x, v, stretch), strict=True):
+            total -= row * actuator.damping * rate if actuator.tendon else row**2 * actuator.damping * v
+        return total + self.actuated(x, v, stretch)
+
+    def stretch(self, q: Floats, v: Floats) -> Stretch:
+        """Return lengths of all tendons, their rates and derivatives."""
+        lengths, rates, rows = self.T @ self.x(q), self.T @ v, self.T.copy()
+        at = [i for i, tendon in enumerate(self.scene.tendons) if tendon.bodies]
+        if at and self.spans is not None:
+            lengths[at], rates[at], rows[at] = self.spans(q, v)
+        return lengths, rates, rows
+
+    def strokes(self, x: Floats, v: Floats, stretch: Stretch) -> list[tuple[Floats, float, float]]:
+        """Return of every actuator the derivative (nv,) of its length, its length and its rate, gear included."""
+        names, found = [tendon.name for tendon in self.scene.tendons], []
+        for row, actuator in zip(self.A, self.scene.actuators, strict=True):
+            if not actuator.tendon:
+                found.append((row, float(row @ x), float(row @ v)))
+                continue
+            length, rate, T = (part[names.index(actuator.tendon)] for part in stretch)
+            found.append((actuator.gear[0] * T, actuator.gear[0] * length, actuator.gear[0] * rate))
+        return found
 
     @staticmethod
     def outside(rest: Vector, length: Floats) -> Floats:
@@ -167,15 +193,14 @@ class Forces:
         out: Floats = length - clamped(length, rest)
         return out
 
-    def actuated(self, x: Floats, v: Floats) -> Floats:
+    def actuated(self, x: Floats, v: Floats, stretch: Stretch) -> Floats:
         """Return what the actuators do (nv,), each within its bounds and their sum within the joint's."""
         total: Floats = np.zeros(len(v))
-        for row, actuator, given in zip(self.A, self.scene.actuators, self.u, strict=True):
-            terms = np.array([1.0, row @ x, row @ v])
+        strokes = self.strokes(x, v, stretch)
+        for (row, length, rate), actuator, given in zip(strokes, self.scene.actuators, self.u, strict=True):
+            terms = np.array([1.0, length, rate])
             force = np.dot(actuator.gain, terms) * clamped(given, actuator.control_range) + np.dot(actuator.bias, terms)
             total += row * clamped(force, actuator.force_range)
-            if actuator.joint:
-                total -= row**2 * actuator.damping * v
         for joint in self.scene.joints:
             moved = self.moved(joint)
             total[moved] = clamped(total[moved], joint.force_range)
@@ -190,8 +215,10 @@ class Forces:
                 total += stored(joint.stiffness, x[:, self.place[joint.name]] - joint.rest[0])
             elif any(joint.stiffness):
                 total += stored(joint.stiffness, np.linalg.norm(self.turned(joint, q), axis=-1))
-        for row, tendon in zip(self.T, self.scene.tendons, strict=True):
-            total += stored(tendon.stiffness, self.outside(tendon.rest, x @ row))
+        if self.scene.tendons:
+            lengths = np.array([self.stretch(one, np.zeros(self.scene.nv))[0] for one in q]).T
+            for tendon, length in zip(self.scene.tendons, lengths, strict=True):
+                total += stored(tendon.stiffness, self.outside(tendon.rest, length))
         return total
 
 
@@ -237,7 +264,7 @@ class Rows:
         return np.array(drift)
 
     def _bounded(self, q: Floats, v: Floats) -> list[tuple[Joint | Tendon, float, Floats, float]]:
-        """What may have bounds, but distances of points: coordinate or length, its derivative (nv,), its rate's drift."""
+        """What may have bounds, but distances of points: its length, its derivative (nv,), and its drift."""
         unit, forces, x = np.eye(self.scene.nv), self.forces, self.forces.x(q)
         found: list[tuple[Joint | Tendon, float, Floats, float]] = []
         for joint in self.scene.joints:

@@ -510,13 +510,57 @@ def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> 
     assert np.abs(run.q[-1, :4] - first.q[-1, :4]).max() <= 2e-5
 
 
-def test_what_a_string_cannot_do_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "rope.xml"
-    path.write_text(ROPE.replace("limited", 'stiffness="3" limited', 1), encoding="utf-8")
-    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+WINCH = """
+<mujoco><option timestep="1e-3"/><worldbody><site name="hook" pos=".1 0 1.2"/>
+<body pos="0 0 1"><joint name="boom" axis="0 1 0" damping=".1" actuatorfrclimited="true" actuatorfrcrange="-3 3"/>
+<geom type="capsule" fromto="0 0 0 .5 0 0" size=".03" mass="1" contype="0" conaffinity="0"/><site name="tip" pos=".5 0 0"/>
+</body><body pos=".6 .1 .5"><freejoint/><geom type="box" size=".05 .08 .1" mass=".8" contype="0" conaffinity="0"/>
+<site name="load" pos="0 0 .1"/></body></worldbody>
+<tendon><spatial name="brace" stiffness="40 5 2" damping="1 .2 .1" springlength=".3 .45"><site site="hook"/><site site="tip"/>
+</spatial><spatial name="rope" stiffness="60" springlength=".2"><site site="tip"/><site site="load"/></spatial></tendon>
+<actuator><position name="winch" tendon="rope" kp="30" kv="2" gear="1.5" forcerange="-20 20"/>
+<motor name="pull" tendon="brace" gear="-2"/></actuator>
+<keyframe><key ctrl=".4 1" qvel="0 .3 .2 0 2 -1 3"/></keyframe></mujoco>
+"""
+
+
+def test_forces_along_tendons_between_points_move_alike_in_every_engine(tmp_path: Path) -> None:
+    """A brace with a dead band, a rope with a servo; and the account of energy is closed."""
+    path = tmp_path / "winch.xml"
+    path.write_text(WINCH, encoding="utf-8")
+    moves_as_in_mujoco(compiled(path), scene_of(compiled(path)))
+    case = cases.load(str(path), t_end=0.4)
+    runs = [
+        engines.load(name).prepare(case, profile, **settings).run()
+        for name, profile, settings in (
+            ("reference", "compiled", {"rtol": 1e-11}), ("reference", "cvode", {"rtol": 1e-11}),
+            ("reference", "ida", {"rtol": 1e-10}), ("pinocchio", "law", {"rtol": 1e-11}),
+            ("mujoco", "matched", {"dt": 1e-4}),
+        )
+    ]  # fmt: skip
+    for k, run in enumerate(runs):
+        assert run.outcome is Outcome.FINISHED
+        # A fixed step that meets the end of a range or of a dead band is second order.
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= (1e-6 if k == 4 else 1e-8)
+        assert np.abs(run.energy[-1].sum() - runs[0].energy[-1].sum()) <= 1e-5
+    ledger = runs[0].ledger
+    assert ledger is not None
+    account = runs[0].total_energy - ledger.input + ledger.dissipated
+    assert np.abs(account - account[0]).max() <= 1e-8 * np.abs(runs[0].energy).max()
+
+
+def test_a_loop_that_couples_the_distance_of_points_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "winch.xml"
+    loop = '<equality><tendon name="both" tendon1="rope" tendon2="brace"/></equality>'
+    path.write_text(WINCH.replace("<actuator>", f"{loop}<actuator>"), encoding="utf-8")
+    with pytest.raises(SceneError, match=r"Tendon '(rope|brace)' runs between two points: no loop \('both'\)"):
         cases.load(str(path))
-    path.write_text(ROPE.replace('<motor name="a" joint="x"/>', '<motor name="a" tendon="string"/>'), encoding="utf-8")
-    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+
+
+def test_inertia_of_an_actuator_on_a_tendon_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "winch.xml"
+    path.write_text(WINCH.replace("<motor ", '<motor armature=".1" '), encoding="utf-8")
+    with pytest.raises(SceneError, match="Actuator 'pull' has armature on a tendon"):
         cases.load(str(path))
 
 

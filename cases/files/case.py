@@ -162,13 +162,10 @@ def check_runnable(scene: Scene) -> None:
     for part in scene.bounded:
         if part.friction_loss:
             raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
-    used = {part.tendon for part in scene.actuators}
-    used |= {name for loop in scene.loops if loop.type == "tendon" for name in (loop.first, loop.second)}
-    for tendon in scene.tendons:
-        if tendon.bodies and (any(tendon.stiffness) or any(tendon.damping) or tendon.name in used):
-            raise SceneError(
-                f"Tendon {tendon.name!r} runs between two points: it can have a range, and nothing acts along it."
-            )
+    spans = {tendon.name for tendon in scene.tendons if tendon.bodies}
+    for loop in scene.loops:
+        for name in {loop.first, loop.second} & spans if loop.type == "tendon" else ():
+            raise SceneError(f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple it.")
 
 
 ENTRIES = {

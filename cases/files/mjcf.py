@@ -223,15 +223,14 @@ def _tendon(model: Any, i: int) -> Tendon:
     where = slice(first, first + count)
     name = _name(model, "tendon", i)
     kinds, parts = model.wrap_type[where].tolist(), model.wrap_objid[where].tolist()
-    joined: dict[str, Any] = {
-        "joints": tuple(_name(model, "jnt", j) for j in parts), "coefficients": _floats(model.wrap_prm[where]),
-    }  # fmt: skip
+    joined: dict[str, Any] = {}
     if kinds == [SITE_WRAP, SITE_WRAP]:
-        joined = {
-            "bodies": tuple(_name(model, "body", int(model.site_bodyid[j])) for j in parts),
-            "positions": tuple(_floats(model.site_pos[j]) for j in parts),
-        }
-    elif set(kinds) != {JOINT_WRAP}:
+        joined["bodies"] = tuple(_name(model, "body", int(model.site_bodyid[j])) for j in parts)
+        joined["positions"] = tuple(_floats(model.site_pos[j]) for j in parts)
+    elif set(kinds) == {JOINT_WRAP}:
+        joined["joints"] = tuple(_name(model, "jnt", j) for j in parts)
+        joined["coefficients"] = _floats(model.wrap_prm[where])
+    else:
         raise SceneError(f"Tendon {name!r} runs over shapes or more than two sites; a scene has two points, or joints.")
     if model.tendon_armature[i] != 0.0:
         raise SceneError(f"Tendon {name!r} has armature, which a scene does not have.")

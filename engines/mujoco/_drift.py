@@ -1,4 +1,6 @@
-"""H' v of contacts, strings and bounds of ball joints: MuJoCo has J v' = -a1 h' - a0 h there, where the law has h'' = H v' + H' v.
+"""H' v of contacts, strings and bounds of ball joints, which MuJoCo leaves out.
+
+It has J v' = -a1 h' - a0 h there, where the law has h'' = H v' + H' v.
 
 By a difference of H along the motion, in a second set of data; MuJoCo has the term of `connect` and `weld`.
 """

@@ -70,16 +70,18 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = q, v
     mujoco.mj_forward(model, data)
-    M, n, forces, step = mass_matrix(model, data), model.nv, Forces(scene), 1e-6
+    M, n, step = mass_matrix(model, data), model.nv, 1e-6
     lift = step * np.eye(n)
 
-    def moved(d: Floats) -> Floats:
-        found = np.array(q)
-        mujoco.mj_integratePos(model, found, d, 1.0)
-        return found
+    def forces(d: Floats, rate: Floats) -> Floats:
+        data.qpos[:], data.qvel[:] = q, v + rate
+        mujoco.mj_integratePos(model, data.qpos, d, 1.0)
+        mujoco.mj_forward(model, data)
+        return np.array(data.qfrc_passive + data.qfrc_actuator)
 
-    K = np.array([(forces(moved(d), v) - forces(moved(-d), v)) / (2.0 * step) for d in lift]).T
-    D = np.array([(forces(q, v + d) - forces(q, v - d)) / (2.0 * step) for d in lift]).T
+    still = np.zeros(n)
+    K = np.array([(forces(d, still) - forces(-d, still)) / (2.0 * step) for d in lift]).T
+    D = np.array([(forces(still, d) - forces(still, -d)) / (2.0 * step) for d in lift]).T
     A = np.block([[np.zeros((n, n)), np.eye(n)], [np.linalg.solve(M, K), np.linalg.solve(M, D)]])
     return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
 
@@ -234,7 +236,7 @@ class Rows:
         return self.places[kind, part, bool(off[1] < off[0])]
 
     def hook(self) -> Hook | None:
-        """Return what gives contacts, strings and bounds of ball joints what MuJoCo leaves out; None without such rows."""
+        """Return what gives contacts, strings and bounds of ball joints their H' v; None without such rows."""
         joints, tendons = self.scene.joints, self.scene.tendons
         bent = {(int(LIMITS[0]), i): i for i, joint in enumerate(joints) if joint.type == "ball" and joint.limited}
         bent |= {(int(LIMITS[1]), i): len(joints) + i for i, tendon in enumerate(tendons) if tendon.bodies}

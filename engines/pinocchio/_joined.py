@@ -137,6 +137,29 @@ def moved(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
     return rate + np.cross(turn, arm), own + np.cross(spin, arm) + np.cross(turn, np.cross(turn, arm))
 
 
+class Spans:
+    """Distances of two points: lengths, and their derivatives along Pinocchio's velocities.
+
+    Args:
+        model, placed: as of `Joined`.
+        tendons: those between points.
+    """
+
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
+        self.model, self.data = model, model.createData()
+        self.ends = [ends_of(placed, tendon) for tendon in tendons]
+
+    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return l (nt,) and dl/dv (nt, nv)."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        lengths, rows = np.zeros(len(self.ends)), np.zeros((len(self.ends), self.model.nv))
+        for i, (one, two) in enumerate(self.ends):
+            lengths[i], n = apart(self.data, one, two)
+            J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
+            rows[i] = n @ (J[1] - J[0])
+        return lengths, rows
+
+
 class Strings:
     """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
 
@@ -153,9 +176,7 @@ class Strings:
         self.model, self.data, self.none = model, model.createData(), np.zeros(model.nv)
         self.rows: list[tuple[float, float, End, End]] = []  # sign, bound, ends
         for tendon in tendons:
-            ends = [
-                _end(placed[body], place, UPRIGHT) for body, place in zip(tendon.bodies, tendon.positions, strict=True)
-            ]
+            ends = ends_of(placed, tendon)
             for sign, bound in zip((1.0, -1.0), tendon.range, strict=True):
                 if np.isfinite(bound):
                     self.rows.append((sign, bound + sign * tendon.margin, ends[0], ends[1]))
@@ -163,7 +184,7 @@ class Strings:
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""
         pin.forwardKinematics(self.model, self.data, q)
-        return np.array([sign * (self._along(one, two)[0] - bound) for sign, bound, one, two in self.rows])
+        return np.array([sign * (apart(self.data, one, two)[0] - bound) for sign, bound, one, two in self.rows])
 
     def jacobian(self, q: Floats) -> Floats:
         """Return H (rows, nv)."""
@@ -171,7 +192,7 @@ class Strings:
         found = []
         for sign, _, one, two in self.rows:
             J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
-            found.append(sign * self._along(one, two)[1] @ (J[1] - J[0]))
+            found.append(sign * apart(self.data, one, two)[1] @ (J[1] - J[0]))
         return np.array(found).reshape(-1, self.model.nv)
 
     def drift(self, q: Floats, v: Floats) -> Floats:
@@ -180,16 +201,23 @@ class Strings:
         found = []
         for sign, _, one, two in self.rows:
             (v1, a1), (v2, a2) = (moved(self.model, self.data, end) for end in (one, two))
-            d, n = self._along(one, two)
+            d, n = apart(self.data, one, two)
             across = (v2 - v1) - n @ (v2 - v1) * n
             found.append(sign * (n @ (a2 - a1) + across @ across / d))
         return np.array(found)
 
-    def _along(self, one: End, two: End) -> tuple[float, Floats]:
-        """Return the distance, and the direction from the first to the second."""
-        apart = at(self.data, two).translation - at(self.data, one).translation
-        d = float(np.linalg.norm(apart))
-        return d, apart / d
+
+def apart(data: Any, one: End, two: End) -> tuple[float, Floats]:
+    """Return the distance of two ends, and the direction from the first to the second."""
+    way = at(data, two).translation - at(data, one).translation
+    d = float(np.linalg.norm(way))
+    return d, way / d
+
+
+def ends_of(placed: dict[str, tuple[int, Any]], tendon: Tendon) -> tuple[End, End]:
+    """Return the ends of a tendon between points."""
+    one, two = (_end(placed[body], place, UPRIGHT) for body, place in zip(tendon.bodies, tendon.positions, strict=True))
+    return one, two
 
 
 def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:

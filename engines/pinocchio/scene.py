@@ -15,7 +15,7 @@ from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm
+from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -42,6 +42,7 @@ def build(case: Case, algebra: str) -> Prepared:
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
+    forces.spans = spans(scene, model, placed, to)
     centres = at_centres(scene, forces, model, model.createData(), placed)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
@@ -78,6 +79,19 @@ def build(case: Case, algebra: str) -> Prepared:
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def spans(scene: Scene, model: Any, placed: Placed, to: Coordinates) -> Callable[[Floats, Floats], parts.Stretch]:
+    """Return what gives the lengths of tendons between points, in the scene's coordinates."""
+    measured = Spans(model, placed, [tendon for tendon in scene.tendons if tendon.bodies])
+
+    def stretch(q: Floats, v: Floats) -> parts.Stretch:
+        r = to.theirs(q)
+        lengths, rows = measured(r)
+        H = to.velocities(r, rows)
+        return lengths, H @ v, H
+
+    return stretch
 
 
 def _order(scene: Scene) -> list[int]:

@@ -37,15 +37,17 @@ def _pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
 def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Array, w: Array) -> None:
     """M by composite inertias; f = springs, dampers, actuators less the bias."""
     forces.passive(q, v, p, f)
+    sweeps.outwards(q, v, p, w)
     if len(u) > 0:
         n, at_dof = len(f), int(p[layout.AT_DOF].real)
         sums = w[len(w) - n :]
         sums[:] = 0.0
-        forces.actuated(q, v, u, p, sums)
+        forces.actuated(q, v, u, p, w, sums)
         for j in range(n):
             o = at_dof + layout.DOF * j
             f[j] += forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
-    sweeps.outwards(q, v, p, w)
+    if p[layout.SPANNED].real > 0.0:
+        forces.stretched(p, w, f)
     sweeps.inwards(p, w, M, f)
     for i in range(int(p[layout.PUSHES].real)):
         node, x, force = _pushed(u, p, w, i)
@@ -206,7 +208,7 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
         kinetic += p[int(p[layout.AT_DOF].real) + layout.DOF * j + layout.ARMATURE] * v[j] * v[j]
     for i in range(int(p[layout.TENDONS].real)):
         o = forces.tendon(p, i)
-        potential += forces.stored(p, o + layout.STIFF, forces.slack(p, o, forces.length(q, p, o)))
+        potential += forces.stored(p, o + layout.STIFF, forces.slack(p, o, forces.measured(q, v, p, w, o)[0]))
     e[0], e[1] = 0.5 * kinetic, potential
 
 
@@ -215,9 +217,11 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
     """Of the actuators and pushes, and what dampers take."""
     n, at_dof = len(v), int(p[layout.AT_DOF].real)
     given, taken = 0.0 * v[0], 0.0 * v[0]
+    posed = p[layout.PUSHES].real > 0.0 or p[layout.SPANNED].real > 0.0
+    w = _posed(q, v, p) if posed else np.empty(0, dtype=q.dtype)
     if len(u) > 0:
         sums = np.zeros(n, dtype=q.dtype)
-        forces.actuated(q, v, u, p, sums)
+        forces.actuated(q, v, u, p, w, sums)
         for j in range(n):
             o = at_dof + layout.DOF * j
             given += v[j] * forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
@@ -225,13 +229,12 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         taken += v[j] * forces.damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
     for i in range(int(p[layout.TENDONS].real)):
         o = forces.tendon(p, i)
-        speed = forces.rate(v, p, o)
-        taken += speed * forces.damper(p, o + layout.DAMP, speed)
-    if p[layout.PUSHES].real > 0.0:
-        w = _posed(q, v, p)
-        for i in range(int(p[layout.PUSHES].real)):
-            _, x, force = _pushed(u, p, w, i)
-            given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]
+        if p[o + layout.COUNT].real > 0.0 or p[layout.SPANNED].real > 0.0:
+            speed = forces.measured(q, v, p, w, o)[1]
+            taken += speed * forces.damper(p, o + layout.DAMP, speed)
+    for i in range(int(p[layout.PUSHES].real)):
+        _, x, force = _pushed(u, p, w, i)
+        given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]
     e[0], e[1] = given, taken
 
 

@@ -209,6 +209,7 @@ class _Builder:
         head[layout.POSED] = sum(row[layout.KIND] in layout.OF_POSES for row in rows)
         pushes = [self._push(push) for push in scene.pushes]
         head[layout.PUSHES] = len(pushes)
+        head[layout.SPANNED] = sum(scene.acts_along(tendon) for tendon in scene.tendons if tendon.bodies)
         sides = [np.zeros(self.sides)]
         parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places), pushes, sides]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
@@ -264,12 +265,19 @@ class _Builder:
         return row
 
     def _tendon(self, tendon: Tendon) -> Floats:
+        b0, *others = tendon.damping
+        b0 += sum(a.gear[0] ** 2 * a.damping for a in self.scene.actuators if a.tendon == tendon.name)
+        if tendon.bodies:
+            ends = [self.placed(*end) for end in zip(tendon.bodies, tendon.positions, strict=True)]
+            return np.array([
+                layout.POINTS, *tendon.stiffness, b0, *others, *tendon.rest, *ends[0], *ends[1], 0.0,
+            ])  # fmt: skip
         steps = [
             (self.coordinates[name], self.dofs[name], c)
             for name, c in zip(tendon.joints, tendon.coefficients, strict=True)
         ]
         return np.array([
-            len(steps), *tendon.stiffness, *tendon.damping, *tendon.rest, *np.ravel(steps),
+            len(steps), *tendon.stiffness, b0, *others, *tendon.rest, *np.ravel(steps),
         ])  # fmt: skip
 
 
