@@ -309,9 +309,14 @@ class Tendon(_Named):
         object.__setattr__(self, "positions", points)
 
 
+ACTIVATIONS = ("integrator", "filter")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator(_Named):
-    """A force (g0 + g1 l + g2 l') u + b0 + b1 l + b2 l' on a joint or tendon, l = gear x.
+    """A force (g0 + g1 l + g2 l') a + b0 + b1 l + b2 l' on a joint or tendon, l = gear x.
+
+    a is the control u itself, or an activation: a' = u of an integrator, tau a' = u - a of a filter.
 
     Attributes:
         joint, tendon: what it acts on; one of them is empty.
@@ -321,6 +326,9 @@ class Actuator(_Named):
         armature: gear^2 armature is added to the joint's, kg m^2; a tendon cannot have it.
         damping: -gear^2 damping v acts on the joint, or along the tendon.
         control_range, force_range: bounds of u, and of the force.
+        activation: integrator or filter; empty where a = u.
+        time_constant: tau of a filter, s.
+        activation_range: bounds of a, at which it stands still.
     """
 
     joint: str = ""
@@ -332,11 +340,27 @@ class Actuator(_Named):
     damping: float = 0.0
     control_range: Vector = UNBOUNDED
     force_range: Vector = UNBOUNDED
-    sizes: ClassVar[dict[str, int]] = {"gain": 3, "bias": 3, "control_range": 2, "force_range": 2}
+    activation: str = ""
+    time_constant: float = 0.0
+    activation_range: Vector = UNBOUNDED
+    sizes: ClassVar[dict[str, int]] = {
+        "gain": 3, "bias": 3, "control_range": 2, "force_range": 2, "activation_range": 2,
+    }  # fmt: skip
 
     def __post_init__(self) -> None:
-        """Check that a tendon's inertia is not asked for."""
+        """Check the activation, and that a tendon's inertia is not asked for."""
         _Named.__post_init__(self)
+        what = f"Actuator {self.name!r}"
+        if self.activation not in ("", *ACTIVATIONS):
+            raise SceneError(
+                f"{what}: activation is {shown(self.activation)}; valid: {', '.join(ACTIVATIONS)}, or none."
+            )
+        if (self.activation == "filter") != (0.0 < self.time_constant < math.inf):
+            raise SceneError(
+                f"{what}: time_constant is {shown(self.time_constant)}; a filter alone has one, above 0 s."
+            )
+        if not self.activation_range[0] <= self.activation_range[1]:
+            raise SceneError(f"{what}: activation_range is {list(self.activation_range)}; it must not fall.")
         if self.tendon and self.armature:
             raise SceneError(
                 f"Actuator {self.name!r} has armature on a tendon, which would join branches in M: not done."
@@ -442,6 +466,11 @@ class Scene:
         """Return the length of a tendon at the reference pose."""
         rest = {joint.name: joint.reference for joint in self.joints}
         return sum(c * rest[name] for name, c in zip(tendon.joints, tendon.coefficients, strict=True))
+
+    @property
+    def activated(self) -> tuple[int, ...]:
+        """Which actuators have an activation, in the order of these."""
+        return tuple(i for i, actuator in enumerate(self.actuators) if actuator.activation)
 
     def acts_along(self, tendon: Tendon) -> bool:
         """Return whether a spring, a damper or an actuator acts along a tendon."""

@@ -81,6 +81,8 @@ class Forces:
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
         u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N.
+        t: now, s; it counts where there are activations. since: when the controls were put in force, s.
+        act (nu,): activations then, of the actuators that have one.
         T (nt, nv): dl/dx of the tendons, 0 of those between points.
         A (nu, nv): dl/dx of the actuators on joints, gear included.
         spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics; None without them.
@@ -91,6 +93,9 @@ class Forces:
     place: dict[str, int] = field(init=False)
     single: Any = field(init=False)
     u: Floats = field(init=False)
+    t: float = field(init=False, default=0.0)
+    since: float = field(init=False, default=0.0)
+    act: Floats = field(init=False)
     pushes: Floats = field(init=False)
     T: Floats = field(init=False)
     A: Floats = field(init=False)
@@ -102,6 +107,7 @@ class Forces:
         self.at, self.place = places(scene)
         single = [joint.name for joint in scene.joints if joint.type in ("slide", "hinge")]
         self.single = np.array([(self.at[name], self.place[name]) for name in single], dtype=int).reshape(-1, 2).T
+        self.act = np.zeros(len(scene.actuators))
         self.u, self.pushes = np.zeros(len(scene.actuators)), np.zeros((len(scene.pushes), 3))
         self.T = tendons(scene)
         self.A = np.zeros((len(scene.actuators), n))
@@ -138,14 +144,34 @@ class Forces:
         rest = np.array(joint.rest if len(joint.rest) == 4 else (1.0, 0.0, 0.0, 0.0))
         return turned(q[..., first : first + 4], rest)
 
-    def change(self, values: Floats) -> None:
-        """Put inputs of the scene in force: controls, then pushes."""
+    def begin(self, act0: Floats) -> None:
+        """Put no input in force, at t = 0, with activations (na,)."""
+        self.still()
+        self.act[list(self.scene.activated)] = act0
+
+    def driven(self) -> Floats:
+        """Return what drives the actuators now (nu,): controls, or the activations that follow them."""
+        found: Floats = np.zeros(len(self.u))
+        gone = self.t - self.since
+        for i, (part, u, a) in enumerate(zip(self.scene.actuators, self.u, self.act, strict=True)):
+            c = clamped(u, part.control_range)
+            if part.activation == "integrator":
+                c = a + c * gone
+            elif part.activation:
+                c = a - (c - a) * np.expm1(-gone / part.time_constant)
+            found[i] = clamped(c, part.activation_range)
+        return found
+
+    def change(self, values: Floats, t: float) -> None:
+        """Put inputs of the scene in force from t on, s: controls, then pushes."""
+        self.t = t
+        self.act, self.since = self.driven(), t
         count = len(self.u)
         self.u[:], self.pushes[:] = values[:count], values[count:].reshape(-1, 3)
 
     def still(self) -> None:
-        """Put no input in force."""
-        self.u[:], self.pushes[:] = 0.0, 0.0
+        """Put no input in force, and no activation."""
+        self.u[:], self.pushes[:], self.act[:], self.t, self.since = 0.0, 0.0, 0.0, 0.0, 0.0
 
     def __call__(self, q: Floats, v: Floats) -> Floats:
         """Return the generalised forces (nv,) at a state."""
@@ -197,9 +223,9 @@ class Forces:
         """Return what the actuators do (nv,), each within its bounds and their sum within the joint's."""
         total: Floats = np.zeros(len(v))
         strokes = self.strokes(x, v, stretch)
-        for (row, length, rate), actuator, given in zip(strokes, self.scene.actuators, self.u, strict=True):
+        for (row, length, rate), actuator, given in zip(strokes, self.scene.actuators, self.driven(), strict=True):
             terms = np.array([1.0, length, rate])
-            force = np.dot(actuator.gain, terms) * clamped(given, actuator.control_range) + np.dot(actuator.bias, terms)
+            force = np.dot(actuator.gain, terms) * given + np.dot(actuator.bias, terms)
             total += row * clamped(force, actuator.force_range)
         for joint in self.scene.joints:
             moved = self.moved(joint)

@@ -16,6 +16,7 @@ from crossbody.cases._arrays import frozen, full, is_number
 from crossbody.cases._control import Control
 from crossbody.cases._entry_points import checked_arguments, finite, wholes
 from crossbody.reference import kernels as kernel_types
+from crossbody.reference._activations import Activations
 from crossbody.reference._indices import different
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
@@ -57,6 +58,7 @@ class System:
         span (nc, 2): first coordinate, and one past the last, that a row's H may touch; all of them if not given.
             With it the cost of a chain grows with its length, not with its square.
         constant_mass: M does not depend on q: it is factored once.
+        activations: what some inputs follow from the others by, in closed form: the last ones, which no caller gives.
         affine: M and H are constant, f depends on u alone: arcs in closed form are admitted.
 
     Raises:
@@ -97,6 +99,7 @@ class System:
     span: ArrayLike | None = None
     constant_mass: bool = False
     affine: bool = False
+    activations: Activations | None = None
     p: Floats = field(init=False)
     alpha: Floats = field(init=False)
     beta: Floats = field(init=False)

@@ -513,11 +513,12 @@ def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> 
 WINCH = """
 <mujoco><option timestep="1e-3"/><worldbody><site name="hook" pos=".1 0 1.2"/>
 <body pos="0 0 1"><joint name="boom" axis="0 1 0" damping=".1" actuatorfrclimited="true" actuatorfrcrange="-3 3"/>
-<geom type="capsule" fromto="0 0 0 .5 0 0" size=".03" mass="1" contype="0" conaffinity="0"/><site name="tip" pos=".5 0 0"/>
-</body><body pos=".6 .1 .5"><freejoint/><geom type="box" size=".05 .08 .1" mass=".8" contype="0" conaffinity="0"/>
-<site name="load" pos="0 0 .1"/></body></worldbody>
-<tendon><spatial name="brace" stiffness="40 5 2" damping="1 .2 .1" springlength=".3 .45"><site site="hook"/><site site="tip"/>
-</spatial><spatial name="rope" stiffness="60" springlength=".2"><site site="tip"/><site site="load"/></spatial></tendon>
+<geom type="capsule" fromto="0 0 0 .5 0 0" size=".03" mass="1" contype="0" conaffinity="0"/>
+<site name="tip" pos=".5 0 0"/></body><body pos=".6 .1 .5"><freejoint/>
+<geom type="box" size=".05 .08 .1" mass=".8" contype="0" conaffinity="0"/><site name="load" pos="0 0 .1"/></body>
+</worldbody><tendon><spatial name="brace" stiffness="40 5 2" damping="1 .2 .1" springlength=".3 .45"><site site="hook"/>
+<site site="tip"/></spatial><spatial name="rope" stiffness="60" springlength=".2"><site site="tip"/>
+<site site="load"/></spatial></tendon>
 <actuator><position name="winch" tendon="rope" kp="30" kv="2" gear="1.5" forcerange="-20 20"/>
 <motor name="pull" tendon="brace" gear="-2"/></actuator>
 <keyframe><key ctrl=".4 1" qvel="0 .3 .2 0 2 -1 3"/></keyframe></mujoco>

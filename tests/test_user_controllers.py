@@ -208,7 +208,9 @@ def test_random_scenes_with_an_impedance_law_move_alike_in_four_engines(seed: in
         replace(one, control_range=(-np.inf, np.inf), force_range=(-np.inf, np.inf)) for one in scene.actuators
     )
     joints = tuple(replace(one, force_range=(-np.inf, np.inf), range=(-np.inf, np.inf)) for one in scene.joints)
-    springs = tuple(replace(one, rest=(0.0, 0.0)) for one in scene.tendons if one.joints)
+    springs = tuple(
+        replace(one, rest=(0.0, 0.0), range=(-np.inf, np.inf) if one.bodies else one.range) for one in scene.tendons
+    )
     scene = scene.replace(
         actuators=free, joints=joints, loops=(), pairs=(), tendons=springs, pushes=(Push(name="push", body="body 0"),)
     )

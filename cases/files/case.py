@@ -67,11 +67,12 @@ class FileCase:
             q0 = assembled(model_of(self.path, str(p["without"])), q0)
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
+        act0 = np.zeros(self.model.na) if index < 0 else self.model.key_act[index]
         scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
-            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),
+            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, t_end=float(p["t_end"]),
             findings=findings_of(self.path),
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
@@ -111,6 +112,7 @@ def case_of(
     variant: str = REFERENCE_POSE,
     q0: Any = None,
     v0: Any = None,
+    act0: Any = None,
     inputs: Inputs | None = None,
     control: Control | None = None,
     t_end: float = 1.0,
@@ -126,6 +128,7 @@ def case_of(
         variant: of the case.
         q0: start (nq,); the reference pose if not given.
         v0: velocities there (nv,); at rest if not given.
+        act0: activations there (na,) of the actuators that have one; 0 if not given.
         inputs: controls of the actuators, then the components of the pushes; zero if not given.
         control: gives the controls at its ticks; those of the inputs are zero then.
         t_end: horizon, s.
@@ -148,7 +151,8 @@ def case_of(
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         contacts=tuple(names), q0=start,
-        v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
+        v0=np.zeros(scene.nv) if v0 is None else v0, act0=np.zeros(0) if act0 is None else act0, t_end=t_end, law=law,
+        inputs=inputs or held(scene), scene=scene,
         control=control, file=file, findings=findings,
     )  # fmt: skip
 

@@ -247,14 +247,24 @@ def _tendon(model: Any, i: int) -> Tendon:
     )
 
 
+ACTIVATIONS = {
+    "mjDYN_NONE": "", "mjDYN_INTEGRATOR": "integrator", "mjDYN_FILTER": "filter", "mjDYN_FILTEREXACT": "filter",
+}  # fmt: skip
+"""MuJoCo's word -> the scene's: how exactly it integrates a filter is a matter of steps."""
+
+
 def _actuator(model: Any, i: int) -> Actuator:
     import mujoco
 
     name = _name(model, "actuator", i)
     kind = mujoco.mjtTrn(model.actuator_trntype[i])
     gain, bias = mujoco.mjtGain(model.actuator_gaintype[i]), mujoco.mjtBias(model.actuator_biastype[i])
-    if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-        raise SceneError(f"Actuator {name!r} has an activation, which a scene does not have.")
+    dynamics = mujoco.mjtDyn(model.actuator_dyntype[i])
+    if dynamics.name not in ACTIVATIONS or (model.actuator_actnum[i] > 1 or model.actuator_actearly[i]):
+        early = " that acts early" if model.actuator_actearly[i] else ""
+        valid = ", ".join(name.removeprefix("mjDYN_").lower() for name in ACTIVATIONS)
+        raise SceneError(f"Actuator {name!r} has the activation {dynamics.name}{early}; valid: one of {valid}.")
+    kind_of = ACTIVATIONS[dynamics.name]
     if gain.name not in ("mjGAIN_FIXED", "mjGAIN_AFFINE") or bias.name not in ("mjBIAS_NONE", "mjBIAS_AFFINE"):
         raise SceneError(f"Actuator {name!r} has {gain.name} and {bias.name}; valid: fixed and affine ones.")
     target = int(model.actuator_trnid[i, 0])
@@ -274,4 +284,7 @@ def _actuator(model: Any, i: int) -> Actuator:
         damping=float(model.actuator_damping[i]),
         control_range=_floats(model.actuator_ctrlrange[i]) if model.actuator_ctrllimited[i] else UNBOUNDED,
         force_range=_floats(model.actuator_forcerange[i]) if model.actuator_forcelimited[i] else UNBOUNDED,
+        activation=kind_of,
+        time_constant=float(model.actuator_dynprm[i, 0]) if kind_of == "filter" else 0.0,
+        activation_range=_floats(model.actuator_actrange[i]) if kind_of and model.actuator_actlimited[i] else UNBOUNDED,
     )

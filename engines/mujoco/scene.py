@@ -83,7 +83,8 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     K = np.array([(forces(d, still) - forces(-d, still)) / (2.0 * step) for d in lift]).T
     D = np.array([(forces(still, d) - forces(still, -d)) / (2.0 * step) for d in lift]).T
     A = np.block([[np.zeros((n, n)), np.eye(n)], [np.linalg.solve(M, K), np.linalg.solve(M, D)]])
-    return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
+    filters = [1.0 / actuator.time_constant for actuator in scene.actuators if actuator.time_constant > 0.0]
+    return max(float(np.abs(np.linalg.eigvals(A)).max()), *filters, 1.0)
 
 
 def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared:
@@ -141,7 +142,7 @@ def _start(case: Case, model: Any, data: Any, acting: Acting) -> Callable[[], No
     def start() -> None:
         acting.reset()
         mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:] = case.q0, case.v0
+        data.qpos[:], data.qvel[:], data.act[:] = case.q0, case.v0, case.act0
         mujoco.mj_forward(model, data)  # the rows that are always on stand there only then
 
     return start

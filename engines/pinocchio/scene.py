@@ -188,13 +188,18 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
     def change(t: float, q: Floats, v: Floats) -> None:
         r = q.copy()
         to.normalise(r)
-        forces.change(acting.at(t, to.ours(r), to.velocities(r, v)))
+        forces.change(acting.at(t, to.ours(r), to.velocities(r, v)), t)
 
     def reset() -> None:
-        forces.still()
+        forces.begin(case.act0)
         acting.reset()
 
-    return World(instants=acting.instants, change=change, reset=reset, acting=acting)
+    def clock(t: float) -> None:
+        forces.t = t
+
+    return World(
+        instants=acting.instants, change=change, reset=reset, acting=acting, clock=clock if len(case.act0) else None
+    )  # fmt: skip
 
 
 def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:

@@ -151,15 +151,15 @@ def pull(p: Array, o: int, force: Any, f: Array) -> None:
 
 
 @kernels.helper
-def actuated(q: Array, v: Array, u: Array, p: Array, w: Array, sums: Array) -> None:
+def actuated(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, sums: Array) -> None:
     """Add the actuators' forces to sums (n,), each within its own bounds; w holds poses if one acts between points."""
     for i in range(int(p[layout.ACTUATORS].real)):
         o = int(p[layout.AT_ACTUATOR].real) + layout.ACTUATOR * i
-        which = int(p[o + layout.WHICH].real)
+        which, a = int(p[o + layout.WHICH].real), activation(t, u, p, o, i)
         if p[o + layout.TARGET].real == layout.ON_TENDON:
             at = tendon(p, which)
             x, speed = measured(q, v, p, w, at)
-            force = p[o + layout.GEAR] * actuator(p, o, u[i], p[o + layout.GEAR] * x, p[o + layout.GEAR] * speed)
+            force = p[o + layout.GEAR] * actuator(p, o, a, p[o + layout.GEAR] * x, p[o + layout.GEAR] * speed)
             if p[at + layout.COUNT].real < 0.0:
                 strings.along(p, at + layout.FIRST, w, force, sums)
             else:
@@ -171,15 +171,27 @@ def actuated(q: Array, v: Array, u: Array, p: Array, w: Array, sums: Array) -> N
                 speed += p[o + layout.GEAR + k] * v[which + k]
                 width = k + 1
         x = p[o + layout.GEAR] * q[int(p[o + layout.ANGLE].real)] if width == 1 else 0.0 * speed
-        force = actuator(p, o, u[i], x, speed)
+        force = actuator(p, o, a, x, speed)
         for k in range(width):
             sums[which + k] += p[o + layout.GEAR + k] * force
 
 
 @kernels.helper
-def actuator(p: Array, o: int, u: Any, x: Any, speed: Any) -> Any:
-    """Return the force of the actuator at p[o:] at a length and its rate."""
-    u = clamped(u, p[o + layout.CONTROL], p[o + layout.CONTROL + 1])
+def activation(t: float, u: Array, p: Array, o: int, i: int) -> Any:
+    """Return what drives actuator i at p[o:]: its control, or the activation that follows it from an instant on."""
+    c = clamped(u[i], p[o + layout.CONTROL], p[o + layout.CONTROL + 1])
+    kind = p[o + layout.ACTIVATION].real
+    if kind == layout.DIRECT:
+        return c
+    k = int(p[o + layout.SINCE].real)
+    since, a = t - u[k], u[k + 1]
+    a = a + c * since if kind == layout.INTEGRATOR else c + (a - c) * np.exp(-since / p[o + layout.TAU])
+    return clamped(a, p[o + layout.SPAN], p[o + layout.SPAN + 1])
+
+
+@kernels.helper
+def actuator(p: Array, o: int, a: Any, x: Any, speed: Any) -> Any:
+    """Return the force of the actuator at p[o:] at a length and its rate, driven by a."""
     gain = p[o + layout.GAIN] + p[o + layout.GAIN + 1] * x + p[o + layout.GAIN + 2] * speed
-    force = gain * u + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
+    force = gain * a + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
     return clamped(force, p[o + layout.FORCE], p[o + layout.FORCE + 1])

@@ -17,9 +17,13 @@ TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIF
 )  # fmt: skip
 # A degree of freedom: the one before it on the way to the world, armature, damping, bounds of its actuators' sum.
 BEFORE, ARMATURE, DAMPING, FORCE_LOW, FORCE_HIGH, DOF = 0, 1, 2, 5, 6, 7
-# An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds.
-TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTUATOR = 0, 1, 2, 3, 9, 12, 15, 17, 19
+# An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds; of its
+# activation what it is, its time constant and bounds, and where in u the instant and the value stand that it goes from.
+TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTIVATION, TAU, SPAN, SINCE, ACTUATOR = (
+    0, 1, 2, 3, 9, 12, 15, 17, 19, 20, 21, 23, 24,
+)  # fmt: skip
 ON_JOINT, ON_TENDON = 0, 1
+DIRECT, INTEGRATOR, FILTER = range(3)
 # A push: the node that it acts on, and where in its frame.
 PUSHED, PUSH = 0, 4
 # A tendon: its spring, damper and bounds; then joint by joint the coordinate, the velocity and the coefficient. One

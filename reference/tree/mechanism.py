@@ -42,7 +42,7 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
         n, at_dof = len(f), int(p[layout.AT_DOF].real)
         sums = w[len(w) - n :]
         sums[:] = 0.0
-        forces.actuated(q, v, u, p, w, sums)
+        forces.actuated(t, q, v, u, p, w, sums)
         for j in range(n):
             o = at_dof + layout.DOF * j
             f[j] += forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
@@ -221,7 +221,7 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
     w = _posed(q, v, p) if posed else np.empty(0, dtype=q.dtype)
     if len(u) > 0:
         sums = np.zeros(n, dtype=q.dtype)
-        forces.actuated(q, v, u, p, w, sums)
+        forces.actuated(t, q, v, u, p, w, sums)
         for j in range(n):
             o = at_dof + layout.DOF * j
             given += v[j] * forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])

@@ -11,6 +11,7 @@ from crossbody.cases import Law
 from crossbody.cases._control import Control
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
+from crossbody.reference._activations import Activations
 from crossbody.reference._kinds import Floats
 from crossbody.reference._redundant import redundant
 from crossbody.reference.tree import balls
@@ -18,7 +19,20 @@ from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import tabulate
 
 
-def system(scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None) -> System:
+def activations(scene: Scene, act0: Floats | None) -> Activations:
+    """Return the activations of a scene's actuators, which start at act0 (na,), or at 0."""
+    parts = [scene.actuators[i] for i in scene.activated]
+    return Activations(
+        driven=np.array(scene.activated, dtype=np.int64), tau=np.array([part.time_constant for part in parts]),
+        control=np.array([part.control_range for part in parts]),
+        span=np.array([part.activation_range for part in parts]),
+        start=np.zeros(len(parts)) if act0 is None else np.array(act0),
+    )  # fmt: skip
+
+
+def system(
+    scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None, act0: Floats | None = None
+) -> System:  # fmt: skip
     """Return the equations of a scene; nothing is compiled for it.
 
     Args:
@@ -27,6 +41,7 @@ def system(scene: Scene, law: Law, q0: Floats | None = None, control: Control | 
         q0: an assembled start (nq,), at which rows of loops that follow from others are found and left out; without it
             none is.
         control: of the user's own, which gives the controls.
+        act0: activations (na,) at the start; 0 if not given.
 
     Raises:
         SceneError: for a scene that the kernels cannot do.
@@ -45,7 +60,8 @@ def system(scene: Scene, law: Law, q0: Floats | None = None, control: Control | 
     fields: dict[str, Any] = dict(
         n=scene.nv, nq=scene.nq, parameters=table.p[: len(table.p) - table.sides], **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
-        inputs=len(scene.inputs), scratch=table.scratch, control=control, **KERNELS,
+        inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
+        activations=activations(scene, act0) if scene.activated else None, **KERNELS,
     )  # fmt: skip
     whole = System(**fields)
     if q0 is None or not scene.loops:

@@ -262,6 +262,12 @@ class _Builder:
             actuator.control_range,
             actuator.force_range,
         )
+        if actuator.activation:
+            kind = ("integrator", "filter").index(actuator.activation) + layout.INTEGRATOR
+            place = [self.scene.actuators[i].name for i in self.scene.activated].index(actuator.name)
+            row[layout.ACTIVATION : layout.SINCE + 1] = (
+                kind, actuator.time_constant, *actuator.activation_range, len(self.scene.inputs) + 2 * place,
+            )  # fmt: skip
         return row
 
     def _tendon(self, tendon: Tendon) -> Floats:
