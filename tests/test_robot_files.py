@@ -27,6 +27,7 @@ from crossbody.reference import System, simulate
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
+from crossbody.reports.runs import jobs
 
 ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",
@@ -265,12 +266,12 @@ def test_an_unnamed_floating_box_runs_in_every_engine(tmp_path: Path) -> None:
     for engine, profile in (
         ("reference", "compiled"),
         ("mujoco", "matched"),
-        ("mujoco", "default"),
+        ("mujoco", "as_is"),
         ("pinocchio", "law"),
     ):
         run = engines.load(engine).prepare(case, profile).run()
         assert run.outcome is Outcome.FINISHED
-        assert run.q[-1, 4] == pytest.approx(2.0 - 0.5 * 9.81 * 0.2**2, abs=1e-2 if profile == "default" else 1e-9)
+        assert run.q[-1, 4] == pytest.approx(2.0 - 0.5 * 9.81 * 0.2**2, abs=1e-2 if profile == "as_is" else 1e-9)
 
 
 def test_an_arm_moves_alike_in_three_engines(tmp_path: Path) -> None:
@@ -292,7 +293,7 @@ def test_an_arm_moves_alike_in_three_engines(tmp_path: Path) -> None:
 def test_a_file_as_it_stands_steps_as_mujoco_does(tmp_path: Path, integrator: str) -> None:
     path = write(tmp_path, integrator=integrator)
     case = cases.load(path, "raised", t_end=0.2)
-    run = engines.load("mujoco").prepare(case, "default").run()
+    run = engines.load("mujoco").prepare(case, "as_is").run()
     model = mujoco.MjModel.from_xml_path(path)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -470,7 +471,7 @@ def test_a_push_gives_a_floating_body_its_momentum(tmp_path: Path) -> None:
         '<geom type="box" size=".1 .2 .3" mass="2"/></body></worldbody></mujoco>', encoding="utf-8",
     )  # fmt: skip
     case = cases.load(str(path), t_end=0.5, push="box 1 -2 3 .1 .3")
-    for engine, profile in (("reference", "compiled"), ("mujoco", "default"), ("pinocchio", "law")):
+    for engine, profile in (("reference", "compiled"), ("mujoco", "as_is"), ("pinocchio", "law")):
         run = engines.load(engine).prepare(case, profile).run()
         assert run.outcome is Outcome.FINISHED
         assert np.abs(run.v[-1] - [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]).max() < 1e-9, engine
@@ -587,7 +588,7 @@ def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
     assert "'wall'" in found.message
     free = cases.load(path, "down", t_end=3.0, without="contacts")
     assert engines.load("reference").prepare(free, "compiled").run().outcome is Outcome.FINISHED
-    assert engines.load("mujoco").prepare(free, "default").run().outcome is Outcome.FINISHED
+    assert engines.load("mujoco").prepare(free, "as_is").run().outcome is Outcome.FINISHED
 
 
 @pytest.mark.parametrize(
@@ -620,6 +621,17 @@ def test_nothing_is_left_out_that_is_not_there(tmp_path: Path, word: str) -> Non
 def test_a_file_that_is_not_there_is_told() -> None:
     with pytest.raises(UnknownName, match=r"none\.xml"):
         cases.load("none.xml")
+
+
+def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path) -> None:
+    """`default` is that of shipped cases, and each sentence names the other."""
+    engine, case, shipped = engines.load("mujoco"), cases.load(write(tmp_path), "raised"), cases.load("bouncing_ball")
+    assert "as_is" in str(engine.why_not(case, "default"))
+    assert "default" in str(engine.why_not(shipped, "as_is"))
+    for one, profiles in ((case, {"matched", "as_is"}), (shipped, {"matched", "default"})):
+        assert {jobs.of_case(pick, one).profile for pick in jobs.picks(["mujoco"])} == profiles
+    asked = jobs.picks(["mujoco:default"])[0]
+    assert jobs.of_case(asked, case).profile == "default"
 
 
 def test_the_command_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -455,7 +455,7 @@ def test_a_file_takes_a_control_from_python_or_by_name(files: Path) -> None:
         calls.append(t)
         return 4.0 * (0.5 - float(q[0]))
 
-    given = run_in(cases.from_file("arm.xml", control=Control(held, 0.02), t_end=0.2), "mujoco", "default")
+    given = run_in(cases.from_file("arm.xml", control=Control(held, 0.02), t_end=0.2), "mujoco", "as_is")
     assert calls == [k * 0.02 for k in range(10)]
     with pytest.raises(InvalidValue, match="tick is given beside a Control"):
         cases.from_file("arm.xml", control=Control(held, 0.02), tick=0.01)
@@ -477,7 +477,7 @@ def test_a_file_takes_a_control_from_python_or_by_name(files: Path) -> None:
 )  # fmt: skip
 def test_wrong_controls_are_a_sentence(files: Path, words: list[str], told: str) -> None:
     (files / "u.csv").write_text("t,m\n0,1\n")
-    done = CliRunner().invoke(cli, ["run", "arm.xml", "-e", "mujoco:default", "--control", *words])
+    done = CliRunner().invoke(cli, ["run", "arm.xml", "-e", "mujoco:as_is", "--control", *words])
     assert done.exit_code == 2 or done.exception is not None
     text = done.output + str(done.exception)
     assert told in text.replace("\n", " ")

@@ -1,4 +1,4 @@
-"""Any scene in MuJoCo: matched, built from the scene; default, the file as it stands."""
+"""Any scene in MuJoCo: matched, built from the scene; as_is, the file as it stands."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
-    if profile != "default":
+    if profile == "default":
+        return "What MuJoCo makes of a robot file by itself is the profile as_is; default is one of the shipped cases."
+    if profile != "as_is":
         return None
     if not case.file:
         return "There is no file to run as it stands."
@@ -52,14 +54,14 @@ def why_not(case: Case, profile: str) -> str | None:
 
 def settings(case: Case, profile: str) -> dict[str, Parameter]:
     """Return the setting that says who reads the file: MuJoCo, or the project, which builds its scene."""
-    if profile != "default":
+    if profile != "as_is":
         return {}
     return {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
 
 
 def default_step(case: Case, profile: str) -> float:
     """Return the file's own step, s, or for matched a part of the fastest time constant that forces of joints have."""
-    if profile == "default":
+    if profile == "as_is":
         return float(_from_file(case).opt.timestep)
     return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0))
 
@@ -94,7 +96,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         ValueError: MuJoCo's own, for a model that it refuses.
     """
     scene = _scene(case)
-    if profile == "default":
+    if profile == "as_is":
         model = held(_from_file(case))
         model = model if reader == "file" else rebuilt(scene, model)
     else:
