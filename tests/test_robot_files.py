@@ -634,6 +634,33 @@ def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path
     assert jobs.of_case(asked, case).profile == "default"
 
 
+SERVO = """
+<mujoco><compiler angle="radian"/><worldbody><body><joint name="hinge" axis="0 1 0" damping="2"/>
+<geom type="capsule" fromto="0 0 0 .4 0 0" size=".03" mass="1.2"/></body></worldbody><actuator>
+<position name="servo" joint="hinge" kp="8"/><motor name="lift" joint="hinge"/></actuator>
+<keyframe><key ctrl="-.4 -1" qpos="-.3"/></keyframe></mujoco>
+"""
+
+
+def test_an_analysis_trims_at_the_controls_that_are_held(tmp_path: Path) -> None:
+    """Of the keyframe, or of the table at that instant; and MuJoCo's linear model there is the same."""
+    from crossbody.reports.analysis.counterparts import counterparts
+    from crossbody.reports.analysis.places import places
+
+    path, table = tmp_path / "servo.xml", tmp_path / "u.csv"
+    path.write_text(SERVO, encoding="utf-8")
+    table.write_text("t,servo,lift\n0,.1,-2\n2.5,0,0\n", encoding="utf-8")
+    for ctrl, wanted in (("", [-0.4, -1.0]), (str(table), [0.1, -2.0])):
+        (place,) = places(cases.load(str(path), t_end=3.0, ctrl=ctrl))
+        assert place.trim.outcome is Outcome.FINISHED
+        assert place.trim.u.tolist() == wanted
+        q = float(place.trim.q[0])
+        weight = 1.2 * 9.81 * 0.2 * np.cos(q)
+        assert 8.0 * (wanted[0] - q) + wanted[1] + weight == pytest.approx(0.0, abs=1e-12)
+        told = counterparts([place])[0]
+        assert told.loc[told["engine"] == "mujoco", "slope"].min() <= 1e-7
+
+
 def test_the_command_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path)
     arguments = ["run", path, "--key", "raised", "--set", "t_end=0.3", "--out", str(tmp_path / "out"), "--json"]
