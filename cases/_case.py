@@ -263,6 +263,7 @@ class Case:
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
         act0 (na,): activations at the start, of those actuators of the scene that have one; 0 if not given.
+        rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
         scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
             `findings` what is strange in it.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
@@ -296,6 +297,7 @@ class Case:
     chaos: Chaos | None = None
     consistent: bool = True
     scene: Scene | None = None
+    rank: int = -1
     act0: Floats = field(default_factory=lambda: np.zeros(0))
     velocities: tuple[Coordinate, ...] = ()
     quaternions: tuple[int, ...] = ()

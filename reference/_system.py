@@ -46,6 +46,8 @@ class System:
         unilateral (nc,): False for a row that is always on.
         redundant: indices of rows that are always on but follow from the others: they are held by these and stay off,
             mode FREE with a multiplier of 0. A run in which their gaps open ends as inconsistent.
+        loose: of each of these the part of it that does not follow, 0 if not given: so far its gap may open.
+        findings: sentences on what was decided when the system was made; they stand in the message of every run.
         follows (nc,): index of the row whose activity this one shares (a slip row follows its normal row); -1 none.
         mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
         inputs: nu, length of u.
@@ -85,6 +87,8 @@ class System:
     b2: ArrayLike = 0.0
     unilateral: ArrayLike = True
     redundant: ArrayLike = ()
+    loose: ArrayLike = ()
+    findings: tuple[str, ...] = ()
     follows: ArrayLike = -1
     nq: int = 0
     quaternions: ArrayLike = ()
@@ -124,6 +128,8 @@ class System:
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         put(self, "redundant", different("System.redundant", wholes("System.redundant", self.redundant), nc))
+        count = len(np.asarray(self.redundant))
+        put(self, "loose", frozen("System", "loose", self.loose if np.size(self.loose) else np.zeros(count), (count,)))
         if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
             raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters

@@ -205,6 +205,55 @@ def test_a_loop_given_twice_moves_as_once(tmp_path: Path) -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
+TILTED = FOUR_BAR.replace('<mujoco>', '<mujoco><option gravity="3 0 -9.81"/>').replace(
+    'name="coupler" axis="0 1 0"', 'name="coupler" axis="{tilt} 1 0"').replace("qpos=\".2 .1 -.3\"", 'qpos="0 0 0"')  # fmt: skip
+
+
+def tilted(folder: Path, tilt: float, **parameters: Any) -> cases.Case:
+    """A four-bar that is closed where it starts, one of whose axes is off by an angle, rad."""
+    path = folder / "tilted.xml"
+    loop = '<connect name="loop" body1="last" anchor="0 0 -.4" solref="-1 -2"/>'
+    path.write_text(TILTED.format(loops=loop, tilt=tilt), encoding="utf-8")
+    return cases.load(str(path), t_end=0.2, without="contacts", **parameters)
+
+
+@pytest.mark.parametrize("tilt", [1e-5, 1e-6, 1e-7])
+def test_a_row_that_is_nearly_dependent_is_named_and_left_out_or_kept(tmp_path: Path, tilt: float) -> None:
+    """Without it the four-bar moves, with it it stands: both are told, and in both witnesses `rank` decides."""
+    for rank, moves in ((-1, True), (2, True), (3, False)):
+        case = tilted(tmp_path, tilt, rank=rank)
+        runs = [
+            engines.load(name).prepare(case, profile, rtol=1e-10).run()
+            for name, profile in (("reference", "compiled"), ("reference", "cvode"), ("pinocchio", "law"))
+        ]
+        for run in runs:
+            assert run.outcome is Outcome.FINISHED, run.message
+            assert bool(np.abs(run.q[-1]).max() > 1e-2) is moves
+            assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= 1e-7
+        assert "near_dependent: a pivot between 1e-08 and 0.0001 of the first has 'loop y' (" in runs[0].message
+        assert f"{2 if moves else 3} of 3 rows hold" in runs[0].message
+
+
+@pytest.mark.parametrize(
+    ("tilt", "rank", "valid"), [(0.0, 3, "2, of 3"), (1e-6, 1, "from 2 to 3"), (0.3, 2, "3, of 3")]
+)
+def test_a_rank_that_rounding_does_not_leave_open_is_refused(
+    tmp_path: Path, tilt: float, rank: int, valid: str
+) -> None:
+    with pytest.raises(SceneError, match=f"rank is {rank}; valid: {valid}"):
+        engines.load("reference").prepare(tilted(tmp_path, tilt, rank=rank))
+    with pytest.raises(SceneError, match="no loops"):
+        cases.load(write(tmp_path), "raised", rank=3)
+
+
+def test_a_nearly_dependent_row_is_told_before_the_run(tmp_path: Path) -> None:
+    path = tilted(tmp_path, 1e-6).file
+    arguments = ["run", path, "-e", "reference:compiled", "--t-end", ".1", "--without", "contacts", "--rank", "3"]
+    result = CliRunner().invoke(cli, [*arguments, "--out", str(tmp_path / "out")])
+    assert "note: tilted.xml: near_dependent" in result.stderr
+    assert "3 of 3 rows hold" in result.stderr
+
+
 WELDED = """
 <mujoco><option timestep="1e-3"/>
   <default><joint axis="0 1 0" damping=".01"/><geom type="capsule" size=".02" contype="0" conaffinity="0"/></default>

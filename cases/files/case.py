@@ -31,6 +31,7 @@ PARAMETERS = {
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
     "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
+    "rank": Parameter(default=-1, doc="rows of the loops that hold; -1: those that surely do", low=-1, high=1e6),
     "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
@@ -72,7 +73,7 @@ class FileCase:
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
-            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, t_end=float(p["t_end"]),
+            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, rank=int(p["rank"]), t_end=float(p["t_end"]),
             findings=findings_of(self.path),
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
@@ -113,6 +114,7 @@ def case_of(
     q0: Any = None,
     v0: Any = None,
     act0: Any = None,
+    rank: int = -1,
     inputs: Inputs | None = None,
     control: Control | None = None,
     t_end: float = 1.0,
@@ -129,6 +131,7 @@ def case_of(
         q0: start (nq,); the reference pose if not given.
         v0: velocities there (nv,); at rest if not given.
         act0: activations there (na,) of the actuators that have one; 0 if not given.
+        rank: how many rows of the loops hold; below 0 those that surely do.
         inputs: controls of the actuators, then the components of the pushes; zero if not given.
         control: gives the controls at its ticks; those of the inputs are zero then.
         t_end: horizon, s.
@@ -140,6 +143,8 @@ def case_of(
         SceneError: for a scene that no engine here can run, naming what stands against it.
     """
     check_runnable(scene)
+    if rank >= 0 and not scene.loops:
+        raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
     names, laws, unilateral = rows_of(scene)
     law = Law(
@@ -152,7 +157,7 @@ def case_of(
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         contacts=tuple(names), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else v0, act0=np.zeros(0) if act0 is None else act0, t_end=t_end, law=law,
-        inputs=inputs or held(scene), scene=scene,
+        inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
     )  # fmt: skip
 

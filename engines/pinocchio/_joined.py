@@ -20,6 +20,7 @@ from crossbody.cases.scene import UPRIGHT, Loop, Tendon
 from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian, pose
 
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
+NEAR = (1e-8, 1e-4)  # what a row adds to the others, over the first: below it follows, above it holds by itself
 AXES = pin.LOCAL_WORLD_ALIGNED
 
 
@@ -225,17 +226,58 @@ def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:
     return End(joint, where * pose(position, orientation))
 
 
-def by_least_norm(model: Any, data: Any, tau: Floats) -> Solve:
-    """The same equations where rows may depend on each other: v' is unique, lam the least."""
+def loose_rows(A: Floats, widths: Sequence[int], rank: int) -> tuple[list[int], float]:
+    """Return which rows of loops are left out, and the singular value over the largest that counts as zero.
+
+    By Gram and Schmidt, each time the row that is longest behind those before it: what is nearly dependent is left out
+    (what follows but for rounding is not: the least norm deals with it), or all that is beyond a rank.
+
+    Args:
+        A: H M^-1/2 of the loops (rows, nv) where they are closed.
+        widths: rows of each loop; they are scaled by one length.
+        rank: how many hold; below 0 those that surely do.
+    """
+    left = np.concatenate(
+        [part / (np.linalg.norm(part, axis=1).max() or 1.0) for part in np.split(A, np.cumsum(widths)[:-1])]
+    )
+    order: list[int] = []
+    pivots: list[float] = []
+    while len(order) < len(A):
+        sizes = np.linalg.norm(left, axis=1)
+        sizes[order] = -1.0
+        order.append(int(np.argmax(sizes)))
+        pivots.append(float(sizes[order[-1]]) / (pivots[0] if pivots else 1.0))
+        way = left[order[-1]] / (sizes[order[-1]] or 1.0)
+        left = left - np.outer(left @ way, way)
+    if rank >= 0:
+        return order[rank:], min(DEPENDENT, 1e-2 * min(pivots[1:rank], default=1.0))
+    near = [row for row, pivot in zip(order[1:], pivots[1:], strict=True) if NEAR[0] <= pivot < NEAR[1]]
+    return near, DEPENDENT
+
+
+def by_least_norm(
+    model: Any, data: Any, tau: Floats, left_out: Sequence[int] = (), dependent: float = DEPENDENT
+) -> Solve:  # fmt: skip
+    """The same equations where rows may depend on each other: v' is unique, lam the least.
+
+    Args:
+        model, data, tau: as of the others.
+        left_out: rows that do not hold, among the first.
+        dependent: singular value of the rows, over the largest, that counts as zero.
+    """
 
     def solve(q: Floats, v: Floats, J: Floats, gamma: Floats) -> tuple[Floats, Floats]:
+        holds = np.ones(len(J), dtype=bool)
+        holds[list(left_out)] = False
         root = np.linalg.cholesky(mass_matrix(model, data, q))
         free = np.linalg.solve(root, tau - pin.nonLinearEffects(model, data, q, v))
-        A = np.linalg.solve(root, J.T).T
+        A = np.linalg.solve(root, J[holds].T).T
         U, s, Vt = np.linalg.svd(A, full_matrices=False)
-        kept = s > DEPENDENT * s[0]
-        wanted = U[:, kept].T @ (-gamma - A @ free) / s[kept]
+        kept = s > dependent * s[0]
+        wanted = U[:, kept].T @ (-gamma[holds] - A @ free) / s[kept]
         vd = np.linalg.solve(root.T, free + Vt[kept].T @ wanted)
-        return vd, U[:, kept] @ (wanted / s[kept])
+        lam = np.zeros(len(J))
+        lam[holds] = U[:, kept] @ (wanted / s[kept])
+        return vd, lam
 
     return solve

@@ -9,11 +9,12 @@ import numpy as np
 
 from crossbody.cases import Law
 from crossbody.cases._control import Control
+from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._kinds import Floats
-from crossbody.reference._redundant import redundant
+from crossbody.reference._redundant import ranked
 from crossbody.reference.tree import balls
 from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import tabulate
@@ -31,7 +32,8 @@ def activations(scene: Scene, act0: Floats | None) -> Activations:
 
 
 def system(
-    scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None, act0: Floats | None = None
+    scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None, act0: Floats | None = None,
+    rank: int = -1,
 ) -> System:  # fmt: skip
     """Return the equations of a scene; nothing is compiled for it.
 
@@ -42,9 +44,10 @@ def system(
             none is.
         control: of the user's own, which gives the controls.
         act0: activations (na,) at the start; 0 if not given.
+        rank: how many rows of loops hold; below 0 those whose pivot is above 1e-4 of the first.
 
     Raises:
-        SceneError: for a scene that the kernels cannot do.
+        SceneError: for a scene that the kernels cannot do, or a rank that the rows do not have.
     """
     table = tabulate(scene)
     turning: dict[str, Any] = {}
@@ -67,5 +70,13 @@ def system(
     if q0 is None or not scene.loops:
         return whole
     ends = np.cumsum([0, *(loop.width for loop in scene.loops)]).tolist()
-    left_out = redundant(whole, q0, [range(a, b) for a, b in pairwise(ends)])
-    return System(**fields, redundant=left_out) if left_out else whole
+    found = ranked(whole, q0, [range(a, b) for a, b in pairwise(ends)])
+    count = found.held(rank)
+    finding = found.finding(count, rows_of(scene)[0])
+    out = sorted(zip(found.order[count:], found.pivots[count:], strict=True))
+    if not out and not finding:
+        return whole
+    return System(
+        **fields, redundant=[row for row, _ in out], loose=[pivot for _, pivot in out],
+        findings=(finding,) if finding else (),
+    )  # fmt: skip
