@@ -61,7 +61,7 @@ class Rank:
         done = f"{count} of {len(self.order)} rows hold"
         return (
             f"near_dependent: a pivot between {ROUNDED:g} and {INDEPENDENT:g} of the first has {near}. Left out, such "
-            "rows follow from the others and the mechanism moves; kept, each takes a degree of freedom away, and it may "
+            "rows follow from the others and the mechanism moves; kept, each takes a degree of freedom, and it may "
             f"lock. Here {done}; rank (--rank) decides: from {sure}, none of them, to {most}, all of them."
         )
 

@@ -205,8 +205,11 @@ def test_a_loop_given_twice_moves_as_once(tmp_path: Path) -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
-TILTED = FOUR_BAR.replace('<mujoco>', '<mujoco><option gravity="3 0 -9.81"/>').replace(
-    'name="coupler" axis="0 1 0"', 'name="coupler" axis="{tilt} 1 0"').replace("qpos=\".2 .1 -.3\"", 'qpos="0 0 0"')  # fmt: skip
+TILTED = (
+    FOUR_BAR.replace("<mujoco>", '<mujoco><option gravity="3 0 -9.81"/>')
+    .replace('name="coupler" axis="0 1 0"', 'name="coupler" axis="{tilt} 1 0"')
+    .replace('qpos=".2 .1 -.3"', 'qpos="0 0 0"')
+)
 
 
 def tilted(folder: Path, tilt: float, **parameters: Any) -> cases.Case:

@@ -73,7 +73,8 @@ class FileCase:
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
-            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, rank=int(p["rank"]), t_end=float(p["t_end"]),
+            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, rank=int(p["rank"]),
+            t_end=float(p["t_end"]),
             findings=findings_of(self.path),
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip

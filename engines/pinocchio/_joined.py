@@ -261,7 +261,9 @@ def by_least_norm(
     """The same equations where rows may depend on each other: v' is unique, lam the least.
 
     Args:
-        model, data, tau: as of the others.
+        model: Pinocchio's.
+        data: its own.
+        tau: generalised forces (nv,) beside gravity and the rows.
         left_out: rows that do not hold, among the first.
         dependent: singular value of the rows, over the largest, that counts as zero.
     """

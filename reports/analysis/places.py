@@ -1,7 +1,8 @@
 """Equilibria of a case, each in a mode set, with the linear model there (spec 2.7).
 
 The model at a place is minimal: rows that are held stay held, unless their law is what is looked at (a ball in contact,
-soft fingers), and what acts from outside on a scene is held at what it is there. A mechanism without a list of places is looked at where its run passes: in every mode set that it visits.
+soft fingers). What acts from outside on a scene is held at what it is there. A mechanism without a list of places is
+looked at where its run passes: in every mode set that it visits.
 """
 
 from __future__ import annotations
