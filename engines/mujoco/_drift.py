@@ -7,6 +7,7 @@ By a difference of H along the motion, in a second set of data; MuJoCo has the t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -14,7 +15,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Joint, Scene, Tendon
-from crossbody.engines._contacts import Contacts, drift, gradient
+from crossbody.engines._contacts import Contacts, drift
 from crossbody.engines._scene import angle_of, places
 from crossbody.engines.mujoco._observe import numbers, pose_of
 
@@ -34,40 +35,46 @@ class Drift:
         self.pose = pose_of(self.data, self.numbers)
         self.bounded, self.at, self.place = scene.bounded, *places(scene)
 
-    def __call__(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Return that of all that may have bounds, 0 of what is a sum of joints, and of every row of the contacts."""
+    def __call__(self, q: Floats, v: Floats, parts: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return that of some of what may have bounds, 0 of a sum of joints, and of some rows of the contacts."""
+        self.data.qvel[:] = v
 
         def rates(t: float) -> Floats:
             self.data.qpos[:] = q
             mujoco.mj_integratePos(self.model, self.data.qpos, v, t)
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
-            touching = [gradient(touch, self._carried) @ v for touch in self.contacts.touches(self.pose)]
-            return np.array([*(self._rate(part, v) for part in self.bounded), *touching])
+            mujoco.mj_comVel(self.model, self.data)
+            touches = self.contacts.touches(self.pose, rows)
+            closing = [t.normal @ (self._carried(t.second, t.point) - self._carried(t.first, t.point)) for t in touches]
+            return np.array([*(self._rate(self.bounded[i], v) for i in parts), *closing])
 
-        lengths, touches = np.split(drift(rates, v), [len(self.bounded)])
+        lengths, touches = np.split(drift(rates, v), [len(parts)])
         return lengths, touches
 
     def _rate(self, part: Joint | Tendon, v: Floats) -> float:
         """Return how fast an angle of a ball joint or a distance of points changes, 0 of anything else."""
         if isinstance(part, Joint):
             return self._angle_rate(part, v) if part.type == "ball" and part.limited else 0.0
-        return self._length_rate(part, v) if part.bodies else 0.0
+        return self._length_rate(part) if part.bodies else 0.0
 
     def _angle_rate(self, joint: Joint, v: Floats) -> float:
         first, turn = self.place[joint.name], angle_of(self.data.qpos[self.at[joint.name] :][:4])
         return float(turn @ v[first : first + 3] / np.linalg.norm(turn))
 
-    def _length_rate(self, tendon: Tendon, v: Floats) -> float:
+    def _length_rate(self, tendon: Tendon) -> float:
         at = []
         for body, position in zip(tendon.bodies, tendon.positions, strict=True):
             R, p = self.pose(body)
             at.append(p + R @ np.array(position))
-        one, two = (self._carried(body, point) @ v for body, point in zip(tendon.bodies, at, strict=True))
+        one, two = (self._carried(body, point) for body, point in zip(tendon.bodies, at, strict=True))
         apart = at[1] - at[0]
         return float(apart @ (two - one) / np.linalg.norm(apart))
 
     def _carried(self, body: str, point: Floats) -> Floats:
-        J = np.zeros((3, self.model.nv))
-        mujoco.mj_jac(self.model, self.data, J, None, point, self.numbers[body])
-        return J
+        """Return the velocity of a point of a body; MuJoCo's twists are about a tree's centre of mass."""
+        k = self.numbers[body]
+        (a, b, c), linear = self.data.cvel[k, :3], self.data.cvel[k, 3:]
+        x, y, z = point - self.data.subtree_com[self.model.body_rootid[k]]
+        velocity: Floats = linear + np.array([b * z - c * y, c * x - a * z, a * y - b * x])
+        return velocity

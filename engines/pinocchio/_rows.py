@@ -15,6 +15,8 @@ from crossbody.engines._machines import active, elastic_part
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
+Chosen = Sequence[int] | slice
+"""Indices of rows; all of them as slice(None)."""
 Forces = Callable[[Floats, Floats, Floats], None]
 """(q, v, tau): writes the generalised forces tau (nv,) beside gravity and the rows, N or N m."""
 ULP = 2.3e-16
@@ -87,6 +89,7 @@ class PinRows:
         jacobian: q -> H (nc, nv).
         heights: q -> h (nc,), m.
         drift: (q, v) -> H' v (nc,), m/s^2.
+        drift_of: (q, v, rows) -> that of some rows; where it costs less than that of all.
         law: constants of every row.
         follows: index of the row whose mode each one shares; -1 for none.
     """
@@ -101,9 +104,11 @@ class PinRows:
         algebra: str = "forwardDynamics",
         follows: Sequence[int] = (),
         forces: Forces | None = None,
+        drift_of: Callable[[Floats, Floats, Chosen], Floats] | None = None,
     ) -> None:
         self.model, self.data = model, model.createData()
         self.jacobian, self.heights, self.drift, self.forces = jacobian, heights, drift, forces
+        self.drift_of = drift_of or (lambda q, v, rows: drift(q, v)[rows])
         self.nc = len(law.a0)
         self.unilateral: Sequence[bool] = law.unilateral.tolist()
         self.follows: Sequence[int] = tuple(follows) or (-1,) * self.nc
@@ -158,7 +163,7 @@ class PinRows:
         if rows is None:
             return pin.aba(self.model, self.data, q, v, self.tau), np.zeros(self.nc)
         J, h = self.jacobian(q)[rows], self.heights(q)[rows]
-        gamma = self.drift(q, v)[rows] + a1 * J.dot(v) + (a0 + a2 * h * h) * h
+        gamma = self.drift_of(q, v, rows) + a1 * J.dot(v) + (a0 + a2 * h * h) * h
         vd, part = self.solve(q, v, J, gamma)
         if len(part) == self.nc:
             return vd, part
