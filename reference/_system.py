@@ -128,8 +128,7 @@ class System:
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         put(self, "redundant", different("System.redundant", wholes("System.redundant", self.redundant), nc))
-        count = len(np.asarray(self.redundant))
-        put(self, "loose", frozen("System", "loose", self.loose if np.size(self.loose) else np.zeros(count), (count,)))
+        self._check_told()
         if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
             raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
@@ -198,6 +197,21 @@ class System:
                 raise SceneError(f"System.{name} is {shown(value)}; it must be a whole number from {low} to {LARGEST}.")
         if self.mass_block and self.n % self.mass_block:
             raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")
+
+    def _check_told(self) -> None:
+        """Bring `loose` to the rows that are redundant, and check what comes with a scene."""
+        count, loose = len(np.asarray(self.redundant)), frozen("System", "loose", self.loose, (None,))
+        loose = frozen("System", "loose", loose if len(loose) else np.zeros(count), (count,))
+        if not np.all(np.isfinite(loose)) or np.any(loose < 0.0):
+            raise SceneError(f"System.loose is {loose.tolist()}; it must be finite and at least 0.")
+        object.__setattr__(self, "loose", loose)
+        if not isinstance(self.findings, tuple) or not all(isinstance(text, str) for text in self.findings):
+            raise SceneError(f"System.findings is {shown(self.findings)}; it must be a tuple of texts.")
+        behind = self.activations
+        if behind is not None and not (isinstance(behind, Activations) and behind.width <= self.inputs):
+            raise SceneError(
+                f"System.activations is {shown(behind)}; valid: Activations of some of its inputs, or None."
+            )
 
     def _put_callable(self, control: Control) -> None:
         """Take tick and memory of a controller in Python, and check how many inputs it sets."""
