@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases._arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import UNBOUNDED, Scene
 from crossbody.cases.scene_contacts import Contact
 from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
@@ -103,12 +104,13 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         model = matched(scene)
     data = mujoco.MjData(model)
     rows, acting = Rows(scene, model, data), Acting(case)
+    driver = Forces(scene) if profile == "matched" and scene.activated else None
     prepared = Prepared(
-        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting), modes=rows.modes,
-        lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
-        observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting),
+        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting, driver),
+        modes=rows.modes, lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
+        observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
-        hook=rows.hook() if profile == "matched" else None, always=True,
+        hook=_hook(scene, rows, driver) if profile == "matched" else None, always=True,
     )  # fmt: skip
     prepared.audit = _audit(case, profile, model, rows)
     return prepared
@@ -128,7 +130,14 @@ def _from_file(case: Case) -> Any:
 
 
 def matched(scene: Scene) -> Any:
-    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no other contacts."""
+    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no other contacts.
+
+    Controls stand for the activations of actuators that have one: MuJoCo's stages let these pass the ends of ranges.
+    """
+    scene = scene.replace(actuators=tuple(
+        replace(one, activation="", time_constant=0.0, control_range=UNBOUNDED) if one.activation else one
+        for one in scene.actuators
+    ))  # fmt: skip
     spec = spec_of(scene)
     option = spec.option
     option.integrator, option.solver = mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_NEWTON
@@ -140,17 +149,37 @@ def matched(scene: Scene) -> Any:
     return model
 
 
-def _start(case: Case, model: Any, data: Any, acting: Acting) -> Callable[[], None]:
+def _start(case: Case, model: Any, data: Any, acting: Acting, driver: Forces | None) -> Callable[[], None]:
     def start() -> None:
         acting.reset()
         mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:], data.act[:] = case.q0, case.v0, case.act0
+        data.qpos[:], data.qvel[:] = case.q0, case.v0
+        if driver is not None:
+            driver.begin(case.act0)
+        else:
+            data.act[:] = case.act0
         mujoco.mj_forward(model, data)  # the rows that are always on stand there only then
 
     return start
 
 
-def _change(scene: Scene, data: Any, acting: Acting) -> Callable[[float], None]:
+def _hook(scene: Scene, rows: Rows, driver: Forces | None) -> Hook | None:
+    """Return what MuJoCo calls in every stage: terms of rows that it leaves out, and activations at that instant."""
+    own = rows.hook()
+    if driver is None:
+        return own
+    activated = list(scene.activated)
+
+    def hook(model: Any, data: Any) -> None:
+        driver.t = data.time
+        data.ctrl[activated] = driver.driven()[activated]
+        if own is not None:
+            own(model, data)
+
+    return hook
+
+
+def _change(scene: Scene, data: Any, acting: Acting, driver: Forces | None) -> Callable[[float], None]:
     bodies = numbers(scene)
     pushed = [bodies[push.body] for push in scene.pushes]
 
@@ -159,6 +188,8 @@ def _change(scene: Scene, data: Any, acting: Acting) -> Callable[[float], None]:
             given = acting.at(t, data.qpos, data.qvel)
         controls, pushes = np.split(given, [len(scene.actuators)])
         data.ctrl[:] = controls
+        if driver is not None:
+            driver.change(given, t)
         data.xfrc_applied[:] = 0.0
         np.add.at(data.xfrc_applied[:, :3], pushed, pushes.reshape(-1, 3))
 
