@@ -107,7 +107,8 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     driver = Forces(scene) if profile == "matched" and scene.activated else None
     prepared = Prepared(
         model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting, driver),
-        modes=rows.modes, lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
+        modes=rows.modes, lam=rows.lam,
+        safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
         hook=_hook(scene, rows, driver) if profile == "matched" else None, always=True,
