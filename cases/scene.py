@@ -323,8 +323,9 @@ class Actuator(_Named):
         gear: one number; of a ball or free joint, as many as it has velocities.
         gain: g0, g1, g2.
         bias: b0, b1, b2.
-        armature: gear^2 armature is added to the joint's, kg m^2; a tendon cannot have it.
-        damping: -gear^2 damping v acts on the joint, or along the tendon.
+        armature: gear^2 armature is added to the joint's, kg m^2; a tendon cannot have it. Of several gears the first
+            counts, for every velocity of the joint.
+        damping: -gear^2 damping v acts on the joint likewise, or along the tendon.
         control_range, force_range: bounds of u, and of the force.
         activation: integrator or filter; empty where a = u.
         time_constant: tau of a filter, s.

@@ -16,7 +16,7 @@ import numpy as np
 from crossbody.cases import CaseUnsupported
 from crossbody.cases._arrays import Floats
 from crossbody.cases._rotations import turned
-from crossbody.cases.scene import WIDTHS, Joint, Scene, Tendon, Vector
+from crossbody.cases.scene import WIDTHS, Actuator, Joint, Scene, Tendon, Vector
 
 
 def polynomial(constants: Vector, x: Any) -> Any:
@@ -113,7 +113,7 @@ class Forces:
         self.A = np.zeros((len(scene.actuators), n))
         for row, actuator in zip(self.A, scene.actuators, strict=True):
             if not actuator.tendon:
-                moved = self.moved(next(joint for joint in scene.joints if joint.name == actuator.joint))
+                moved = self.reached(actuator)
                 row[moved] = actuator.gear[: moved.stop - moved.start]
 
     def x(self, q: Floats) -> Floats:
@@ -133,10 +133,14 @@ class Forces:
         own: Floats = np.zeros(self.scene.nv)
         for joint in self.scene.joints:
             own[self.moved(joint)] += joint.armature
-        for row, actuator in zip(self.A, self.scene.actuators, strict=True):
+        for actuator in self.scene.actuators:
             if actuator.joint:
-                own += row**2 * actuator.armature
+                own[self.reached(actuator)] += actuator.gear[0] ** 2 * actuator.armature
         return own
+
+    def reached(self, actuator: Actuator) -> slice:
+        """Velocities of the joint of an actuator."""
+        return self.moved(next(joint for joint in self.scene.joints if joint.name == actuator.joint))
 
     def turned(self, joint: Joint, q: Floats) -> Floats:
         """Rotation (..., 3), rad, of a free or ball joint from where its spring rests."""
@@ -191,7 +195,11 @@ class Forces:
             spring = polynomial(tendon.stiffness, self.outside(tendon.rest, length))
             total -= row * (spring + drag(tendon.damping, rate))
         for actuator, (row, _, rate) in zip(self.scene.actuators, self.strokes(x, v, stretch), strict=True):
-            total -= row * actuator.damping * rate if actuator.tendon else row**2 * actuator.damping * v
+            if actuator.tendon:
+                total -= row * actuator.damping * rate
+            else:
+                reached = self.reached(actuator)
+                total[reached] -= actuator.gear[0] ** 2 * actuator.damping * v[reached]
         return total + self.actuated(x, v, stretch)
 
     def stretch(self, q: Floats, v: Floats) -> Stretch:

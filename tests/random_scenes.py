@@ -162,6 +162,7 @@ def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actua
             gain=tuple(rng.normal(size=3) if joint.type in SINGLE else (1.0, 0.0, 0.0)),
             bias=tuple(rng.normal(size=3) if joint.type in SINGLE else (0.0, 0.0, 0.0)),
             control_range=(-1.0, 2.0), force_range=(-4.0, 4.0),
+            armature=0.05, damping=0.3,
         ))  # fmt: skip
     return tuple(made)
 

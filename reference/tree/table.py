@@ -253,8 +253,8 @@ class _Builder:
             row[[layout.TARGET, layout.WHICH, layout.ANGLE]] = layout.ON_JOINT, dof, self.coordinates[joint.name]
             row[layout.GEAR : layout.GEAR + width] = actuator.gear[:width]
             for k in range(width):
-                self.dof_rows[dof + k][layout.ARMATURE] += actuator.gear[k] ** 2 * actuator.armature
-                self.dof_rows[dof + k][layout.DAMPING] += actuator.gear[k] ** 2 * actuator.damping
+                self.dof_rows[dof + k][layout.ARMATURE] += actuator.gear[0] ** 2 * actuator.armature
+                self.dof_rows[dof + k][layout.DAMPING] += actuator.gear[0] ** 2 * actuator.damping
         else:
             raise SceneError(f"Actuator {actuator.name!r} acts on neither a joint nor a tendon.")
         row[layout.GAIN : layout.GAIN + 3], row[layout.BIAS : layout.BIAS + 3] = actuator.gain, actuator.bias
