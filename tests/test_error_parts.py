@@ -168,7 +168,7 @@ SOFT = """
 
 def rows_of(path: str, **settings: Any) -> dict[str, Verdict]:
     case = cases.load(path, t_end=0.5)
-    result = jobs.run_case(case, jobs.picks(["mujoco:default"]), settings=settings)
+    result = jobs.run_case(case, jobs.picks(["mujoco:as_is"]), settings=settings)
     return {row.metric: row for row in judged(case, result.entries, result.truth, "crossbody run")}
 
 
@@ -203,9 +203,9 @@ def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: p
     path = tmp_path / "soft.xml"
     path.write_text(SOFT.format(solref="-1e4 -200"), encoding="utf-8")
     case = cases.load(str(path), t_end=0.5)
-    right = jobs.run_case(case, jobs.picks(["mujoco:default"]))
+    right = jobs.run_case(case, jobs.picks(["mujoco:as_is"]))
     monkeypatch.setattr(scene, "_from_file", wrong)
-    run = engines.load("mujoco").prepare(case, "default").run()
+    run = engines.load("mujoco").prepare(case, "as_is").run()
     assert right.entries[0].study is not None
     found = splits(case, right.truth, run, right.entries[0].study)["position"]
     before = splits(case, right.truth, right.entries[0].run, right.entries[0].study)["position"]
@@ -229,7 +229,7 @@ def test_contacts_of_the_scene_are_as_soft_as_those_of_its_file(tmp_path: Path) 
     path = tmp_path / "bouncing.xml"
     path.write_text(BOUNCING, encoding="utf-8")
     case, engine = cases.load(str(path), t_end=0.6), engines.load("mujoco")
-    own, built = (engine.prepare(case, "default", reader=reader).run() for reader in ("file", "scene"))
+    own, built = (engine.prepare(case, "as_is", reader=reader).run() for reader in ("file", "scene"))
     assert len(own.events) == len(built.events) > 0
     assert np.abs(own.q - built.q).max() < 1e-12
 
@@ -247,7 +247,7 @@ def test_a_published_biped_is_soft_by_its_file_and_converges_where_it_is_stiff()
 
     def off(dt: float, how: str) -> Any:
         """Differences to the rigid motion (instants, coordinates)."""
-        scene: Any = engines.load("mujoco").prepare(case, "default", dt=dt)
+        scene: Any = engines.load("mujoco").prepare(case, "as_is", dt=dt)
         model, data = scene.scene.model, scene.scene.data
         if how == "stiff":
             model.eq_solimp[:, :2] = MAX_IMPEDANCE

@@ -1,4 +1,4 @@
-"""Rows that bound the distance of two points, of one body or of two, or of one and the world."""
+"""Distances of two points, of one body or of two, or of one and the world: their bounds, and forces along them."""
 
 from __future__ import annotations
 
@@ -11,23 +11,34 @@ from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout
 from crossbody.reference.tree.points import point, pull
 
-SIGN, FIRST, SECOND, BOUND = 1, 2, 6, 10  # in a row: 1 below, -1 above; a node and a point in its frame, twice
+SIGN, ENDS, BOUND = 1, 2, 10  # in a row: 1 below, -1 above; a node and a point in its frame, twice
+END = 4  # numbers of one end
 
 
 @kernels.helper
-def _between(p: Array, o: int, w: Array) -> Any:
-    """Return the distance of the second point from the first as a jet, its direction, and both points."""
-    one = point(p, w, int(p[o + FIRST].real), p[o + FIRST + 1], p[o + FIRST + 2], p[o + FIRST + 3])
-    two = point(p, w, int(p[o + SECOND].real), p[o + SECOND + 1], p[o + SECOND + 2], p[o + SECOND + 3])
+def between(p: Array, o: int, w: Array) -> Any:
+    """Return the distance of the second end at p[o:] from the first as a jet, its direction, and both points."""
+    k = o + END
+    one = point(p, w, int(p[o].real), p[o + 1], p[o + 2], p[o + 3])
+    two = point(p, w, int(p[k].real), p[k + 1], p[k + 2], p[k + 3])
     d, n = solids.point(two, one)
     return d, n, value(one), value(two)
+
+
+@kernels.helper
+def along(p: Array, o: int, w: Array, force: Any, f: Array) -> None:
+    """Add what a force that lengthens the distance of the ends at p[o:] does to the joints."""
+    _, n, one, two = between(p, o, w)
+    n = (force * n[0], force * n[1], force * n[2])
+    pull(p, w, int(p[o].real), -1.0, n, one, f)
+    pull(p, w, int(p[o + END].real), 1.0, n, two, f)
 
 
 @kernels.helper
 def string(p: Array, i: int, w: Array) -> tuple[Any, Any, Any]:
     """Return gap, rate and H' v of row i."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
-    d, sign = _between(p, o, w)[0], p[o + SIGN]
+    d, sign = between(p, o + ENDS, w)[0], p[o + SIGN]
     return sign * (d[0] - p[o + BOUND]), sign * d[1], sign * d[2]
 
 
@@ -35,6 +46,4 @@ def string(p: Array, i: int, w: Array) -> tuple[Any, Any, Any]:
 def string_columns(p: Array, i: int, w: Array, H: Array) -> None:
     """Fill H (n,) of row i along the joints of both points."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
-    sign, (_, n, one, two) = p[o + SIGN].real, _between(p, o, w)
-    pull(p, w, int(p[o + FIRST].real), -sign, n, one, H)
-    pull(p, w, int(p[o + SECOND].real), sign, n, two, H)
+    along(p, o + ENDS, w, p[o + SIGN], H)
