@@ -76,4 +76,5 @@ def watched(system: System, run: Trajectory) -> Trajectory:
             return replace(run, outcome=Outcome.INCONSISTENT, message=message)
     lam = np.array(run.lam)
     lam[:, left_out] = np.nan
-    return replace(run, lam=lam, counts={**run.counts, "redundant": len(left_out)})
+    count = len(left_out) + run.counts.get("redundant", 0)
+    return replace(run, lam=lam, counts={**run.counts, "redundant": count})

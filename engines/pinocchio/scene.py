@@ -15,7 +15,7 @@ from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm
+from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm, none_pulling
 from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -68,8 +68,9 @@ def build(case: Case, algebra: str) -> Prepared:
         return np.concatenate([np.concatenate(own)[order], touching.drift(q, v)])
 
     pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
-    if loops:  # planar loops have rows that depend on each other
+    if loops or touching.count > 1:  # planar loops have rows that depend on each other, and bodies on many feet
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
+        pinned.shared = none_pulling
     start = to.theirs(case.q0)
     return Prepared(
         rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),

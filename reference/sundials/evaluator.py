@@ -45,16 +45,22 @@ class Evaluator:
             return code
         raise Ended(ENDS[abs(code)], self.equations.active)
 
-    def begin(self, guards: Sequence[Guard], frozen: Collection[int]) -> None:
+    def begin(self, guards: Sequence[Guard], frozen: Collection[int], tied: Collection[int] = ()) -> None:
         """Put the active rows, their law and guards in force.
 
         Args:
             guards: what is watched.
+            tied: open rows that depend on the active ones.
             frozen: rows whose collisions take no time: inactive, they would follow their slow law.
         """
         work, e = self.work, self.equations
         terms = [(g, term) for g, guard in enumerate(guards) for term in guard.terms]
         work["size"][4:7] = len(e.active), len(terms), len(guards)
+        work["size"][9] = e.spread is not None
+        if e.spread is not None:
+            work["spread"][:, : len(e.active)] = e.spread
+        work["tied"][:] = 0
+        work["tied"][list(tied)] = 1
         work["idx"][: len(e.active)] = e.active
         work["law"][:], work["law_if"][:] = e.law, e.law
         for i in range(e.system.nc):
