@@ -146,9 +146,9 @@ def _exchange(s: Any, w: Work, j: int) -> bool:
     if left <= DEPENDENT * w.gram[j, j]:
         least, out = np.inf, -1
         for c in range(s.na):
-            if w.carries[c] and w.shares[w.idx[c]] and w.trial[c] > DEPENDENT:
-                if w.share[c] < least * w.trial[c]:
-                    least, out = w.share[c] / w.trial[c], c
+            gives_way = w.carries[c] and w.shares[w.idx[c]] and w.trial[c] > DEPENDENT
+            if gives_way and w.share[c] < least * w.trial[c]:
+                least, out = w.share[c] / w.trial[c], c
         if out < 0:
             return False
         for c in range(s.na):

@@ -236,6 +236,7 @@ class Work:
     settled: Bytes  # modes that rows left in the last pass
     shares: Bytes  # rows that may depend on others
     idle_rows: Bytes  # rows in contact that carry nothing
+    tied: Bytes  # open rows that depend on the active ones, as far as they were asked
     spent: Bytes  # rows that share a load and whose multiplier has just vanished
     carries: Bytes  # rows of a smallest set that carries the load
     kind: Index  # (nc,) which guard fired

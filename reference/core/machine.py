@@ -40,6 +40,7 @@ from crossbody.reference.core.shares import CONSISTENT
 SLOW = 1e-9  # part of the largest rate seen
 DEEP = 1e-9  # m: a FREE gap below -DEEP was started in penetration
 ROUNDING = 1e-13
+LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 
 
 @inlined
@@ -142,6 +143,7 @@ def multiplier_if_active(
     mode[i] = active_mode(s, m, i)
     activate(s, m, w, mode)
     lam, dependent = -np.inf, -1
+    w.tied[i] = 0
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) == 0:
         noise(s, m, w)
         dependent = s.dependent
@@ -182,15 +184,9 @@ def _alone(K: Any, m: Model, w: Work, j: int, i: int, t: float, q: Any, v: Any) 
 def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float, t: float, q: Any, v: Any) -> float:
     """What row i lacks beside the active rows: its multiplier, or if it depends on them by how much it is off its law.
 
-    One that they hold at its law counts as in contact; but not before its own time scale has passed since it was
-    lifted off, or rounding would choose where a load is about to leave a row.
-
-    Args:
-        K, s, m, w: of the run, with the modes as they are.
-        i: the row.
-        dependent: number of dependent rows if row i were active; -1 if they contradicted each other.
-        lam: its multiplier then.
-        t, q, v: instant and state.
+    One that they hold at its law counts as in contact; but not just after it was lifted off, or rounding would choose
+    where a load is about to leave a row. If it were active, so many rows would be `dependent` (-1 if they contradicted
+    each other), and `lam` would be its multiplier.
     """
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) != 0:
         return -np.inf
@@ -199,10 +195,10 @@ def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float
     j = s.na
     _alone(K, m, w, j, i, t, q, v)
     off, size = _off_law(m, w, j, i, 1.0, v, w.vd)
-    w.noise[i] = 0.0
+    w.noise[i], w.tied[i] = 0.0, 1
     band = max(CONSISTENT, s.rtol) * size + 8.0 * _from_state(s, w, i)
-    old = (s.t_old - w.let_go[i]) * max(np.sqrt(w.law[i, 0]), w.law[i, 1]) > 1.0
-    return float(-off + band if old else -off - band)
+    open_for = (t - w.let_go[i]) * max(np.sqrt(w.law[i, 0]), w.law[i, 1])
+    return float(-off + band if open_for > LIFTED else -off - band)
 
 
 @compiled
@@ -246,6 +242,15 @@ def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest
 
 
 @inlined
+def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether row i, below the surface, depends on the active rows and follows its law with them."""
+    if not w.shares[i] or s.na == 0:
+        return False
+    lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.nq], w.y[s.nq :])
+    return bool(w.tied[i] and lam > 0.0)
+
+
+@inlined
 def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the level machine puts row i at this instant."""
     h, rate = w.gap[i], w.rate[i]
@@ -258,7 +263,9 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return int(mode[i])
     if mode[i] != FREE:
         closing = rate < -slow(s)
-        return active_mode(s, m, i) if closing and _would_press(K, s, m, w, mode, i, False) else int(mode[i])
+        if closing and (_would_press(K, s, m, w, mode, i, False) or _is_held(K, s, m, w, mode, i)):
+            return active_mode(s, m, i)
+        return int(mode[i])
     if rate < -slow(s):
         return active_mode(s, m, i)
     if h < -DEEP:

@@ -20,7 +20,7 @@ import numpy as np
 from crossbody.cases import Event, Mode, Outcome
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System, initial_modes
-from crossbody.reference.sundials.compiled.evaluation import Kind
+from crossbody.reference.sundials.compiled.evaluation import LIFTED, Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 from crossbody.reference.sundials.sharing import CONSISTENT, Sharing, rank, share
 
@@ -110,7 +110,8 @@ class LevelMachine:
         self.guards: list[Guard] = []
         self.sharing: Sharing | None = None
         self.spent: set[int] = set()
-        self.tied: set[int] = set()
+        self.tied: dict[int, float] = {}
+        self._lifted: dict[int, float] = {}
         self.redundant = 0
         self._bilateral = [i for i in range(system.nc) if not self.switching[i] and self.modes[i] in ACTIVE]
         self._may_share = len(self.rows) > 1 and max(self.follows, default=-1) < 0
@@ -197,14 +198,19 @@ class LevelMachine:
             self._activate(self.modes)
 
     def _beyond_law(self, i: int, t: float, q: Floats, v: Floats) -> float:
-        """By how much row i is below its law, m/s^2, where the active rows determine it."""
+        """By how much row i is below its law, m/s^2, where the active rows determine it; one that is at it counts.
+
+        But not just after it was lifted off, or rounding would choose where a load is about to leave a row.
+        """
         e = self.equations
         vd, _ = e.accelerate(t, q, v)
         with e._selected([i]):
             H, h, Hdv = e.rows(t, q, v)
             a0, a1, a2 = e.law[i]
             terms = np.array([H[0] @ vd, Hdv[0], a1 * (H[0] @ v), (a0 + a2 * h[0] ** 2) * h[0]])
-        return float(-terms.sum() - CONSISTENT * np.abs(terms).sum())
+        open_for = (t - self.tied[i]) * max(a0**0.5, a1)
+        band = CONSISTENT * np.abs(terms).sum()
+        return float((band if open_for > LIFTED else -band) - terms.sum())
 
     def _presses(self, i: int, h: float, t: float, q: Floats, v: Floats) -> bool:
         """Whether row i would push if it were active now."""
@@ -276,6 +282,7 @@ class LevelMachine:
             try:
                 lifted = self._share(t, q, v)
                 for i in lifted:
+                    self._lifted[i] = t
                     self._switch(t, i, self._released(i, float(self.equations.gaps(t, q, v)[0][i])))
                 changed.update(lifted)
                 if lifted:
@@ -308,7 +315,7 @@ class LevelMachine:
 
     def _tie(self, t: float, q: Floats, v: Floats) -> None:
         """Find the open rows below the surface that depend on the active ones."""
-        self.tied = set()
+        self.tied = {}
         open_ = [i for i in self.rows if self.modes[i] in (Mode.BALLISTIC, Mode.COLLISION_SEPARATION)]
         if not self._may_share or not open_ or self.frozen:
             return
@@ -319,7 +326,9 @@ class LevelMachine:
         A /= np.linalg.norm(A, axis=1)[:, None]
         held = A[: len(active)]
         self.tied = {
-            i for i, row in zip(open_, A[len(active) :], strict=True) if rank(np.vstack([held, row])) <= len(held)
+            i: self._lifted.get(i, -np.inf)
+            for i, row in zip(open_, A[len(active) :], strict=True)
+            if rank(np.vstack([held, row])) <= len(held)
         }
 
     def _strongest(self, wanted: dict[int, Mode], t: float, q: Floats, v: Floats) -> list[int]:

@@ -9,18 +9,17 @@ from crossbody.reference._kinds import Array
 from crossbody.reference.pairs import solids
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout
-from crossbody.reference.tree.points import point, pull
+from crossbody.reference.tree.points import apart, point, pull
 
 SIGN, FIRST, SECOND, BOUND = 1, 2, 6, 10  # in a row: 1 below, -1 above; a node and a point in its frame, twice
 
 
 @kernels.helper
 def _between(p: Array, o: int, w: Array) -> Any:
-    """Return the distance of the second point from the first as a jet, its direction, and both points."""
-    one = point(p, w, int(p[o + FIRST].real), p[o + FIRST + 1], p[o + FIRST + 2], p[o + FIRST + 3])
-    two = point(p, w, int(p[o + SECOND].real), p[o + SECOND + 1], p[o + SECOND + 2], p[o + SECOND + 3])
+    """Return the distance of the second point from the first as a jet, and its direction."""
+    one, two = apart(p, w, o + FIRST, o + SECOND)
     d, n = solids.point(two, one)
-    return d, n, value(one), value(two)
+    return d, n
 
 
 @kernels.helper
@@ -35,6 +34,8 @@ def string(p: Array, i: int, w: Array) -> tuple[Any, Any, Any]:
 def string_columns(p: Array, i: int, w: Array, H: Array) -> None:
     """Fill H (n,) of row i along the joints of both points."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
-    sign, (_, n, one, two) = p[o + SIGN].real, _between(p, o, w)
-    pull(p, w, int(p[o + FIRST].real), -sign, n, one, H)
-    pull(p, w, int(p[o + SECOND].real), sign, n, two, H)
+    sign, (_, n) = p[o + SIGN].real, _between(p, o, w)
+    for end in range(2):
+        at, along = (o + FIRST, -sign) if end == 0 else (o + SECOND, sign)
+        node = int(p[at].real)
+        pull(p, w, node, along, n, value(point(p, w, node, p[at + 1], p[at + 2], p[at + 3])), H)

@@ -50,6 +50,7 @@ GAP, BELOW, RATE, FORCE, PRESS, SPENT, WATCH = (int(kind) for kind in Kind)
 SPENT_PART = 0.01  # elastic part of lam at which a collision hands over to contact
 GOOD, ILL_POSED, NOT_FINITE = range(3)
 CONSISTENT = 1e-9  # part of its terms by which a row that depends on others may be off its law
+LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 STIFF = 0.3  # step times damped pole beyond which a step counts as bound by stability
 
 DEGREE = 8
@@ -95,6 +96,7 @@ class Workspace:
     law_if: Floats2  # the same, with every inactive row as it would be
     idx: Index
     trial: Index
+    let_go: Floats  # (nc,) instant at which others lifted a row off that shared a load with them
     tied: Index  # 1 for open rows that depend on the active ones
     spread: Floats2  # (nc, nc) multipliers of all rows from those of the active ones, where these hold others
     follows: Index
@@ -391,7 +393,7 @@ def _residual(
 
 @inlined
 def _below_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, i: int) -> float:
-    """By how much row i is below its law under the active rows, beyond what the tolerance tells."""
+    """By how much row i is below its law under the active rows; one that they hold at its law counts as below."""
     na, n, law = s.size[4], s.size[0], s.law_if
     if _solve(dynamics, rows, s, t, q, v, s.idx, na, s.law, -1, True) != GOOD:
         return -np.inf
@@ -405,7 +407,9 @@ def _below_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: F
         rate += s.H[0, c] * v[c]
     spring = (law[i, 0] + law[i, 2] * h * h) * h
     size += law[i, 1] * abs(rate) + abs(spring)
-    return float(-(push + s.Hdv[0] + law[i, 1] * rate + spring) - CONSISTENT * size)
+    open_for = (t - s.let_go[i]) * max(np.sqrt(law[i, 0]), law[i, 1])
+    band = CONSISTENT * size if open_for > LIFTED else -CONSISTENT * size
+    return float(band - (push + s.Hdv[0] + law[i, 1] * rate + spring))
 
 
 @inlined
@@ -732,7 +736,7 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
     }
     arrays["p"], arrays["u"] = p, u
     arrays["follows"][:] = system.follows
-    arrays["arc"][:, 0] = np.nan
+    arrays["arc"][:, 0], arrays["let_go"][:] = np.nan, -np.inf
     arrays["size"][:4] = n, nc, system.mass_block, nz
     arrays["size"][7:9] = nq, system.velocity is not None
     return arrays, table([*arrays.values()])
