@@ -80,7 +80,8 @@ def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     """
     na, idle = 0, 0
     follows = m.follows
-    for i in range(s.nc):
+    for k in range(s.nc):
+        i = w.order[k] if s.sharing else k
         if follows[i] >= 0:
             mode[i] = mode[follows[i]]
         if is_active(mode[i]):

@@ -23,6 +23,7 @@ from crossbody.reference.core import (
     stepping,
 )
 from crossbody.reference.core.acceleration import scatter
+from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.algebra import ULP, all_finite, copy
 from crossbody.reference.core.layout import (
     DONE,
@@ -230,7 +231,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 def _share_anew(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Ask anew which rows idle: they carry again where they would push, and must have followed their laws."""
     code = settle.share(K, s, m, w, b)
-    return _restart(K, s, m, w, b) if code == settle.MOVED else code
+    return _restart(K, s, m, w, b) if code == MOVED else code
 
 
 @inlined

@@ -26,17 +26,17 @@ from crossbody.reference.core.shares import allow
 
 MOVED = np.int64(1)  # rows have let go
 SAME = 1.0 + 1e-12  # rows that arrive at zero together
+NEARLY = 1e-9  # part of a row's diagonal below which it depends on those that carry, as far as rounding tells
 CHANGES = 64  # times the number of rows: changes of the set that carries; more never end
 
 
 @inlined
-def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Evaluate all rows in contact: w.gram, w.r, w.allowed; their rank, -1 if ill posed."""
+def _evaluate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Evaluate all rows in contact: w.gram, w.r, w.allowed; False if ill posed."""
     q, v = w.y[: s.nq], w.y[s.nq :]
-    w.idle_rows[:] = 0
     activate(s, m, w, b.mode)
     if free(K.dynamics, s, m.p, w, s.t, q, v) != 0 or assemble(K.rows, s, m, w, 1.0, s.t, q, v) != 0:
-        return -1
+        return False
     allow(s, w, q, v)
     for j in range(s.na):
         for c in range(j + 1):
@@ -45,7 +45,51 @@ def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
                 total += w.H[j, a] * w.X[c, a]
             w.gram[j, c] = total
             w.gram[c, j] = total
-    return int(s.na - s.dependent)
+    return True
+
+
+@inlined
+def _order_by_pivots(s: Any, w: Work) -> int:
+    """List the rows in contact by pivots of w.gram, those that are always on first; return their rank."""
+    L, rank = w.part, 0
+    w.holds[:] = 0
+    for j in range(s.na):
+        w.trial[j] = w.gram[j, j]
+    for place in range(s.na):
+        best, most = -1, 0.0
+        for j in range(s.na):
+            i = w.idx[j]
+            size = w.trial[j] / w.gram[j, j] + (0.0 if w.shares[i] else 2.0)
+            if not w.holds[i] and (best < 0 or size > most):
+                best, most = j, size
+        i = w.idx[best]
+        w.holds[i] = 1
+        w.order[place] = i
+        if most > DEPENDENT:
+            rank += 1
+            root = np.sqrt(w.trial[best])
+            for j in range(s.na):
+                total = w.gram[j, best]
+                for c in range(place):
+                    total -= L[j, c] * L[best, c]
+                L[j, place] = total / root
+                w.trial[j] -= L[j, place] ** 2
+    place = s.na
+    for i in range(s.nc):
+        if not w.holds[i]:
+            w.order[place] = i
+            place += 1
+    return rank
+
+
+@inlined
+def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Evaluate all rows in contact, the most independent ones first; their rank, -1 if ill posed."""
+    w.idle_rows[:] = 0
+    if not _evaluate(K, s, m, w, b):
+        return -1
+    rank = _order_by_pivots(s, w)
+    return rank if _evaluate(K, s, m, w, b) else -1
 
 
 @inlined
@@ -143,7 +187,7 @@ def _exchange(s: Any, w: Work, j: int) -> bool:
     _solve(s, w, w.trial)
     for c in range(s.na):
         left -= w.gram[j, c] * w.trial[c] if w.carries[c] else 0.0
-    if left <= DEPENDENT * w.gram[j, j]:
+    if left <= NEARLY * w.gram[j, j]:
         least, out = np.inf, -1
         for c in range(s.na):
             gives_way = w.carries[c] and w.shares[w.idx[c]] and w.trial[c] > DEPENDENT
@@ -185,16 +229,14 @@ def _let_go(s: Any, w: Work, b: Buffers, i: int) -> None:
 
 @inlined
 def _lift(s: Any, w: Work, b: Buffers) -> bool:
-    """Release the rows whose gaps open faster than their law; whether there were any. Row by row in w.carries then."""
+    """Release the rows whose gaps open faster than their law; whether there were any."""
     lifted = False
+    w.holds[:] = 0
     for j in range(s.na):
+        w.holds[w.idx[j]] = w.carries[j]
         if not w.carries[j] and _excess(s, w, j) > w.allowed[j]:
             _let_go(s, w, b, w.idx[j])
             lifted = True
-    for j in range(s.na - 1, -1, -1):  # places rise with rows, so that nothing is overwritten before it is read
-        i, kept = w.idx[j], w.carries[j]
-        w.carries[j] = 0
-        w.carries[i] = kept
     return lifted
 
 
@@ -236,7 +278,7 @@ def _most_pulling(s: Any, w: Work) -> int:
 def _fewest(K: Any, s: Any, m: Model, w: Work, b: Buffers, rank: int) -> None:
     """Let all rows idle but the smallest set that carries, and what it lacks to hold the others."""
     for i in range(s.nc):
-        w.idle_rows[i] = w.shares[i] and is_active(b.mode[i]) and not w.carries[i]
+        w.idle_rows[i] = w.shares[i] and is_active(b.mode[i]) and not w.holds[i]
     known = _rank(K, s, m, w, b)
     for i in range(s.nc):
         if known < rank and w.idle_rows[i]:
@@ -258,7 +300,7 @@ def _share(K: Any, s: Any, m: Model, w: Work, b: Buffers, rank: int) -> int:
             return 0
         w.idle_rows[i] = 1
         if _rank(K, s, m, w, b) < rank:
-            if not w.carries[i]:  # it lifts off: nothing holds it, and nothing presses it
+            if not w.holds[i]:  # it lifts off: nothing holds it, and nothing presses it
                 w.idle_rows[i] = 0
                 _let_go(s, w, b, i)
                 return int(MOVED)

@@ -228,6 +228,7 @@ class Work:
     parts: Floats  # (4,) functions of a guard
     bands: Floats  # (4,) below which they count as zero
     tiny: Floats  # (4,) closer than which they are not told apart
+    order: Index  # (nc,) rows as they are listed: of those that depend on each other the most independent ones first
     idx: Index  # active rows
     reach: Index  # first column of each row of the Schur complement's factor
     ends: Index  # largest column past an active row and all before it
@@ -238,7 +239,8 @@ class Work:
     idle_rows: Bytes  # rows in contact that carry nothing
     tied: Bytes  # open rows that depend on the active ones, as far as they were asked
     spent: Bytes  # rows that share a load and whose multiplier has just vanished
-    carries: Bytes  # rows of a smallest set that carries the load
+    carries: Bytes  # places of a smallest set of rows that carries the load
+    holds: Bytes  # these rows
     kind: Index  # (nc,) which guard fired
     pivot: Index
     # Where q' is not v, and empty elsewhere:

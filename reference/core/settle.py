@@ -185,6 +185,7 @@ def begin(s: Any, m: Model, w: Work) -> None:
     w.idle_rows[:], w.spent[:], w.let_go[:] = 0, 0, -np.inf
     may = s.fsm == LEVEL and not s.frozen and not s.has_solve
     for i in range(s.nc):
+        w.order[i] = i
         s.switching |= m.unilateral[i]
         w.shares[i] = may and m.unilateral[i] and m.follows[i] < 0
     for i in range(s.nc):

@@ -12,6 +12,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.optimize import nnls
 
@@ -19,6 +20,7 @@ from crossbody.cases import Outcome
 from crossbody.reference._kinds import Floats
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 
+Flags = NDArray[np.bool_]
 RANK = 1e-5  # singular value of the rows, scaled to length one, over the largest, that counts as zero
 NOTHING = 1e-9  # part of the largest multiplier below which a row carries nothing
 CONSISTENT = 1e-9  # part of its terms by which a row may be off its law
@@ -112,7 +114,7 @@ def share(
     span = rank(at.A)
     if span == len(every):
         return None
-    one_sided = np.array([i not in bilateral for i in every])
+    one_sided = np.array([i not in bilateral for i in every], dtype=bool)
     y = _nearest(at, one_sided, every)
     excess = at.A @ y - at.least
     lifted = [every[k] for k in np.flatnonzero(one_sided & (excess > at.allowed))]
@@ -131,7 +133,7 @@ def share(
     return Sharing([every[k] for k in basis], spread, [])
 
 
-def _nearest(at: _Rows, one_sided: Floats, every: list[int]) -> Floats:
+def _nearest(at: _Rows, one_sided: Flags, every: list[int]) -> Floats:
     """Return y = L^T v' by Gauss's principle."""
     fixed = at.A[~one_sided]
     start: Floats = at.free + np.linalg.pinv(fixed) @ (at.least[~one_sided] - fixed @ at.free)
@@ -142,13 +144,13 @@ def _nearest(at: _Rows, one_sided: Floats, every: list[int]) -> Floats:
     found = least_distance(G, h)
     if found is None:
         raise Ended(Outcome.ILL_POSED, every)
-    tight = found[1] > 0.0
+    tight = found[1] > NOTHING * found[1].max()
     step: Floats = np.linalg.lstsq(G[tight], h[tight], rcond=RANK)[0]  # to rounding, where nnls is to a tolerance
     return start + step
 
 
 def _carrying(
-    at: _Rows, y: Floats, one_sided: Floats, every: list[int], spent: Collection[int], span: int
+    at: _Rows, y: Floats, one_sided: Flags, every: list[int], spent: Collection[int], span: int
 ) -> list[int] | None:
     """Return places of the rows that carry; None if a spent one that none can replace has to let go."""
     force = y - at.free
