@@ -35,6 +35,24 @@ def turned(q: Floats, rest: Floats) -> Floats:
     return vector
 
 
+def rates(q: Floats, v: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return q' (n, nq) of velocities (n, nv) that have the angular velocity in body axes, rad/s, for a quaternion.
+
+    Args:
+        q: positions (n, nq).
+        v: velocities (n, nv).
+        quaternions: first index in q of each.
+    """
+    parts, at, row = [], 0, 0
+    for first in quaternions:
+        parts.append(v[:, row : row + first - at])
+        row += first - at
+        w, x, turn = q[:, first : first + 1], q[:, first + 1 : first + 4], 0.5 * v[:, row : row + 3]
+        parts += [-np.sum(x * turn, axis=1, keepdims=True), w * turn + np.cross(x, turn)]
+        at, row = first + 4, row + 3
+    return np.concatenate([*parts, v[:, row:]], axis=1)
+
+
 def differences(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
     """Return |q - other| (n, nq); in the first entry of a quaternion the angle between both, rad, and 0 in the others.
 
@@ -48,4 +66,17 @@ def differences(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
         entries = slice(at, at + 4)
         found[:, at] = np.linalg.norm(turned(q[:, entries], other[:, entries]), axis=1)
         found[:, at + 1 : at + 4] = 0.0
+    return found
+
+
+def matrices(quaternions: Floats) -> Floats:
+    """Return the rotations (..., 3, 3) of quaternions (..., 4), w first, of any length but 0."""
+    q = np.asarray(quaternions)
+    w, x, y, z = (q[..., k] for k in range(4))
+    two = 2.0 / (w * w + x * x + y * y + z * z)
+    X, Y, Z = two * x, two * y, two * z
+    found: Floats = np.empty((*q.shape[:-1], 3, 3))
+    found[..., 0, 0], found[..., 0, 1], found[..., 0, 2] = 1.0 - Y * y - Z * z, X * y - Z * w, X * z + Y * w
+    found[..., 1, 0], found[..., 1, 1], found[..., 1, 2] = X * y + Z * w, 1.0 - X * x - Z * z, Y * z - X * w
+    found[..., 2, 0], found[..., 2, 1], found[..., 2, 2] = X * z - Y * w, Y * z + X * w, 1.0 - X * x - Y * y
     return found

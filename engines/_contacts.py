@@ -6,7 +6,7 @@ are sought in each shape's own axes, and nothing here knows a second derivative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,26 +44,39 @@ class Touch:
 
 
 class Contacts:
-    """The contacts of a scene, one `Touch` for every row of them, in their order."""
+    """The contacts of a scene, one `Touch` for every row of them, in their order.
+
+    Attributes:
+        all: of the scene.
+        rows: of every row its contact's place in `all`, and its own within the contact.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.all: Sequence[Contact] = contacts(scene)
-        self.count = sum(contact.places for contact in self.all)
+        self.rows = [(k, place) for k, contact in enumerate(self.all) for place in range(contact.places)]
         shapes = {shape.name: shape for contact in self.all for shape in (contact.first, contact.second)}
         self.shapes = {name: (shape, rotation(shape.orientation)) for name, shape in shapes.items()}
 
-    def touches(self, poses: Poses) -> list[Touch]:
-        """Return all of them."""
-        placed = {name: _placed(shape, R, poses(shape.body)) for name, (shape, R) in self.shapes.items()}
-        return [touch for contact in self.all for touch in _touches(contact, placed)]
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.rows)
 
+    def touches(self, poses: Poses, rows: Sequence[int] | None = None) -> list[Touch]:
+        """Return those of some rows, or of all."""
+        wanted = self.rows if rows is None else [self.rows[i] for i in rows]
+        placed: dict[str, Pose] = {}
+        found = {k: self._touches(self.all[k], poses, placed) for k in dict.fromkeys(k for k, _ in wanted)}
+        return [found[k][place] for k, place in wanted]
 
-def _touches(contact: Contact, placed: Mapping[str, Pose]) -> Iterator[Touch]:
-    first, second = contact.first, contact.second
-    one, two = placed[first.name], placed[second.name]
-    found = _over(one, second, two) if first.type == "plane" else [_between(first, one, second, two)]
-    for gap, normal, point in found:
-        yield Touch(gap - contact.pair.margin, normal, point, first.body, second.body)
+    def _touches(self, contact: Contact, poses: Poses, placed: dict[str, Pose]) -> list[Touch]:
+        first, second = contact.first, contact.second
+        for shape in (first, second):
+            if shape.name not in placed:
+                placed[shape.name] = _placed(shape, self.shapes[shape.name][1], poses(shape.body))
+        one, two = placed[first.name], placed[second.name]
+        found = _over(one, second, two) if first.type == "plane" else [_between(first, one, second, two)]
+        return [Touch(gap - contact.pair.margin, n, point, first.body, second.body) for gap, n, point in found]
 
 
 def rotation(quaternion: Vector) -> Floats:
@@ -79,26 +92,30 @@ def _placed(shape: Shape, turned: Floats, pose: Pose) -> Pose:
     return R @ turned, p + R @ shape.position
 
 
+SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in range(8)])
+"""Of the corners of a box, in the order of their rows."""
+
+
 def _over(floor: Pose, shape: Shape, at: Pose) -> list[tuple[float, Floats, Floats]]:
     """Gap, normal and lowest point for every place of a shape over a plane."""
-    n, points = floor[0][:, 2], np.array(list(_lowest(shape, at[0].T @ floor[0][:, 2])))
-    return [(float(n @ (at[0] @ x + at[1] - floor[1])), n, at[0] @ x + at[1]) for x in points]
+    n = floor[0][:, 2]
+    points = _lowest(shape, at[0].T @ n) @ at[0].T + at[1]
+    gaps: list[float] = ((points - floor[1]) @ n).tolist()
+    return [(gap, n, point) for gap, point in zip(gaps, points, strict=True)]
 
 
-def _lowest(shape: Shape, n: Floats) -> Iterator[Floats]:
-    """Yield lowest points along n, all in the shape's axes."""
-    a, b, c = shape.size
+def _lowest(shape: Shape, n: Floats) -> Floats:
+    """Return the lowest points (places, 3) along n, all in the shape's axes."""
+    a, b, _ = shape.size
     if shape.type == "sphere":
-        yield -a * n
-    elif shape.type == "ellipsoid":
-        yield -(np.square(shape.size) * n) / np.linalg.norm(np.array(shape.size) * n)
-    elif shape.type == "box":
-        for k in range(8):
-            yield np.array([a, b, c]) * [1 if k >> bit & 1 else -1 for bit in range(3)]
-    else:
-        across = n * [1.0, 1.0, 0.0]
-        for end in (-b, b):
-            yield np.array([0.0, 0.0, end]) - a * (n if shape.type == "capsule" else across / np.linalg.norm(across))
+        return -a * n[None]
+    if shape.type == "ellipsoid":
+        scaled = np.array(shape.size) * n
+        return -(shape.size * scaled / np.sqrt(scaled @ scaled))[None]
+    if shape.type == "box":
+        return SIGNS * shape.size
+    side = n if shape.type == "capsule" else np.array([n[0], n[1], 0.0]) / np.hypot(n[0], n[1])
+    return np.array([[0.0, 0.0, -b], [0.0, 0.0, b]]) - a * side
 
 
 def _between(one: Shape, at: Pose, two: Shape, by: Pose) -> tuple[float, Floats, Floats]:

@@ -65,7 +65,7 @@ class LevelMachine:
             mode, at = modes[i], WATCHED * i
             if mode == FREE:
                 out[at + GAP] = max(h[i], hd[i] + self.slow) if i in self._closed else h[i]
-                out[at + PUSH] = hd[i]
+                out[at + PUSH] = hd[i] + self.slow  # not the rounding of a row that no motion moves
             elif mode in ACTIVE and lam is not None:
                 out[at + PUSH] = lam[i]
                 out[at + SPENT] = self._left(q, v, modes, lam, i) if mode == COLLISION else 1.0

@@ -20,7 +20,7 @@ from crossbody.cases import SceneError
 from crossbody.reference._differences import AGREE, closest, differs
 from crossbody.reference._guarded import GuardedCall, entry
 from crossbody.reference._kinds import Floats
-from crossbody.reference._state import State, started
+from crossbody.reference._state import NOISE, State, started
 from crossbody.reference._system import System
 from crossbody.reference.systems import _none
 
@@ -163,7 +163,8 @@ def _check_rows(at: State, draw: Any) -> None:
     wrong = held & differs(lambda x: at.gaps(x, v)[0], q, s.displacement(q, d, at.p), at.H @ d, H @ np.abs(d), reach)
     if np.any(wrong):
         _name_gradient(at, int(np.flatnonzero(wrong)[0]))
-    bound = np.where(there, EXACT * (H @ np.abs(v) + np.abs(at.rate)), np.inf)
+    size = H @ np.abs(v) + np.abs(at.rate)
+    bound = np.where(there, EXACT * (size + NOISE * size.max(initial=0.0)), np.inf)
     _compare(at, "gaps", "hd", at.rate, "H v", at.H @ v, bound)
 
     def turned(x: Floats) -> Floats:

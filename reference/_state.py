@@ -11,6 +11,10 @@ from crossbody.reference._guarded import entry
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference._system import System, initial_modes
 
+NOISE = 1e-3
+"""Of the largest row's size: a row that no motion moves (the end of a capsule on its hinge) has no size of its own,
+and is off by the rounding of positions as the others are."""
+
 
 class State:
     """One state of a system and what its kernels give there.
@@ -77,6 +81,7 @@ class State:
     def reach(self) -> Floats:
         """The size of the terms that a gap (nc,) is made of, as far as its derivatives tell."""
         size: Floats = np.abs(self.H) @ (1.0 + self.sizes())
+        size += NOISE * size.max(initial=0.0)
         return size
 
     def where(self) -> str:

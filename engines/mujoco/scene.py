@@ -243,13 +243,14 @@ class Rows:
             acting = [one for one in acting if one[1] == TOUCH or (one[1] == LIMITS[1] and one[2] in strings)]
             if not acting:
                 return
-            lengths, touches = drift(data.qpos, data.qvel)
-            for j, kind, part in acting:
-                if kind == TOUCH:
-                    data.efc_aref[j] -= touches[self._touch(part) - first]
-                else:
-                    upper = self._place(j, kind, part) == self.places.get((kind, part, True))
-                    data.efc_aref[j] -= (-1.0 if upper else 1.0) * lengths[part]
+            touched = [(j, self._touch(part) - first) for j, kind, part in acting if kind == TOUCH]
+            pulled = [(j, kind, part) for j, kind, part in acting if kind != TOUCH]
+            lengths, touches = drift(data.qpos, data.qvel, [part for _, _, part in pulled], [row for _, row in touched])
+            for (j, _), term in zip(touched, touches, strict=True):
+                data.efc_aref[j] -= term
+            for (j, kind, part), term in zip(pulled, lengths, strict=True):
+                upper = self._place(j, kind, part) == self.places.get((kind, part, True))
+                data.efc_aref[j] -= (-1.0 if upper else 1.0) * term
 
         return hook
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ class ContactRows:
         self.contacts = Contacts(scene)
         self.count = self.contacts.count
         self.model, self.data, self.placed = model, model.createData(), placed
+        self._moved = model.createData()
         self._at: Floats = np.full(model.nq, np.nan)
         self._found: list[Touch] = []
         self._H: Floats | None = None
@@ -43,23 +44,43 @@ class ContactRows:
             self._H = np.array([gradient(touch, self._velocity) for touch in touches])
         return self._H
 
-    def drift(self, q: Floats, v: Floats) -> Floats:
-        """Return H' v (n,)."""
-        if not self.count:
-            return np.zeros(0)
-        return drift(lambda t: self.jacobian(pin.integrate(self.model, q, t * v)) @ v, v)
+    def drift(self, q: Floats, v: Floats, rows: Sequence[int]) -> Floats:
+        """Return H' v of some rows."""
+        data = self._moved
+
+        def rates(t: float) -> Floats:
+            pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
+            touches = self.contacts.touches(lambda body: self._pose(body, data), rows)
+            points, normals = (np.array([getattr(touch, name) for touch in touches]) for name in ("point", "normal"))
+            moving, held = (
+                self._carried([self.placed[body][0] for body in bodies], points)
+                for bodies in ([touch.second for touch in touches], [touch.first for touch in touches])
+            )
+            total: Floats = np.sum(normals * (moving - held), axis=1)
+            return total
+
+        return drift(rates, v) if len(rows) else np.zeros(0)
 
     def _touches(self, q: Floats) -> list[Touch]:
         """Return the contacts at q; those of the last one are kept, for a step asks several times."""
         if not np.array_equal(q, self._at):
             pin.forwardKinematics(self.model, self.data, q)
-            self._at, self._H, self._found = q.copy(), None, self.contacts.touches(self._pose)
+            self._found = self.contacts.touches(lambda body: self._pose(body, self.data))
+            self._at, self._H = q.copy(), None
         return self._found
 
-    def _pose(self, body: str) -> Pose:
+    def _pose(self, body: str, data: Any) -> Pose:
         carrier, pose = self.placed[body]
-        world = self.data.oMi[carrier] * pose
+        world = data.oMi[carrier] * pose
         return world.rotation, world.translation
 
     def _velocity(self, body: str, point: Floats) -> Floats:
         return point_jacobian(self.model, self.data, self.placed[body][0], point)
+
+    def _carried(self, joints: list[int], points: Floats) -> Floats:
+        """Return the velocities (n, 3) of points that joints carry, where `drift` has moved them."""
+        data, frame = self._moved, pin.LOCAL_WORLD_ALIGNED
+        twists = np.array([pin.getVelocity(self.model, data, joint, frame).vector for joint in joints])
+        (x, y, z), (a, b, c) = (points - [data.oMi[joint].translation for joint in joints]).T, twists[:, 3:].T
+        velocities: Floats = twists[:, :3] + np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
+        return velocities

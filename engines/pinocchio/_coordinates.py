@@ -10,9 +10,9 @@ and 1 elsewhere; there J' v_e = R (w x v_lin), and 0 elsewhere. Slides and hinge
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import matrices
 from crossbody.cases.scene import Scene
 from crossbody.engines._scene import places
 
@@ -42,25 +42,30 @@ class Coordinates:
                 self.frees.append((q, v))
             if joint.type in ("free", "ball"):
                 self.turns.append((q + 3, v + 3) if joint.type == "free" else (q, v))
+        self._last: Floats = np.zeros(0)
+        self._blocks: list[tuple[int, Floats]] = []
+        self._theirs, self._ours = np.arange(self.nq), np.arange(self.nq)  # where each entry stands in the other's
+        for first, _ in self.turns:
+            self._theirs[first : first + 4] = [first + 1, first + 2, first + 3, first]
+            self._ours[first : first + 4] = [first + 3, first, first + 1, first + 2]
         self.single = np.array(single, dtype=int).reshape(-1, 2).T
 
     def theirs(self, q: Floats) -> Floats:
         """Return Pinocchio's positions (..., nq)."""
-        found: Floats = q - self.reference
-        for at, _ in self.turns:
-            found[..., at : at + 4] = np.roll(found[..., at : at + 4], -1, axis=-1)
+        found: Floats = (q - self.reference)[..., self._theirs]
         return found
 
     def ours(self, q: Floats) -> Floats:
         """Return the scene's positions (..., nq)."""
-        found: Floats = q + self.reference
-        for at, _ in self.turns:
-            found[..., at : at + 4] = np.roll(found[..., at : at + 4], 1, axis=-1)
+        found: Floats = (q + self.reference)[..., self._ours]
         return found
 
     def blocks(self, q: Floats) -> list[tuple[int, Floats]]:
         """Return for every free joint its first velocity and R (..., 3, 3), at Pinocchio's positions."""
-        return [(v, Rotation.from_quat(q[..., at + 3 : at + 7]).as_matrix()) for at, v in self.frees]
+        if self.frees and not np.array_equal(q, self._last):  # a step asks several times at one place
+            self._last = np.array(q)
+            self._blocks = [(v, matrices(q[..., [at + 6, at + 3, at + 4, at + 5]])) for at, v in self.frees]
+        return self._blocks
 
     def velocities(self, q: Floats, v: Floats) -> Floats:
         """Return J v, the scene's velocities (..., nv), at Pinocchio's positions."""

@@ -15,6 +15,8 @@ from crossbody.engines._machines import active, elastic_part
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
+Chosen = Sequence[int] | slice
+"""Indices of rows; all of them as slice(None)."""
 Shared = Callable[[Floats, Floats, Any], Floats]
 """(lam (na,), J (na, nv), which rows may not pull (na,)) -> lam (na,) that exert the same forces."""
 Forces = Callable[[Floats, Floats, Floats], None]
@@ -89,6 +91,7 @@ class PinRows:
         jacobian: q -> H (nc, nv).
         heights: q -> h (nc,), m.
         drift: (q, v) -> H' v (nc,), m/s^2.
+        drift_of: (q, v, rows) -> that of some rows; where it costs less than that of all.
         law: constants of every row.
         follows: index of the row whose mode each one shares; -1 for none.
         shared: what makes multipliers of rows that depend on each other such that none pulls; None where rows do not.
@@ -104,9 +107,11 @@ class PinRows:
         algebra: str = "forwardDynamics",
         follows: Sequence[int] = (),
         forces: Forces | None = None,
+        drift_of: Callable[[Floats, Floats, Chosen], Floats] | None = None,
     ) -> None:
         self.model, self.data = model, model.createData()
         self.jacobian, self.heights, self.drift, self.forces = jacobian, heights, drift, forces
+        self.drift_of = drift_of or (lambda q, v, rows: drift(q, v)[rows])
         self.nc = len(law.a0)
         self.unilateral: Sequence[bool] = law.unilateral.tolist()
         self.follows: Sequence[int] = tuple(follows) or (-1,) * self.nc
@@ -162,7 +167,7 @@ class PinRows:
         if rows is None:
             return pin.aba(self.model, self.data, q, v, self.tau), np.zeros(self.nc)
         J, h = self.jacobian(q)[rows], self.heights(q)[rows]
-        gamma = self.drift(q, v)[rows] + a1 * J.dot(v) + (a0 + a2 * h * h) * h
+        gamma = self.drift_of(q, v, rows) + a1 * J.dot(v) + (a0 + a2 * h * h) * h
         vd, part = self.solve(q, v, J, gamma)
         if self.shared is not None and np.min(part[one_sided], initial=0.0) < 0.0:
             part = self.shared(part, J, one_sided)

@@ -16,7 +16,7 @@ from crossbody.engines._acting import Acting
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm, none_pulling
-from crossbody.engines.pinocchio._rows import Forces, PinRows, mass_matrix, point_jacobian, pose
+from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 
@@ -63,11 +63,20 @@ def build(case: Case, algebra: str) -> Prepared:
         own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
         return np.concatenate([own[order], touching.jacobian(q)])
 
-    def drift(q: Floats, v: Floats) -> Floats:
-        own = [rows.drift(to.ours(q), to.velocities(q, v)), *(part.drift(q, v) for part in in_space)]
-        return np.concatenate([np.concatenate(own)[order], touching.drift(q, v)])
+    def drift_of(q: Floats, v: Floats, chosen: Chosen) -> Floats:
+        wanted = np.arange(len(order) + touching.count)[chosen]
+        before = wanted < len(order)
+        total: Floats = np.empty(len(wanted))
+        if before.any():
+            own = [rows.drift(to.ours(q), to.velocities(q, v)), *(part.drift(q, v) for part in in_space)]
+            total[before] = np.concatenate(own)[order][wanted[before]]
+        total[~before] = touching.drift(q, v, list(wanted[~before] - len(order)))
+        return total
 
-    pinned = PinRows(model, jacobian, heights, drift, law=case.law, algebra=algebra, forces=apply)
+    pinned = PinRows(
+        model, jacobian, heights, lambda q, v: drift_of(q, v, slice(None)), law=case.law, algebra=algebra, forces=apply,
+        drift_of=drift_of,
+    )  # fmt: skip
     if loops or touching.count > 1:  # planar loops have rows that depend on each other, and bodies on many feet
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
         pinned.shared = none_pulling

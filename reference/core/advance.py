@@ -23,8 +23,8 @@ from crossbody.reference.core import (
     stepping,
 )
 from crossbody.reference.core.acceleration import scatter
-from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.algebra import ULP, all_finite, copy
+from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
     DONE,
     EVENTS_FULL,

@@ -59,7 +59,7 @@ def _order_by_pivots(s: Any, w: Work) -> int:
         best, most = -1, 0.0
         for j in range(s.na):
             i = w.idx[j]
-            size = w.trial[j] / w.gram[j, j] + (0.0 if w.shares[i] else 2.0)
+            size = w.trial[j] / w.gram[j, j] if w.shares[i] else 2.0
             if not w.holds[i] and (best < 0 or size > most):
                 best, most = j, size
         i = w.idx[best]

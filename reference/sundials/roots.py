@@ -32,6 +32,8 @@ PLACES = {degree: -np.cos(np.pi * np.arange(degree + 1) / degree) for degree in 
 SERIES = {degree: np.linalg.inv(chebyshev.chebvander(x, degree)) for degree, x in PLACES.items()}
 
 Terms = Callable[[float], Floats]
+LARGEST = 1e290
+"""Of a term: sums of it are finite."""
 
 
 def first(
@@ -51,7 +53,7 @@ def first(
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     for degree in (COARSE, FINE):
         times = [a, *(middle + half * PLACES[degree][1:-1]).tolist(), b]
-        values = np.array([terms(t) for t in times])
+        values = np.clip([terms(t) for t in times], -LARGEST, LARGEST)  # infinite where nothing fires
         series = SERIES[degree] @ values
         tail = np.abs(series[-TAIL:]).sum(axis=0)
         least = series[0] - np.abs(series[1:]).sum(axis=0)

@@ -66,7 +66,7 @@ def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
     sheet = Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points, group=2)
     for i, trace in enumerate(traces):
-        t, q = filled(trace.run)
+        t, q = filled(trace.run, trace.quaternions)
         for place, k in enumerate(shown):
             sheet.line(trace, i, 2 * place, q[:, k], t)
             if trace.truth is not None:

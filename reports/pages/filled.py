@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from crossbody.cases import Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import rates
 
 PIECES = 400
 """Into so many pieces a horizon is cut; shorter steps stay as they are."""
 
 
-def filled(run: Trajectory, pieces: int = PIECES) -> tuple[Floats, Floats]:
+def filled(run: Trajectory, quaternions: Sequence[int] = (), pieces: int = PIECES) -> tuple[Floats, Floats]:
     """Instants and coordinates: all samples, and in long steps the cubic through q and v at both ends (Hermite).
 
     With x = (t - a)/h in [0, 1]: q = (1 - x)^2 (1 + 2x) q_a + x^2 (3 - 2x) q_b + h x (1 - x)^2 v_a - h x^2 (1 - x) v_b.
-    It is exact for free flight; velocities must be the rates of the coordinates.
+    It is exact for free flight; velocities must be the rates of the coordinates, but for the quaternions, whose rates
+    follow from the angular velocities.
 
     Args:
         run: a motion; an instant that stands twice is never crossed.
+        quaternions: first index in q of each.
         pieces: how many the horizon is cut into.
 
     Returns:
         t (m,) and q (m, nq).
     """
-    t, q, v = run.t, run.q, run.v
+    t, q, v = run.t, run.q, rates(run.q, run.v, quaternions)
     if len(t) < 2 or q.shape != v.shape or not (np.isfinite(q).all() and np.isfinite(v).all()):
         return t, q
     h = np.diff(t)

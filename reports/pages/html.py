@@ -21,7 +21,7 @@ from crossbody.reports.pages.section import Figure, Kind, Section
 
 TEMPLATES = Path(__file__).parent / "templates"
 PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
-PARTS = ("page.js", "plots.js", "player.js")
+PARTS = ("page.js", "plots.js", "solids.js", "player.js")
 """The pages' own script, in this order."""
 SIGNS = {
     "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·", "ledger only": "∑", "skipped": "-",

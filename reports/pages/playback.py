@@ -48,14 +48,16 @@ def playback(traces: Sequence[Trace]) -> list[Section]:
     return [
         Section(
             name="playback", title="Playback", text=TEXT, template="playback.html",
-            context={"scene": json.dumps(scene, separators=(",", ":")), "caption": caption},
+            context={"scene": json.dumps(scene, separators=(",", ":")), "caption": caption,
+                     "frames": scene["stage"]["frames"]},
         )
     ]  # fmt: skip
 
 
 def packed(traces: Sequence[Trace], scene: scenes.Scene) -> dict[str, Any]:
     """Stage, and of every trace its times, poses and arrows as single precision in base64."""
-    parameters = traces[0].about["parameters"]
+    about = traces[0].about
+    parameters = {**about["parameters"], "scene": about.get("scene")}
     stage = scene.stage(parameters)
     one = scene.poses(traces[0].run.q[:1], parameters)[0].size
     width = 1 + one + scene.arrows(traces[0].run.q[:1], traces[0].run.lam[:1], parameters)[0].size
@@ -71,7 +73,7 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene) -> dict[str, Any]:
 
 def _track(trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int) -> dict[str, Any]:
     run = trace.run
-    t, q = filled(run)
+    t, q = filled(run, trace.quaternions)
     at = chosen(t, np.array([e.t for e in run.events]), frames)
     lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t[at], side="right"), 1))
     poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)

@@ -37,6 +37,12 @@ class Trace:
     run: Trajectory
     truth: Trajectory | None = None
 
+    @property
+    def quaternions(self) -> tuple[int, ...]:
+        """Where in q each quaternion begins, by the names of the coordinates."""
+        names = [coordinate["name"] for coordinate in self.about.get("coordinates", ())]
+        return tuple(i for i, name in enumerate(names) if name.endswith(" qw"))
+
 
 def _columns(prefix: str, array: Floats) -> dict[str, Floats]:
     return {f"{prefix}{i}": array[:, i] for i in range(array.shape[1])}

@@ -14,6 +14,9 @@ import pyarrow.parquet as pq
 
 from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.cases.scene import Scene
+from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_plain import plain
 from crossbody.reports.judging.comparison import Entry, judged, table
 from crossbody.reports.judging.truth import Truth
 from crossbody.reports.judging.verdict import Verdict
@@ -110,12 +113,19 @@ def _audit(results: Sequence[CaseResult]) -> pd.DataFrame:
 
 
 def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
-    return {
+    found = {
         "case": case.name, "variant": case.variant, "title": case.title, "mechanism": case.mechanism,
         "engine": engine, "profile": profile,
         "coordinates": [{"name": c.name, "unit": c.unit} for c in case.coordinates],
         "contacts": list(case.contacts), "parameters": dict(case.parameters), "units": dict(case.units),
     }  # fmt: skip
+    return found if case.scene is None else found | {"scene": plain(_drawn(case.scene))}
+
+
+def _drawn(scene: Scene) -> Scene:
+    """Return what a picture of a scene needs."""
+    met = tuple(contact.pair for contact in contacts(scene))
+    return scene.replace(pairs=met, actuators=(), pushes=())
 
 
 def _traces(result: CaseResult) -> list[Trace]:

@@ -3,10 +3,12 @@
 A module has a docstring whose first line says what is drawn, and the public names
 
     stage(p)                        a `Stage`: shapes that stand still and shapes of bodies, from the parameters
-    poses(q, p)                     planar: x, y, angle of bodies (n, bodies, 3); spatial: points (n, points, 3)
+    poses(q, p)                     planar: x, y, angle of bodies (n, bodies, 3); spatial: points (n, points, 3), or
+                                    where the stage has frames origin and first two axes of each (n, frames, 9)
     arrows(q, lam, p)               point and force of every arrow (n, arrows, 2 * dimensions), m and N
 
-and it knows neither numba nor an engine: a picture is made from stored coordinates alone.
+p holds the case's parameters, and for a case that is a scene the scene as plain values (`scene`). A module knows
+neither numba nor an engine: a picture is made from stored coordinates alone.
 """
 
 from __future__ import annotations
@@ -33,6 +35,10 @@ class Stage:
         threads: (x, y, body): a line from a fixed point to a body's origin (planar).
         lines: indices of points joined by one line (spatial); dimensions are 3 where there are any.
         down: whether the third axis points down (spatial).
+        solids: of bodies (-1: the world) in space, in their frames: `points` that a sphere of `radius` is swept over,
+            with the `faces` that have edges (indices of points); or a `plane`: origin and two axes.
+        bones: pairs of bodies whose origins are joined by a line.
+        frames: number of bodies that solids and bones speak of.
     """
 
     still: tuple[Shape, ...] = ()
@@ -40,11 +46,14 @@ class Stage:
     threads: tuple[tuple[float, float, int], ...] = ()
     lines: tuple[tuple[int, ...], ...] = ()
     down: bool = False
+    solids: tuple[Shape, ...] = ()
+    bones: tuple[tuple[int, int], ...] = ()
+    frames: int = 0
 
     @property
     def dimensions(self) -> int:
         """2 or 3."""
-        return 3 if self.lines else 2
+        return 3 if self.lines or self.frames else 2
 
 
 class Scene(Protocol):

@@ -21,22 +21,30 @@
       return { ...track, t, poses, arrows, struck, blows, width: poses.length / t.length, pushes: arrows.length / t.length };
     });
     const find = (name) => root.querySelector(`[data-${name}]`);
-    const [play, clock, readout, speed, view, forces, longer] = ["play", "clock", "readout", "speed", "view", "forces", "longer"].map(find);
+    const [play, clock, readout, speed, view, forces, longer, axes] =
+      ["play", "clock", "readout", "speed", "view", "forces", "longer", "axes"].map(find);
     const canvas = root.querySelector("canvas");
     const g = canvas.getContext("2d");
-    let [now, running, last, turn, tilt] = [0, false, 0, 0.6, 0.35];
+    let [now, running, last, turn, tilt, zoom] = [0, false, 0, 0.6, 0.35, 1];
+    const solids = stage.frames > 0; // bodies with shapes; otherwise points that are joined by lines
+    const [fixed, moving] = [false, true].map((moves) => stage.solids.filter((s) => !s.plane && s.body >= 0 === moves));
 
     // What one scene spans: all points of all tracks and what stands still; outliers of a run that diverged are left out.
     const spans = () => {
       const values = [[], [], []];
       const add = (p) => p.forEach((x, k) => { if (Number.isFinite(x)) values[k].push(x); });
+      fixed.forEach((solid) => solid.points.forEach(add));
       const reach = stage.bodies.map((shapes) => Math.max(0, ...shapes.flatMap((s) =>
         s.circle ? [Math.hypot(s.circle[0], s.circle[1]) + s.circle[2]] : s.points.map((p) => Math.hypot(...p)))));
       const lead = tracks.filter((track) => track.truth);
       for (const track of lead.length ? lead : tracks) {
-        const step = Math.max(1, Math.floor(track.t.length / 150));
+        const step = Math.max(1, Math.floor(track.t.length / (solids ? 40 : 150)));
         for (let i = 0; i < track.t.length; i += step) {
-          for (let k = 0; k < track.width; k += 3) {
+          if (solids) {
+            const pose = (k) => track.poses[i * track.width + k];
+            for (const solid of moving) crossbody.solids.extent(pose, solid).forEach(add);
+          }
+          for (let k = 0; !solids && k < track.width; k += 3) {
             const p = track.poses.subarray(i * track.width + k, i * track.width + k + 3);
             if (space) add([...p]);
             else for (const side of [-1, 1]) add([p[0] + side * reach[k / 3], p[1] + side * reach[k / 3]]);
@@ -68,16 +76,16 @@
     const camera = (x0, y0, w, h) => {
       if (!space) {
         const [wide, tall] = [range[0][1] - range[0][0] || 1, range[1][1] - range[1][0] || 1];
-        const scale = 0.86 * Math.min(w / wide, (h - 18) / tall);
+        const scale = 0.86 * zoom * Math.min(w / wide, (h - 18) / tall);
         return (p) => [x0 + w / 2 + (p[0] - middle[0]) * scale, y0 + (h + 14) / 2 - (p[1] - middle[1]) * scale, scale];
       }
-      const scale = 0.95 * Math.min(w, h) / (size || 1);
+      const scale = 0.95 * zoom * Math.min(w, h) / (size || 1);
       const [ca, sa, cb, sb] = [Math.cos(turn), Math.sin(turn), Math.cos(tilt), Math.sin(tilt)];
       const up = stage.down ? -1 : 1;
       return (p) => {
         const [x, y, z] = [p[0] - middle[0], p[1] - middle[1], up * (p[2] - middle[2])];
         const [right, deep] = [ca * x - up * sa * y, sa * x + up * ca * y];
-        return [x0 + w / 2 + right * scale, y0 + (h + 14) / 2 - (cb * z + sb * deep) * scale, scale];
+        return [x0 + w / 2 + right * scale, y0 + (h + 14) / 2 - (cb * z + sb * deep) * scale, scale, cb * deep - sb * z];
       };
     };
     const trace = (points) => {
@@ -134,12 +142,20 @@
         arrow(from, to([...point].map((x, i) => x + force[i] * unit * cut)), hollow);
       }
     };
+    const paintSolids = (track, pose, to, ghost) => {
+      const frames = Array.from({ length: stage.frames }, (_, body) => crossbody.solids.frame(pose, body));
+      const look = { ink: track.color, paper: colour("--paper"), width: track.truth ? 2 : 1.4, ghost };
+      crossbody.solids.paint(g, moving, frames, to, look);
+      crossbody.solids.bones(g, stage.bones, frames, to);
+      if (axes.checked) crossbody.solids.axes(g, frames, to, 0.06 * size);
+    };
     const paint = (track, to, h, ghost) => {
       const { pose, pushes } = at(track, now);
       g.strokeStyle = g.fillStyle = track.color;
       g.lineWidth = track.truth ? 4 : 1.8;
       g.setLineDash(ghost && track.strokes !== "none" ? track.strokes.split(" ").map(Number) : []);
-      if (space) {
+      if (solids) paintSolids(track, pose, to, ghost);
+      else if (space) {
         for (const line of stage.lines) {
           trace(line.map((i) => to([pose(3 * i), pose(3 * i + 1), pose(3 * i + 2)])));
           g.stroke();
@@ -172,6 +188,8 @@
       g.strokeStyle = g.fillStyle = colour("--soft");
       g.lineWidth = 1.2;
       stage.still.forEach((each) => shape(each, (p) => p, to, true));
+      for (const { plane } of stage.solids) if (plane) crossbody.solids.grid(g, plane, to, middle, size, colour("--line"));
+      crossbody.solids.paint(g, fixed, [], to, { ink: colour("--soft"), paper: colour("--paper"), width: 1, ghost: false });
     };
     const bar = (to, x, y, h) => {
       // A length, a force and an impulse to measure by.
@@ -262,24 +280,42 @@
     }
     play.addEventListener("click", () => run(!running));
     clock.addEventListener("input", () => seek((clock.value / 1000) * end, true));
-    [view, forces, longer].forEach((field) => field.addEventListener("change", redraw));
-    if (space) {
-      canvas.style.touchAction = "none";
-      canvas.addEventListener("pointermove", (event) => {
-        if (!event.buttons) return;
-        turn += event.movementX * 0.01;
-        tilt = Math.min(1.5, Math.max(-1.5, tilt + event.movementY * 0.01));
-        redraw();
-      });
-      canvas.addEventListener("keydown", (event) => {
-        const step = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
-        if (!step) return;
-        event.preventDefault();
-        turn += step[0];
-        tilt += step[1];
-        redraw();
-      });
-    }
+    [view, forces, longer, axes].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
+    const look = (right, down, closer = 1) => {
+      if (space) [turn, tilt] = [turn + right, Math.min(1.5, Math.max(-1.5, tilt + down))];
+      zoom = Math.min(50, Math.max(0.2, zoom * closer));
+      redraw();
+    };
+    const held = new Map(); // pointers that are down: one turns, two come nearer
+    const apart = () => { const [a, b] = [...held.values()]; return Math.hypot(a.x - b.x, a.y - b.y); };
+    canvas.style.touchAction = space ? "none" : "pan-y";
+    canvas.addEventListener("pointerdown", (event) => {
+      held.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      canvas.setPointerCapture(event.pointerId);
+    });
+    for (const end_ of ["pointerup", "pointercancel"]) canvas.addEventListener(end_, (event) => held.delete(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      const before = held.get(event.pointerId);
+      if (!before) return;
+      const wide = held.size === 2 ? apart() : 0;
+      held.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      if (wide) look(0, 0, apart() / wide);
+      else if (held.size === 1) look((event.clientX - before.x) * 0.01, (event.clientY - before.y) * 0.01);
+    });
+    canvas.addEventListener("wheel", (event) => {
+      if (document.activeElement !== canvas) return; // a page is scrolled past a picture that nobody has touched
+      event.preventDefault();
+      look(0, 0, Math.exp(-0.0015 * event.deltaY));
+    }, { passive: false });
+    canvas.addEventListener("dblclick", () => { [turn, tilt, zoom] = [0.6, 0.35, 1]; redraw(); });
+    const keys = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1],
+      "+": [0, 0, 1.2], "=": [0, 0, 1.2], "-": [0, 0, 1 / 1.2] };
+    canvas.addEventListener("keydown", (event) => {
+      const step = keys[event.key];
+      if (!step || (!space && step.length < 3)) return;
+      event.preventDefault();
+      look(...step);
+    });
     crossbody.on("time", (t, from) => { if (from !== root && root.closest("[data-page]").contains(from)) seek(t, false); });
     for (const what of ["engines", "page"]) crossbody.on(what, redraw);
     crossbody.on("theme", draw); // at once: a print does not wait for a frame

@@ -1,0 +1,112 @@
+// Solids of bodies in space, drawn on a canvas as the outlines of points that a sphere is swept over, those behind first.
+crossbody.solids = (() => {
+  const ROUND = Array.from({ length: 24 }, (_, k) => [Math.cos((k * Math.PI) / 12), Math.sin((k * Math.PI) / 12)]);
+  const unit = (p) => p.map((x) => x / (Math.hypot(...p) || 1));
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const WORLD = { origin: [0, 0, 0], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] };
+
+  // Origin and axes of a body: nine numbers, its origin and its first two axes, which have become shorter between
+  // two pictures and are brought to length 1 again.
+  const frame = (pose, body) => {
+    const three = (i) => [pose(9 * body + i), pose(9 * body + i + 1), pose(9 * body + i + 2)];
+    const [x, leaning] = [unit(three(3)), three(6)];
+    const along = dot(x, leaning);
+    const y = unit(leaning.map((value, i) => value - along * x[i]));
+    return { origin: three(0), axes: [x, y, cross(x, y)] };
+  };
+  const placed = ({ origin, axes }, p) => origin.map((x, i) => x + axes[0][i] * p[0] + axes[1][i] * p[1] + axes[2][i] * p[2]);
+  const turning = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  const outline = (points) => {
+    const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+    const half = (list) => {
+      const found = [];
+      for (const p of list) {
+        while (found.length > 1 && turning(found.at(-2), found.at(-1), p) <= 0) found.pop();
+        found.push(p);
+      }
+      return found.slice(0, -1);
+    };
+    return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
+  };
+  const trace = (g, points) => {
+    g.beginPath();
+    points.forEach(([x, y], i) => (i ? g.lineTo(x, y) : g.moveTo(x, y)));
+  };
+
+  // A square of lines on a plane, around what moves.
+  const grid = (g, plane, to, middle, size, colour) => {
+    const [origin, x, y] = [plane.slice(0, 3), plane.slice(3, 6), plane.slice(6, 9)];
+    const away = middle.map((value, i) => value - origin[i]);
+    const [u, w] = [dot(away, x), dot(away, y)];
+    const point = (a, b) => to(origin.map((value, i) => value + (u + a * size) * x[i] + (w + b * size) * y[i]));
+    g.strokeStyle = colour;
+    g.lineWidth = 0.6;
+    for (let k = -5; k <= 5; k += 1) {
+      for (const line of [[point(k / 8, -0.625), point(k / 8, 0.625)], [point(-0.625, k / 8), point(0.625, k / 8)]]) {
+        trace(g, line);
+        g.stroke();
+      }
+    }
+  };
+
+  // Of the world: planes and shapes that stand still; of one track: its bodies.
+  const paint = (g, shapes, frames, to, look) => {
+    const drawn = shapes.map((solid) => {
+      const points = solid.points.map((p) => to(placed(frames[solid.body] || WORLD, p)));
+      return { ...solid, points, depth: points.reduce((sum, p) => sum + p[3], 0) / points.length };
+    });
+    g.strokeStyle = look.ink;
+    for (const { points, radius, faces } of drawn.sort((a, b) => b.depth - a.depth)) {
+      const r = radius * points[0][2];
+      const around = outline(r ? points.flatMap(([x, y]) => ROUND.map(([c, s]) => [x + r * c, y + r * s])) : points);
+      trace(g, around);
+      g.closePath();
+      if (!look.ghost) {
+        for (const [colour, alpha] of [[look.paper, 1], [look.ink, 0.22]]) {
+          g.fillStyle = colour;
+          g.globalAlpha = alpha;
+          g.fill();
+        }
+        g.globalAlpha = 1;
+      }
+      g.lineWidth = look.width;
+      g.stroke();
+      g.lineWidth = 0.6 * look.width;
+      for (const face of faces) {
+        const corners = face.map((i) => points[i]);
+        const area = corners.reduce((sum, p, i) => {
+          const next = corners[(i + 1) % corners.length];
+          return sum + p[0] * next[1] - p[1] * next[0];
+        }, 0);
+        if (area > 0) continue; // turned away
+        trace(g, corners);
+        g.closePath();
+        g.stroke();
+      }
+    }
+  };
+  const bones = (g, pairs, frames, to) => {
+    g.lineWidth = 1;
+    for (const [one, two] of pairs) {
+      trace(g, [to(frames[one].origin), to(frames[two].origin)]);
+      g.stroke();
+    }
+  };
+  const axes = (g, frames, to, length) => {
+    g.lineWidth = 2;
+    for (const { origin, axes: three } of frames) {
+      three.forEach((axis, k) => {
+        g.strokeStyle = ["#d33", "#292", "#36c"][k];
+        trace(g, [to(origin), to(origin.map((x, i) => x + length * axis[i]))]);
+        g.stroke();
+      });
+    }
+  };
+  // Corners of what a solid fills.
+  const extent = (pose, { body, points, radius }) => points.flatMap((p) => {
+    const at = placed(frame(pose, body), p);
+    return [at.map((x) => x - radius), at.map((x) => x + radius)];
+  });
+  return { extent, frame, grid, paint, bones, axes };
+})();

@@ -1,0 +1,133 @@
+"""A scene from data in space: its shapes, bodies without shapes as the boxes of their inertia, and their frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import matrices
+from crossbody.cases.scene import Body, Scene
+from crossbody.cases.scene import Shape as SceneShape
+from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_plain import scene_from
+from crossbody.reports.scenes import Parameters, Stage
+from crossbody.reports.scenes._kinematics import body_poses, placed
+from crossbody.reports.scenes._meetings import meeting
+
+MOST = 500
+"""Bodies that are drawn."""
+AROUND = 24
+"""Points of a drawn circle."""
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+"""Corners of each side of a box, seen from outside against the clock."""
+
+
+def stage(p: Parameters) -> Stage:
+    """Return what is drawn of every body.
+
+    Raises:
+        ValueError: if these are more than anybody can see.
+    """
+    scene = _scene(p)
+    if len(scene.bodies) > MOST:
+        raise ValueError(f"it has {len(scene.bodies)} bodies, and at most {MOST} are drawn")
+    index = {"": -1} | {body.name: i for i, body in enumerate(scene.bodies)}
+    shown = {shape.body for shape in scene.shapes}
+    boxes = [_inertia_box(body, i) for i, body in enumerate(scene.bodies) if body.name not in shown and body.mass]
+    return Stage(
+        solids=(*(_solid(shape, index[shape.body]) for shape in scene.shapes), *boxes),
+        bones=tuple((index[body.parent], i) for i, body in enumerate(scene.bodies) if body.parent),
+        frames=len(scene.bodies),
+    )
+
+
+def poses(q: Floats, p: Parameters) -> Floats:
+    """Return origin and the first two axes of every body (n, bodies, 9)."""
+    scene = _scene(p)
+    found = body_poses(scene, q)
+    rows = [np.concatenate([x, R[:, :, 0], R[:, :, 1]], axis=1) for x, R in (found[b.name] for b in scene.bodies)]
+    return np.stack(rows, axis=1)
+
+
+def arrows(q: Floats, lam: Floats, p: Parameters) -> Floats:
+    """Return the forces of the contacts on their second shapes, and of loops on their first points (n, arrows, 6)."""
+    scene = _scene(p)
+    found = list(_arrows(scene, q, np.nan_to_num(lam)))
+    return np.stack(found, axis=1) if found else np.zeros((len(q), 0, 6))
+
+
+def _arrows(scene: Scene, q: Floats, lam: Floats) -> Iterator[Floats]:
+    bodies = body_poses(scene, q)
+    row = 0
+    for loop in scene.loops:
+        if loop.in_space:
+            at, _ = placed(bodies[loop.first], loop.first_position, (1.0, 0.0, 0.0, 0.0))
+            yield np.concatenate([at, lam[:, row : row + 3]], axis=1)
+        row += loop.width
+    row += sum(int(np.isfinite(part.range).sum()) for part in scene.bounded)
+    for contact in contacts(scene):
+        first, second = (
+            (shape, placed(bodies[shape.body], shape.position, shape.orientation))
+            for shape in (contact.first, contact.second)
+        )
+        for place in range(contact.places):
+            at, normal = meeting(first, second, place)
+            yield np.concatenate([at, normal * lam[:, [row]]], axis=1)
+            row += 1
+
+
+def _scene(p: Parameters) -> Scene:
+    return scene_from(p["scene"])
+
+
+def _solid(shape: SceneShape, body: int) -> dict[str, Any]:
+    """Return points that a sphere of some radius is swept over, and the faces that have edges."""
+    size, turn = np.asarray(shape.size), matrices(np.asarray(shape.orientation))
+    points, radius = np.zeros((1, 3)), 0.0
+    faces: tuple[tuple[int, ...], ...] = ()
+    if shape.type == "plane":
+        return {"body": body, "plane": [*shape.position, *turn[:, 0], *turn[:, 1]]}
+    if shape.type == "sphere":
+        radius = size[0]
+    elif shape.type == "capsule":
+        points, radius = size[1] * np.array([(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]), size[0]
+    elif shape.type == "cylinder":
+        rings = [np.column_stack([_circle(size[0]), np.full(AROUND, z)]) for z in (-size[1], size[1])]
+        points, faces = np.concatenate(rings), (tuple(range(AROUND))[::-1], tuple(range(AROUND, 2 * AROUND)))
+    elif shape.type == "box":
+        points, faces = SIGNS * size, FACES
+    else:
+        points = _ball() * size
+    return _drawn(np.asarray(shape.position) + points @ turn.T, body, radius, faces)
+
+
+def _inertia_box(body: Body, index: int) -> dict[str, Any]:
+    """Return the box of equal density that has a body's mass and inertia."""
+    xx, yy, zz, xy, xz, yz = body.inertia
+    moments, axes = np.linalg.eigh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    sides = np.sqrt(np.maximum(1.5 * (moments.sum() - 2.0 * moments) / body.mass, 0.0))
+    return _drawn(np.asarray(body.com) + (SIGNS * sides) @ axes.T, index, 0.0, FACES if np.linalg.det(axes) > 0 else
+                  tuple(face[::-1] for face in FACES))  # fmt: skip
+
+
+def _drawn(points: Floats, body: int, radius: float, faces: Any) -> dict[str, Any]:
+    return {"body": body, "points": np.round(points, 6).tolist(), "radius": float(radius), "faces": faces}
+
+
+def _circle(radius: float) -> Floats:
+    angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _ball() -> Floats:
+    """Return points of the unit sphere: circles around all three axes."""
+    rings = [
+        np.column_stack([_circle(np.sqrt(1.0 - z * z)), np.full(AROUND, z)])
+        for z in np.sin(np.arange(-5, 6) * np.pi / 10.0)
+    ]
+    return np.concatenate(rings)
