@@ -27,16 +27,18 @@ from crossbody.reference.core.shares import allow
 MOVED = np.int64(1)  # rows have let go
 SAME = 1.0 + 1e-12  # rows that arrive at zero together
 NEARLY = 1e-9  # part of a row's diagonal below which it depends on those that carry, as far as rounding tells
+DOUBT = 1e-4  # part of a row's diagonal below which a pivot may have lost what tells it from none
 CHANGES = 64  # times the number of rows: changes of the set that carries; more never end
 
 
 @inlined
 def _evaluate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Evaluate all rows in contact: w.gram, w.r, w.allowed; False if ill posed."""
+    """Evaluate all rows in contact: w.gram, w.r, w.allowed; False if in this order they are ill posed."""
     q, v = w.y[: s.nq], w.y[s.nq :]
     activate(s, m, w, b.mode)
-    if free(K.dynamics, s, m.p, w, s.t, q, v) != 0 or assemble(K.rows, s, m, w, 1.0, s.t, q, v) != 0:
+    if free(K.dynamics, s, m.p, w, s.t, q, v) != 0:
         return False
+    code = assemble(K.rows, s, m, w, 1.0, s.t, q, v)
     allow(s, w, q, v)
     for j in range(s.na):
         for c in range(j + 1):
@@ -45,7 +47,19 @@ def _evaluate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
                 total += w.H[j, a] * w.X[c, a]
             w.gram[j, c] = total
             w.gram[c, j] = total
-    return True
+    return bool(code == 0)
+
+
+@compiled
+def doubtful(s: Any, w: Work) -> bool:
+    """Whether active rows, just evaluated, depend on others, or have pivots too small to tell in this order."""
+    for j in range(s.na):
+        total = 0.0
+        for a in range(s.n):
+            total += w.H[j, a] * w.X[j, a]
+        if not w.G[j, j] ** 2 > DOUBT * total:
+            return True
+    return bool(s.dependent > 0)
 
 
 @inlined
@@ -86,8 +100,7 @@ def _order_by_pivots(s: Any, w: Work) -> int:
 def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Evaluate all rows in contact, the most independent ones first; their rank, -1 if ill posed."""
     w.idle_rows[:] = 0
-    if not _evaluate(K, s, m, w, b):
-        return -1
+    _evaluate(K, s, m, w, b)
     rank = _order_by_pivots(s, w)
     return rank if _evaluate(K, s, m, w, b) else -1
 
@@ -317,7 +330,11 @@ def hold(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         0 if the rows in contact hold each other, MOVED if some have let go, or ILL_POSED. The workspace holds no
         evaluation of them.
     """
-    rank = _look(K, s, m, w, b)
+    rank, spent = _look(K, s, m, w, b), 0
+    for i in range(s.nc):
+        spent += w.spent[i]
+    if rank == s.na and spent == 0:
+        return 0
     if rank < 0 or not _carry(s, w):
         return ILL_POSED
     moved = _lift(s, w, b)

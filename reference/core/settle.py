@@ -10,7 +10,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.collisions import collide
-from crossbody.reference.core.holding import MOVED, hold
+from crossbody.reference.core.holding import MOVED, doubtful, hold
 from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
 from crossbody.reference.core.layout import (
     EDGE,
@@ -144,7 +144,7 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     events, joined = s.events, False
     while True:
         code = evaluate(K, s, m, w, b.mode)
-        if s.sharing and (code == ILL_POSED or s.dependent > 0 or s.idle > 0):
+        if s.sharing and (code == ILL_POSED or s.idle > 0 or (s.na > 1 and doubtful(s, w))):
             code = share(K, s, m, w, b)
             if code == MOVED:
                 continue
