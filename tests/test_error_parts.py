@@ -182,6 +182,7 @@ def test_softness_is_an_error_of_the_model_at_any_step(tmp_path: Path, solref: s
         parts = [rows[f"position ({part})"] for part in ("importer", "model", "step")]
         assert sum(part.value for part in parts) == pytest.approx(rows["position"].value, rel=1e-9)
         assert abs(parts[0].value) < parts[0].known
+        assert not {Word.OUTSIDE, Word.EXPECTED} & {row.verdict for row in rows.values()}, "softness is told"
     models = [rows["largest position (model)"] for rows in (one, two)]
     assert abs(models[0].value - models[1].value) <= models[0].known + models[1].known
     assert models[0].value > 10.0 * models[0].known
@@ -210,6 +211,13 @@ def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: p
     found = splits(case, right.truth, run, right.entries[0].study)["position"]
     before = splits(case, right.truth, right.entries[0].run, right.entries[0].study)["position"]
     assert found.largest["importer"] > 1e-2
+    words = {
+        (row.engine, row.metric): row.verdict
+        for entry in right.entries
+        for row in judged(case, [replace(entry, run=run)], right.truth, "crossbody run")
+    }
+    assert words["mujoco", "largest position (importer)"] == Word.OUTSIDE
+    assert words["mujoco", "position"] == Word.INFO
     assert before.largest["importer"] < before.known["importer"]
     for part in ("model", "step"):
         assert found.largest[part] == pytest.approx(before.largest[part], rel=1e-6)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases._case import Case, Coordinate, Inputs, Law, Parameter, Value
+from crossbody.cases._case import Case, Coordinate, Inputs, Law, Limit, Parameter, Value
 from crossbody.cases._control import Control
 from crossbody.cases._errors import SceneError, UnknownName
 from crossbody.cases._rotations import normalised
@@ -159,7 +159,7 @@ def case_of(
         contacts=tuple(names), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else v0, act0=np.zeros(0) if act0 is None else act0, t_end=t_end, law=law,
         inputs=inputs or held(scene), scene=scene, rank=rank,
-        control=control, file=file, findings=findings,
+        control=control, file=file, findings=findings, limits=AS_IT_STANDS if file else (),
     )  # fmt: skip
 
 
@@ -224,6 +224,22 @@ def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
     if ctrl is not None:
         values[0, : len(scene.actuators)] = ctrl
     return Inputs(names=scene.inputs, times=np.zeros(1), values=values)
+
+
+AS_IT_STANDS = (
+    Limit(
+        metric="*", engine="mujoco", profile="as_is",
+        known="the file's own step, integrator and soft rows: parts of its error say how far each of them goes",
+    ),
+    *(
+        Limit(
+            metric=f"largest {metric} (importer)", value=1e-9, engine="mujoco", profile="as_is",
+            why="the same engine and steps on the model that is built from the scene: rounding, and what grows from it",
+        )
+        for metric in ("position", "event_times")
+    ),
+)  # fmt: skip
+"""Of what an engine makes of a file by itself: its reader is judged, what it computes is told."""
 
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
