@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
     from crossbody.cases.scene import Scene
 
-_VOCABULARY = ("files", "scene", "scene_contacts")
+_VOCABULARY = ("files", "scene", "scene_contacts", "scene_plain")
 """Modules of this folder that are no cases."""
 _LAZY = {
     **dict.fromkeys(

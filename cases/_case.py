@@ -262,6 +262,8 @@ class Case:
         control: a callable of the user's own that gives a scene's controls at its ticks, beside the inputs.
         claims: numbers that must come out.
         limits: how far engines may be from the truth.
+        act0 (na,): activations at the start, of those actuators of the scene that have one; 0 if not given.
+        rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
         scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
             `findings` what is strange in it.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
@@ -295,6 +297,8 @@ class Case:
     chaos: Chaos | None = None
     consistent: bool = True
     scene: Scene | None = None
+    rank: int = -1
+    act0: Floats = field(default_factory=lambda: np.zeros(0))
     velocities: tuple[Coordinate, ...] = ()
     quaternions: tuple[int, ...] = ()
     file: str = ""
@@ -306,6 +310,11 @@ class Case:
         object.__setattr__(self, "velocities", self.velocities or self.coordinates)
         for name, of in (("q0", self.coordinates), ("v0", self.velocities)):
             object.__setattr__(self, name, frozen(f"Case {self.name}", name, getattr(self, name), (len(of),)))
+        count = len(self.scene.activated) if self.scene is not None else 0
+        act0 = np.zeros(count) if np.size(self.act0) == 0 else self.act0
+        object.__setattr__(self, "act0", frozen(f"Case {self.name}", "act0", act0, (count,)))
+        if not np.isfinite(self.act0).all():
+            raise SceneError(f"Case {self.name}: act0 is {self.act0.tolist()}; it must be finite.")
         if len(self.law.a0) != len(self.contacts):
             raise SceneError(
                 f"Case {self.name} names {len(self.contacts)} contacts but its law has {len(self.law.a0)} rows."

@@ -167,10 +167,10 @@ class Controller:
     def given(self, times: Floats, values: Floats) -> Inputs:
         """Return what acted on the run: these inputs (m,), (m, nu), and on top of them the controller's."""
         names = self.control.names or tuple(f"u[{i}]" for i in range(len(self.u)))
-        own = np.array(self.values).reshape(-1, len(self.u))
+        own = np.array(self.values).reshape(-1, len(self.u))  # behind those with a name stand activations
         parts = [
-            Inputs(names=names, times=times, values=values),
-            Inputs(names=names, times=np.array(self.times), values=own),
+            Inputs(names=names, times=times, values=values[:, : len(names)]),
+            Inputs(names=names, times=np.array(self.times), values=own[:, : len(names)]),
         ]
         every = np.union1d(parts[0].times, parts[1].times)
         return Inputs(names=names, times=every, values=parts[0].at(every) + parts[1].at(every))

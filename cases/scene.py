@@ -112,7 +112,7 @@ class Joint(_Named):
         type: free, ball, slide or hinge.
         axis, anchor: in body axes, unit and m.
         reference: coordinate at the pose of `Body.position`, m or rad; slide and hinge alone.
-        range: lowest and highest coordinate, m or rad; of a ball joint 0 and the largest angle.
+        range: lowest and highest coordinate, m or rad; of a ball joint 0 (it becomes -inf) and the largest angle.
         margin: distance to the bound at which its row begins to act.
         armature: added to the joint's inertia, kg m^2 or kg.
         damping: b0, b1, b2 of the force -(b0 v + b1 v |v| + b2 v^3).
@@ -153,6 +153,20 @@ class Joint(_Named):
         size = 4 if self.type in ("ball", "free") else 1
         rest = UPRIGHT if size == 4 and len(self.rest) == 1 else self.rest
         object.__setattr__(self, "rest", _vector(f"Joint {self.name!r}: rest", rest, size))
+        if size == 4 and self.limited:
+            self._put_angle()
+
+    def _put_angle(self) -> None:
+        """Check the bound of a ball joint, and leave it alone: no angle is below 0."""
+        low, high = self.range
+        if self.type == "free":
+            raise SceneError(f"Joint {self.name!r}: a free joint has no bounds; range is {list(self.range)}.")
+        if low > 0.0 or not high > max(self.margin, 0.0):
+            raise SceneError(
+                f"Joint {self.name!r}: range is {list(self.range)} and margin {self.margin:g}; a ball joint has 0 and "
+                "its largest angle, rad, above the margin: at no angle nothing says which way is back."
+            )
+        object.__setattr__(self, "range", (-math.inf, high))
 
     @property
     def limited(self) -> bool:
@@ -295,18 +309,27 @@ class Tendon(_Named):
         object.__setattr__(self, "positions", points)
 
 
+ACTIVATIONS = ("integrator", "filter")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator(_Named):
-    """A force (g0 + g1 l + g2 l') u + b0 + b1 l + b2 l' on a joint or tendon, l = gear x.
+    """A force (g0 + g1 l + g2 l') a + b0 + b1 l + b2 l' on a joint or tendon, l = gear x.
+
+    a is the control u itself, or an activation: a' = u of an integrator, tau a' = u - a of a filter.
 
     Attributes:
         joint, tendon: what it acts on; one of them is empty.
         gear: one number; of a ball or free joint, as many as it has velocities.
         gain: g0, g1, g2.
         bias: b0, b1, b2.
-        armature: gear^2 armature is added to the joint's, kg m^2.
-        damping: -gear^2 damping v acts on the joint.
+        armature: gear^2 armature is added to the joint's, kg m^2; a tendon cannot have it. Of several gears the first
+            counts, for every velocity of the joint.
+        damping: -gear^2 damping v acts on the joint likewise, or along the tendon.
         control_range, force_range: bounds of u, and of the force.
+        activation: integrator or filter; empty where a = u.
+        time_constant: tau of a filter, s.
+        activation_range: bounds of a, at which it stands still.
     """
 
     joint: str = ""
@@ -318,7 +341,31 @@ class Actuator(_Named):
     damping: float = 0.0
     control_range: Vector = UNBOUNDED
     force_range: Vector = UNBOUNDED
-    sizes: ClassVar[dict[str, int]] = {"gain": 3, "bias": 3, "control_range": 2, "force_range": 2}
+    activation: str = ""
+    time_constant: float = 0.0
+    activation_range: Vector = UNBOUNDED
+    sizes: ClassVar[dict[str, int]] = {
+        "gain": 3, "bias": 3, "control_range": 2, "force_range": 2, "activation_range": 2,
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Check the activation, and that a tendon's inertia is not asked for."""
+        _Named.__post_init__(self)
+        what = f"Actuator {self.name!r}"
+        if self.activation not in ("", *ACTIVATIONS):
+            raise SceneError(
+                f"{what}: activation is {shown(self.activation)}; valid: {', '.join(ACTIVATIONS)}, or none."
+            )
+        if (self.activation == "filter") != (0.0 < self.time_constant < math.inf):
+            raise SceneError(
+                f"{what}: time_constant is {shown(self.time_constant)}; a filter alone has one, above 0 s."
+            )
+        if not self.activation_range[0] <= self.activation_range[1]:
+            raise SceneError(f"{what}: activation_range is {list(self.activation_range)}; it must not fall.")
+        if self.tendon and self.armature:
+            raise SceneError(
+                f"Actuator {self.name!r} has armature on a tendon, which would join branches in M: not done."
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -420,6 +467,16 @@ class Scene:
         """Return the length of a tendon at the reference pose."""
         rest = {joint.name: joint.reference for joint in self.joints}
         return sum(c * rest[name] for name, c in zip(tendon.joints, tendon.coefficients, strict=True))
+
+    @property
+    def activated(self) -> tuple[int, ...]:
+        """Which actuators have an activation, in the order of these."""
+        return tuple(i for i, actuator in enumerate(self.actuators) if actuator.activation)
+
+    def acts_along(self, tendon: Tendon) -> bool:
+        """Return whether a spring, a damper or an actuator acts along a tendon."""
+        driven = any(actuator.tendon == tendon.name for actuator in self.actuators)
+        return driven or any(tendon.stiffness) or any(tendon.damping)
 
     @property
     def inputs(self) -> tuple[str, ...]:

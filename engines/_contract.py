@@ -72,6 +72,9 @@ class Engine(Protocol):
     An engine may have `orders`, profile -> promised order of the error in its step `dt` or its tolerance `rtol`; the
     benchmark holds the observed one against it.
 
+    An engine may have `of_scenes`, profile -> the one that stands for it in a scene, a robot's file say, where all
+    profiles are meant.
+
     An engine may have `interpreted`, profile ("*" for all) -> what of its timed runs is Python, which the benchmark
     says beside its times; and its runs `native()`, the time in which its own loop makes the same steps without that, s.
 

@@ -51,7 +51,7 @@ def system_of(case: Case) -> System:
     if case.scene is not None:
         from crossbody.reference.tree.system import system
 
-        return system(case.scene, case.law, case.q0, case.control)
+        return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank)
     build = builder(case.mechanism)
     if build is None:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")

@@ -7,6 +7,7 @@ of free and ball joints, whose springs act along the rotation from where they re
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from crossbody.cases import CaseUnsupported
 from crossbody.cases._arrays import Floats
 from crossbody.cases._rotations import turned
-from crossbody.cases.scene import WIDTHS, Joint, Scene, Tendon, Vector
+from crossbody.cases.scene import WIDTHS, Actuator, Joint, Scene, Tendon, Vector
 
 
 def polynomial(constants: Vector, x: Any) -> Any:
@@ -51,6 +52,11 @@ def places(scene: Scene) -> tuple[dict[str, int], dict[str, int]]:
     return q, v
 
 
+def angle_of(quaternion: Floats) -> Floats:
+    """Return the rotation vector (..., 3), rad, of a quaternion (..., 4), at most half a turn long."""
+    return turned(quaternion, np.array([1.0, 0.0, 0.0, 0.0]))
+
+
 def tendons(scene: Scene) -> Floats:
     """Return dl/dx (nt, nv) of the tendons."""
     T = np.zeros((len(scene.tendons), scene.nv))
@@ -59,6 +65,10 @@ def tendons(scene: Scene) -> Floats:
         for name, c in zip(tendon.joints, tendon.coefficients, strict=True):
             row[places_v[name]] += c
     return T
+
+
+Stretch = tuple[Floats, Floats, Floats]
+"""Lengths (nt,) of tendons, their rates, and their derivatives (nt, nv) along v."""
 
 
 @dataclass(slots=True)
@@ -71,8 +81,11 @@ class Forces:
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
         u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N.
-        T (nt, nv): dl/dx of the tendons.
-        A (nu, nv): dl/dx of the actuators, gear included.
+        t: now, s; it counts where there are activations. since: when the controls were put in force, s.
+        act (nu,): activations then, of the actuators that have one.
+        T (nt, nv): dl/dx of the tendons, 0 of those between points.
+        A (nu, nv): dl/dx of the actuators on joints, gear included.
+        spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics; None without them.
     """
 
     scene: Scene
@@ -80,9 +93,13 @@ class Forces:
     place: dict[str, int] = field(init=False)
     single: Any = field(init=False)
     u: Floats = field(init=False)
+    t: float = field(init=False, default=0.0)
+    since: float = field(init=False, default=0.0)
+    act: Floats = field(init=False)
     pushes: Floats = field(init=False)
     T: Floats = field(init=False)
     A: Floats = field(init=False)
+    spans: Callable[[Floats, Floats], Stretch] | None = None
 
     def __post_init__(self) -> None:
         """Lay out which joint each part moves."""
@@ -90,15 +107,13 @@ class Forces:
         self.at, self.place = places(scene)
         single = [joint.name for joint in scene.joints if joint.type in ("slide", "hinge")]
         self.single = np.array([(self.at[name], self.place[name]) for name in single], dtype=int).reshape(-1, 2).T
+        self.act = np.zeros(len(scene.actuators))
         self.u, self.pushes = np.zeros(len(scene.actuators)), np.zeros((len(scene.pushes), 3))
         self.T = tendons(scene)
-        named = {tendon.name: row for tendon, row in zip(scene.tendons, self.T, strict=True)}
         self.A = np.zeros((len(scene.actuators), n))
         for row, actuator in zip(self.A, scene.actuators, strict=True):
-            if actuator.tendon:
-                row[:] = actuator.gear[0] * named[actuator.tendon]
-            else:
-                moved = self.moved(next(joint for joint in scene.joints if joint.name == actuator.joint))
+            if not actuator.tendon:
+                moved = self.reached(actuator)
                 row[moved] = actuator.gear[: moved.stop - moved.start]
 
     def x(self, q: Floats) -> Floats:
@@ -118,10 +133,14 @@ class Forces:
         own: Floats = np.zeros(self.scene.nv)
         for joint in self.scene.joints:
             own[self.moved(joint)] += joint.armature
-        for row, actuator in zip(self.A, self.scene.actuators, strict=True):
+        for actuator in self.scene.actuators:
             if actuator.joint:
-                own += row**2 * actuator.armature
+                own[self.reached(actuator)] += actuator.gear[0] ** 2 * actuator.armature
         return own
+
+    def reached(self, actuator: Actuator) -> slice:
+        """Velocities of the joint of an actuator."""
+        return self.moved(next(joint for joint in self.scene.joints if joint.name == actuator.joint))
 
     def turned(self, joint: Joint, q: Floats) -> Floats:
         """Rotation (..., 3), rad, of a free or ball joint from where its spring rests."""
@@ -129,14 +148,34 @@ class Forces:
         rest = np.array(joint.rest if len(joint.rest) == 4 else (1.0, 0.0, 0.0, 0.0))
         return turned(q[..., first : first + 4], rest)
 
-    def change(self, values: Floats) -> None:
-        """Put inputs of the scene in force: controls, then pushes."""
+    def begin(self, act0: Floats) -> None:
+        """Put no input in force, at t = 0, with activations (na,)."""
+        self.still()
+        self.act[list(self.scene.activated)] = act0
+
+    def driven(self) -> Floats:
+        """Return what drives the actuators now (nu,): controls, or the activations that follow them."""
+        found: Floats = np.zeros(len(self.u))
+        gone = self.t - self.since
+        for i, (part, u, a) in enumerate(zip(self.scene.actuators, self.u, self.act, strict=True)):
+            c = clamped(u, part.control_range)
+            if part.activation == "integrator":
+                c = a + c * gone
+            elif part.activation:
+                c = a - (c - a) * np.expm1(-gone / part.time_constant)
+            found[i] = clamped(c, part.activation_range)
+        return found
+
+    def change(self, values: Floats, t: float) -> None:
+        """Put inputs of the scene in force from t on, s: controls, then pushes."""
+        self.t = t
+        self.act, self.since = self.driven(), t
         count = len(self.u)
         self.u[:], self.pushes[:] = values[:count], values[count:].reshape(-1, 3)
 
     def still(self) -> None:
-        """Put no input in force."""
-        self.u[:], self.pushes[:] = 0.0, 0.0
+        """Put no input in force, and no activation."""
+        self.u[:], self.pushes[:], self.act[:], self.t, self.since = 0.0, 0.0, 0.0, 0.0, 0.0
 
     def __call__(self, q: Floats, v: Floats) -> Floats:
         """Return the generalised forces (nv,) at a state."""
@@ -151,10 +190,36 @@ class Forces:
                 turn = self.turned(joint, q)
                 angle = float(np.linalg.norm(turn)) or 1.0
                 total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
-        for row, tendon in zip(self.T, self.scene.tendons, strict=True):
-            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, row @ x))
-            total -= row * (spring + drag(tendon.damping, row @ v))
-        return total + self.actuated(x, v)
+        stretch = self.stretch(q, v)
+        for tendon, length, rate, row in zip(self.scene.tendons, *stretch, strict=True):
+            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, length))
+            total -= row * (spring + drag(tendon.damping, rate))
+        for actuator, (row, _, rate) in zip(self.scene.actuators, self.strokes(x, v, stretch), strict=True):
+            if actuator.tendon:
+                total -= row * actuator.damping * rate
+            else:
+                reached = self.reached(actuator)
+                total[reached] -= actuator.gear[0] ** 2 * actuator.damping * v[reached]
+        return total + self.actuated(x, v, stretch)
+
+    def stretch(self, q: Floats, v: Floats) -> Stretch:
+        """Return lengths of all tendons, their rates and derivatives."""
+        lengths, rates, rows = self.T @ self.x(q), self.T @ v, self.T.copy()
+        at = [i for i, tendon in enumerate(self.scene.tendons) if tendon.bodies]
+        if at and self.spans is not None:
+            lengths[at], rates[at], rows[at] = self.spans(q, v)
+        return lengths, rates, rows
+
+    def strokes(self, x: Floats, v: Floats, stretch: Stretch) -> list[tuple[Floats, float, float]]:
+        """Return of every actuator the derivative (nv,) of its length, its length and its rate, gear included."""
+        names, found = [tendon.name for tendon in self.scene.tendons], []
+        for row, actuator in zip(self.A, self.scene.actuators, strict=True):
+            if not actuator.tendon:
+                found.append((row, float(row @ x), float(row @ v)))
+                continue
+            length, rate, T = (part[names.index(actuator.tendon)] for part in stretch)
+            found.append((actuator.gear[0] * T, actuator.gear[0] * length, actuator.gear[0] * rate))
+        return found
 
     @staticmethod
     def outside(rest: Vector, length: Floats) -> Floats:
@@ -162,15 +227,14 @@ class Forces:
         out: Floats = length - clamped(length, rest)
         return out
 
-    def actuated(self, x: Floats, v: Floats) -> Floats:
+    def actuated(self, x: Floats, v: Floats, stretch: Stretch) -> Floats:
         """Return what the actuators do (nv,), each within its bounds and their sum within the joint's."""
         total: Floats = np.zeros(len(v))
-        for row, actuator, given in zip(self.A, self.scene.actuators, self.u, strict=True):
-            terms = np.array([1.0, row @ x, row @ v])
-            force = np.dot(actuator.gain, terms) * clamped(given, actuator.control_range) + np.dot(actuator.bias, terms)
+        strokes = self.strokes(x, v, stretch)
+        for (row, length, rate), actuator, given in zip(strokes, self.scene.actuators, self.driven(), strict=True):
+            terms = np.array([1.0, length, rate])
+            force = np.dot(actuator.gain, terms) * given + np.dot(actuator.bias, terms)
             total += row * clamped(force, actuator.force_range)
-            if actuator.joint:
-                total -= row**2 * actuator.damping * v
         for joint in self.scene.joints:
             moved = self.moved(joint)
             total[moved] = clamped(total[moved], joint.force_range)
@@ -185,8 +249,10 @@ class Forces:
                 total += stored(joint.stiffness, x[:, self.place[joint.name]] - joint.rest[0])
             elif any(joint.stiffness):
                 total += stored(joint.stiffness, np.linalg.norm(self.turned(joint, q), axis=-1))
-        for row, tendon in zip(self.T, self.scene.tendons, strict=True):
-            total += stored(tendon.stiffness, self.outside(tendon.rest, x @ row))
+        if self.scene.tendons:
+            lengths = np.array([self.stretch(one, np.zeros(self.scene.nv))[0] for one in q]).T
+            for tendon, length in zip(self.scene.tendons, lengths, strict=True):
+                total += stored(tendon.stiffness, self.outside(tendon.rest, length))
         return total
 
 
@@ -209,8 +275,8 @@ class Rows:
         """Return h (nc,)."""
         x = self.forces.x(q)
         h = [self._loop(i, x)[0] for i in range(len(self.ends))]
-        for part, row in self._bounded():
-            (low, high), length = part.range, float(row @ x)
+        for part, length, _, _ in self._bounded(q, np.zeros(self.scene.nv)):
+            low, high = part.range
             h += [length - low - part.margin] if np.isfinite(low) else []
             h += [high - length - part.margin] if np.isfinite(high) else []
         return np.array(h)
@@ -219,24 +285,40 @@ class Rows:
         """Return H (nc, nv)."""
         x = self.forces.x(q)
         H = [self._loop(i, x)[1] for i in range(len(self.ends))]
-        for part, row in self._bounded():
+        for part, _, row, _ in self._bounded(q, np.zeros(self.scene.nv)):
             H += [sign * row for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
         return np.array(H).reshape(-1, len(x))
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (nc,)."""
         x = self.forces.x(q)
-        drift = np.zeros(len(self.heights(q)))
-        for i, (_, (second, _)) in enumerate(self.ends):
-            drift[i] = -self._loop(i, x)[2] * (second @ v) ** 2
-        return drift
+        drift = [-self._loop(i, x)[2] * float(second @ v) ** 2 for i, (_, (second, _)) in enumerate(self.ends)]
+        for part, _, _, bend in self._bounded(q, v):
+            drift += [sign * bend for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
+        return np.array(drift)
 
-    def _bounded(self) -> list[tuple[Joint | Tendon, Floats]]:
-        """What may have bounds, with the derivative (nv,) of its coordinate or length, but distances of points."""
-        unit, place = np.eye(self.scene.nv), self.forces.place
-        rows = [*(unit[place[joint.name]] for joint in self.scene.joints), *self.forces.T]
-        found = zip(self.scene.bounded, rows, strict=True)
-        return [(part, row) for part, row in found if isinstance(part, Joint) or part.joints]
+    def _bounded(self, q: Floats, v: Floats) -> list[tuple[Joint | Tendon, float, Floats, float]]:
+        """What may have bounds, but distances of points: its length, its derivative (nv,), and its drift."""
+        unit, forces, x = np.eye(self.scene.nv), self.forces, self.forces.x(q)
+        found: list[tuple[Joint | Tendon, float, Floats, float]] = []
+        for joint in self.scene.joints:
+            first = forces.place[joint.name]
+            if joint.type == "ball" and joint.limited:
+                found.append((joint, *self._angle(joint, q, v)))
+            else:
+                found.append((joint, float(x[first]), unit[first], 0.0))
+        lengths = zip(self.scene.tendons, forces.T, strict=True)
+        return [*found, *((tendon, float(row @ x), row, 0.0) for tendon, row in lengths if tendon.joints)]
+
+    def _angle(self, joint: Joint, q: Floats, v: Floats) -> tuple[float, Floats, float]:
+        """Return the angle of a ball joint, its derivative along v (nv,), and its second along a steady v."""
+        row, moved = np.zeros(self.scene.nv), self.forces.moved(joint)
+        vector = angle_of(q[self.forces.at[joint.name] :][:4])
+        angle = float(np.linalg.norm(vector))
+        row[moved] = vector / angle if angle > 0.0 else 0.0
+        across = v[moved] - row @ v * row[moved]
+        bend = float(across @ across) / (2.0 * np.tan(angle / 2.0)) if angle > 0.0 else 0.0
+        return angle, row, bend
 
     def _end(self, kind: str, name: str) -> tuple[Floats, float]:
         """Return the derivative (nv,) of a coordinate or a length, zero without a name, and what it is at rest."""

@@ -17,6 +17,7 @@ from numba.extending import intrinsic
 
 from crossbody.cases._control import Controller
 from crossbody.reference import kernels
+from crossbody.reference._activations import Live
 from crossbody.reference._kinds import Floats
 
 MEMORY = 1
@@ -51,16 +52,19 @@ class Callback:
         controller: of the run.
         nq, nv: lengths of q and v.
         end: called when the controller has failed: the run must end now.
+        live: activations that follow what it gives; None without.
 
     Attributes:
         address: for the kernel's state; it is good as long as this object lives.
         failure: what the controller raised; None if nothing.
     """
 
-    def __init__(self, controller: Controller, nq: int, nv: int, end: Callable[[float], None]) -> None:
-        self.controller, self.end = controller, end
+    def __init__(
+        self, controller: Controller, nq: int, nv: int, end: Callable[[float], None], live: Live | None = None
+    ) -> None:
+        self.controller, self.end, self.live = controller, end, live
         self.failure: BaseException | None = None
-        self._rooms = tuple(ctypes.c_double * size for size in (nq, nv, controller.width))
+        self._rooms = tuple(ctypes.c_double * size for size in (nq, nv, len(controller.u)))
         self._places: tuple[int, ...] = ()
         self._arrays: list[Floats] = []
         self._function = _SIGNATURE(self._ask)
@@ -72,7 +76,10 @@ class Callback:
                 rooms = (room.from_address(at) for room, at in zip(self._rooms, places, strict=True))
                 self._places, self._arrays = places, [np.ctypeslib.as_array(room) for room in rooms]
             q, v, u = self._arrays
-            u[:] = self.controller(t, q, v)[: len(u)]
+            count = self.controller.width
+            u[:count] = self.controller(t, q, v)[:count]
+            if self.live is not None:
+                self.live.put(t, u)
         except BaseException as failure:  # an interrupt too: no exception passes through compiled code
             self.failure = failure
             self.end(t)

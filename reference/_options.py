@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from crossbody.cases import InvalidValue, UnknownName
 from crossbody.cases._arguments import flag, real, shown
 from crossbody.cases._arrays import frozen
+from crossbody.cases._control import Control
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 
@@ -141,14 +142,27 @@ class Options:
             )
         return True
 
-    def schedule(self, system: System) -> tuple[Floats, Floats]:
-        """Times (m,) and values (m, nu) of the inputs, checked."""
+    def schedule(self, system: System, *, played: bool = False) -> tuple[Floats, Floats]:
+        """Times (m,) and values (m, nu) of the inputs, checked, with those that stand for activations.
+
+        A controller in Python puts these itself, unless what it gave is `played`.
+        """
+        behind = system.activations
+        count = system.inputs - (behind.width if behind is not None else 0)
+        times, values = self._given(count)
+        if behind is None:
+            return times, values
+        if isinstance(system.control, Control) and not played:
+            return times, np.hstack([values, np.zeros((len(times), behind.width))])
+        return behind.columns(times, values)
+
+    def _given(self, count: int) -> tuple[Floats, Floats]:
         if self.inputs is None:
-            return np.zeros(0), np.zeros((0, system.inputs))
+            return np.zeros(0), np.zeros((0, count))
         if not isinstance(self.inputs, (tuple, list)) or len(self.inputs) != 2:
             raise InvalidValue(f"inputs is {shown(self.inputs)}; it must be a pair: times (m,) and values (m, nu).")
         times: Floats = frozen("inputs", "times", self.inputs[0], (None,))
-        values: Floats = frozen("inputs", "values", self.inputs[1], (len(times), system.inputs))
+        values: Floats = frozen("inputs", "values", self.inputs[1], (len(times), count))
         if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0) and np.all(np.isfinite(values))):
             raise InvalidValue("inputs must be finite and their times strictly increasing.")
         return times, values

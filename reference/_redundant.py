@@ -7,36 +7,75 @@ decided once, at an assembled start, and stays so: off the rows the rank is full
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr
 
-from crossbody.cases import Outcome, Trajectory
+from crossbody.cases import Outcome, SceneError, Trajectory
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._state import State, started
 from crossbody.reference._system import System
 
 INDEPENDENT = 1e-4  # pivot over the first from which on a row does not follow from the others
+ROUNDED = 1e-8  # below which it does, as far as rounding tells
 OPEN, ROUNDING = 100.0, 1e-6  # times the gap of the rows that hold, and at least, m: more is not held any longer
 
 
-def redundant(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> list[int]:
-    """Return the rows that follow from others at an assembled state, by pivots of H M^-1/2.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rank:
+    """How far rows hold by themselves at an assembled state.
+
+    Attributes:
+        order: the rows as they are taken, each that which adds most to those before it.
+        pivots: what each adds, over what the first does.
+    """
+
+    order: Sequence[int]
+    pivots: Sequence[float]
+
+    def count(self, least: float) -> int:
+        """Return how many rows add at least so much."""
+        return sum(pivot >= least for pivot in self.pivots)
+
+    def held(self, asked: int) -> int:
+        """Return how many rows hold: as many as are asked for, or below 0 those that surely do.
+
+        Raises:
+            SceneError: if more or fewer are asked for than rounding leaves open.
+        """
+        sure, most = self.count(INDEPENDENT), self.count(ROUNDED)
+        if asked < 0:
+            return sure
+        if not sure <= asked <= most:
+            valid = f"{sure}" if sure == most else f"from {sure} to {most}"
+            raise SceneError(f"rank is {asked}; valid: {valid}, of {len(self.order)} rows of loops.")
+        return asked
+
+    def finding(self, count: int, names: Sequence[str]) -> str:
+        """Return a sentence on the rows that neither hold surely nor follow, of which `count` in all hold; or none."""
+        sure, most = self.count(INDEPENDENT), self.count(ROUNDED)
+        if sure == most:
+            return ""
+        near = ", ".join(f"{names[self.order[i]]!r} ({self.pivots[i]:.1e})" for i in range(sure, most))
+        done = f"{count} of {len(self.order)} rows hold"
+        return (
+            f"near_dependent: a pivot between {ROUNDED:g} and {INDEPENDENT:g} of the first has {near}. Left out, such "
+            "rows follow from the others and the mechanism moves; kept, each takes a degree of freedom, and it may "
+            f"lock. Here {done}; rank (--rank) decides: from {sure}, none of them, to {most}, all of them."
+        )
+
+
+def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
+    """Return how far rows hold by themselves at an assembled state, by pivots of H M^-1/2.
 
     Args:
         system: the mechanism.
         q: positions (nq,).
         groups: rows that are scaled by one length, the largest of them: one a loop. Each by its own would lift a row
             that is nothing but rounding to the size of the others.
-
-    Returns:
-        Their indices. A row whose pivot is small but not rounding is left out too: an axis that is off by 1e-6 rad
-        would lock the mechanism.
     """
     rows = [i for group in groups for i in group]
-    if len(rows) < 2:
-        return []
     p, _ = started(system, np.array(q), np.zeros(system.n))
     state = State(system, 0.0, system.checked_state("q", q), np.zeros(system.n), p)
     root = np.linalg.cholesky(state.mass_matrix())
@@ -49,8 +88,8 @@ def redundant(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> lis
     triangle, order = qr(scaled.T, mode="r", pivoting=True)[-2:]
     count = min(triangle.shape)
     pivots = np.zeros(len(rows))
-    pivots[:count] = np.abs(np.diag(triangle)[:count]) / abs(triangle[0, 0])
-    return sorted(rows[i] for i, pivot in zip(order, pivots, strict=True) if pivot < INDEPENDENT)
+    pivots[:count] = np.abs(np.diag(triangle)[:count]) / (abs(triangle[0, 0]) or 1.0)
+    return Rank(order=[rows[i] for i in order], pivots=pivots.tolist())
 
 
 def watched(system: System, run: Trajectory) -> Trajectory:
@@ -60,12 +99,13 @@ def watched(system: System, run: Trajectory) -> Trajectory:
     """
     left_out: Index = np.asarray(system.redundant)
     if not len(left_out) or not len(run.t):
-        return run
+        return replace(run, message=_told(system, run)) if system.findings else run
     rates = np.array([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)])
     for values, what in ((run.gap, "h"), (rates, "h'")):
         most = np.abs(values[:, system.held]).max(initial=0.0)
         off = np.abs(values[:, left_out])
-        bound = max(OPEN * most, ROUNDING * (1.0 if what == "h" else max(1.0, float(np.abs(run.v).max()))))
+        size = 1.0 if what == "h" else max(1.0, float(np.abs(run.v).max()))
+        bound = np.maximum(OPEN * most, (ROUNDING + OPEN * np.asarray(system.loose)) * size)
         if np.any(off > bound):
             k, j = np.argwhere(off > bound)[0]
             row = int(left_out[j])
@@ -77,4 +117,9 @@ def watched(system: System, run: Trajectory) -> Trajectory:
     lam = np.array(run.lam)
     lam[:, left_out] = np.nan
     count = len(left_out) + run.counts.get("redundant", 0)
-    return replace(run, lam=lam, counts={**run.counts, "redundant": count})
+    return replace(run, lam=lam, counts={**run.counts, "redundant": count}, message=_told(system, run))
+
+
+def _told(system: System, run: Trajectory) -> str:
+    """Return the message of a run, with what was found about its system."""
+    return " ".join(filter(None, (run.message, *system.findings)))

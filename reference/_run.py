@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.cases._control import Control, NotFinite
+from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
@@ -155,7 +156,8 @@ class CompiledRun:
         def end(t: float) -> None:
             state["t_end"] = t
 
-        self.callback = Callback(system.control.begin(system.inputs), system.nq, system.n, end)
+        live = Live(system.activations) if system.activations is not None else None
+        self.callback = Callback(system.control.begin(system.inputs), system.nq, system.n, end, live)
 
     def _slices(self, began: float, progress: Callable[[float], None] | None) -> Outcome:
         limit, budget = self.options.max_steps, SLICE

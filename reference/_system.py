@@ -16,6 +16,7 @@ from crossbody.cases._arrays import frozen, full, is_number
 from crossbody.cases._control import Control
 from crossbody.cases._entry_points import checked_arguments, finite, wholes
 from crossbody.reference import kernels as kernel_types
+from crossbody.reference._activations import Activations
 from crossbody.reference._indices import different
 from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
@@ -45,6 +46,8 @@ class System:
         unilateral (nc,): False for a row that is always on.
         redundant: indices of rows that are always on but follow from the others: they are held by these and stay off,
             mode FREE with a multiplier of 0. A run in which their gaps open ends as inconsistent.
+        loose: of each of these the part of it that does not follow, 0 if not given: so far its gap may open.
+        findings: sentences on what was decided when the system was made; they stand in the message of every run.
         follows (nc,): index of the row whose activity this one shares (a slip row follows its normal row); -1 none.
         mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
         inputs: nu, length of u.
@@ -57,6 +60,7 @@ class System:
         span (nc, 2): first coordinate, and one past the last, that a row's H may touch; all of them if not given.
             With it the cost of a chain grows with its length, not with its square.
         constant_mass: M does not depend on q: it is factored once.
+        activations: what some inputs follow from the others by, in closed form: the last ones, which no caller gives.
         affine: M and H are constant, f depends on u alone: arcs in closed form are admitted.
 
     Raises:
@@ -83,6 +87,8 @@ class System:
     b2: ArrayLike = 0.0
     unilateral: ArrayLike = True
     redundant: ArrayLike = ()
+    loose: ArrayLike = ()
+    findings: tuple[str, ...] = ()
     follows: ArrayLike = -1
     nq: int = 0
     quaternions: ArrayLike = ()
@@ -97,6 +103,7 @@ class System:
     span: ArrayLike | None = None
     constant_mass: bool = False
     affine: bool = False
+    activations: Activations | None = None
     p: Floats = field(init=False)
     alpha: Floats = field(init=False)
     beta: Floats = field(init=False)
@@ -121,6 +128,7 @@ class System:
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         put(self, "redundant", different("System.redundant", wholes("System.redundant", self.redundant), nc))
+        self._check_told()
         if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
             raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
@@ -189,6 +197,21 @@ class System:
                 raise SceneError(f"System.{name} is {shown(value)}; it must be a whole number from {low} to {LARGEST}.")
         if self.mass_block and self.n % self.mass_block:
             raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")
+
+    def _check_told(self) -> None:
+        """Bring `loose` to the rows that are redundant, and check what comes with a scene."""
+        count, loose = len(np.asarray(self.redundant)), frozen("System", "loose", self.loose, (None,))
+        loose = frozen("System", "loose", loose if len(loose) else np.zeros(count), (count,))
+        if not np.all(np.isfinite(loose)) or np.any(loose < 0.0):
+            raise SceneError(f"System.loose is {loose.tolist()}; it must be finite and at least 0.")
+        object.__setattr__(self, "loose", loose)
+        if not isinstance(self.findings, tuple) or not all(isinstance(text, str) for text in self.findings):
+            raise SceneError(f"System.findings is {shown(self.findings)}; it must be a tuple of texts.")
+        behind = self.activations
+        if behind is not None and not (isinstance(behind, Activations) and behind.width <= self.inputs):
+            raise SceneError(
+                f"System.activations is {shown(behind)}; valid: Activations of some of its inputs, or None."
+            )
 
     def _put_callable(self, control: Control) -> None:
         """Take tick and memory of a controller in Python, and check how many inputs it sets."""

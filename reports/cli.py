@@ -71,7 +71,8 @@ def _parameters(command: _Work) -> _Work:
     @wraps(command)
     def gathered(
         *given: Any, pairs: tuple[str, ...], t_end: float | None, law: str | None, ctrl: str | None,
-        control: str | None, tick: float | None, without: str | None, push: tuple[tuple[Any, ...], ...], **others: Any,
+        control: str | None, tick: float | None, without: str | None, push: tuple[tuple[Any, ...], ...],
+        rank: int | None, **others: Any,
     ) -> int:  # fmt: skip
         if tick is not None and control is None and not any(pair.startswith("control=") for pair in pairs):
             raise click.UsageError(
@@ -79,6 +80,7 @@ def _parameters(command: _Work) -> _Work:
             )
         pushes = "; ".join(" ".join(map(str, one)) for one in push) or None
         named = {"t_end": t_end, "ctrl": ctrl, "control": control, "tick": tick, "without": without, "push": pushes}
+        named["rank"] = rank
         own = [f"{name}={value}" for name, value in named.items() if value is not None]
         return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **others)
 
@@ -101,6 +103,7 @@ def _parameters(command: _Work) -> _Work:
             help="Of a robot's file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
         ),
         click.option("--without", metavar="PARTS", help="Of a robot's file: parts to leave out of every engine."),
+        click.option("--rank", type=int, metavar="N", help="Of a robot's file: how many rows of its loops hold."),
     )
     told: Any = gathered
     for option in reversed(options):

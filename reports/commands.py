@@ -15,6 +15,7 @@ import click
 from crossbody import engines
 from crossbody.cases import Case, InvalidValue
 from crossbody.cases.files.reading import SUFFIXES
+from crossbody.engines._equations import known, system_of
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.parts import PARTS, part_of
@@ -57,7 +58,7 @@ def run(
     if rtol is not None and not 1e-14 <= rtol <= 1e-1:
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
-    for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in case.findings):
+    for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
         click.echo(f"note: {sentence}", err=True)
     picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
     output.check(out, "run")
@@ -80,6 +81,13 @@ def run(
             show_controllers(out)
         show(rows, out)
     return exit_code(rows["verdict"], rows["regression"] if strict else ())
+
+
+def findings(case: Case) -> tuple[str, ...]:
+    """Return sentences on what is strange in a case, and in the equations of a scene with loops."""
+    if case.scene is None or not case.scene.loops or not known(case):
+        return case.findings
+    return (*case.findings, *system_of(case).findings)
 
 
 def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:

@@ -75,9 +75,10 @@ def moves_as_in_mujoco(model: Any, scene: Scene) -> None:
         q = np.array(model.qpos0)
         mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), 1.0)
         v, u = rng.normal(size=model.nv) * 2.0, rng.normal(size=model.nu) * 20.0
-        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        act = rng.uniform(-0.3, 0.3, model.na)
+        data.qpos[:], data.qvel[:], data.ctrl[:], data.act[:] = q, v, u, act
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, full)
-        M, f = ours(q, v, u)
+        M, f = ours(q, v, np.concatenate([u, np.column_stack([np.zeros(model.na), act]).ravel()]))
         assert close(M, full)
         assert close(f, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)

@@ -31,9 +31,10 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
         joints.append(_joint(rng, "joint", made[0].name, "hinge"))
     joints.sort(key=lambda joint: [body.name for body in made].index(joint.body))
     single = [joint for joint in joints if joint.type in SINGLE]
+    tendons = (*_tendons(rng, single), *_strings(rng, made))
     return Scene(
-        bodies=tuple(made), joints=tuple(joints), actuators=_actuators(rng, joints),
-        tendons=(*_tendons(rng, single), *_strings(rng, made)),
+        bodies=tuple(made), joints=tuple(joints), actuators=(*_actuators(rng, joints), *_winches(tendons)),
+        tendons=tendons,
         loops=(*_loops(rng, single), *_joined(rng, made)), **_contacts(rng, made, joints),
         gravity=tuple(rng.normal(size=3) * 5.0), pushes=_pushes(rng, joints),
     )  # fmt: skip
@@ -95,18 +96,25 @@ def _joint(rng: np.random.Generator, name: str, body: str, kind: str) -> Joint:
         damping=tuple(rng.uniform(0.0, 0.3, 3)) if kind != "free" else (0.0, 0.0, 0.0),
         stiffness=tuple(rng.uniform(0.0, 2.0, 3)) if kind != "free" else (0.0, 0.0, 0.0),
         rest=(float(rng.normal()),) if single else _unit(rng, 4),
-        range=(-20.0, 25.0) if single and rng.random() < 0.3 else (-np.inf, np.inf), margin=0.01,
+        range=_range(rng, name, kind), margin=0.01,
         force_range=(-2.0, 3.0) if single and rng.random() < 0.3 else (-np.inf, np.inf),
     )  # fmt: skip
 
 
+def _range(rng: np.random.Generator, name: str, kind: str) -> tuple[float, float]:
+    if kind == "ball" and name.endswith("0"):
+        return (0.0, 1.5)
+    return (-20.0, 25.0) if kind in SINGLE and rng.random() < 0.3 else (-np.inf, np.inf)
+
+
 def _strings(rng: np.random.Generator, made: Sequence[Body]) -> tuple[Tendon, ...]:
-    """A bounded distance of two bodies, or of one and the world."""
+    """A bounded distance of two bodies, or of one and the world, with a spring and a damper along it."""
     if rng.random() < 0.5:
         return ()
     ends = (made[-1].name, str(rng.choice(["", *(body.name for body in made[:-1])])))
     points = tuple(tuple(rng.normal(size=3)) for _ in range(2))
-    return (Tendon(name="rope", bodies=ends, positions=points, range=(0.1, 0.2), margin=0.01),)
+    return (Tendon(name="rope", bodies=ends, positions=points, range=(0.1, 0.2), margin=0.01, stiffness=(2.0, 0.3, 0.1),
+                   damping=(0.3, 0.1, 0.05), rest=(0.8, 1.6)),)  # fmt: skip
 
 
 def _tendons(rng: np.random.Generator, single: Sequence[Joint]) -> tuple[Tendon, ...]:
@@ -154,8 +162,20 @@ def _actuators(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Actua
             gain=tuple(rng.normal(size=3) if joint.type in SINGLE else (1.0, 0.0, 0.0)),
             bias=tuple(rng.normal(size=3) if joint.type in SINGLE else (0.0, 0.0, 0.0)),
             control_range=(-1.0, 2.0), force_range=(-4.0, 4.0),
+            armature=0.05, damping=0.3,
         ))  # fmt: skip
     return tuple(made)
+
+
+def _winches(tendons: Sequence[Tendon]) -> tuple[Actuator, ...]:
+    """One along every second tendon."""
+    return tuple(
+        Actuator(
+            name=f"winch {tendon.name}", tendon=tendon.name, gear=(1.4,), gain=(0.8, -0.2, 0.1), bias=(0.3, -0.6, -0.2),
+            damping=0.25, force_range=(-4.0, 4.0),
+        )
+        for tendon in tendons[::2]
+    )  # fmt: skip
 
 
 def _pushes(rng: np.random.Generator, joints: Sequence[Joint]) -> tuple[Push, ...]:

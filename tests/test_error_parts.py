@@ -65,6 +65,16 @@ def split(case: Case, truth: Truth, run: Trajectory, made: Study) -> Split:
 STEPS = [0.02, 0.01, 0.005]
 
 
+@pytest.mark.parametrize("agreed", [0.0, 1e-9, 1e-4])
+def test_the_models_part_is_known_no_better_than_the_truth(case: Case, agreed: float) -> None:
+    truth = from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.C, "")
+    made = study(case, STEPS, 1e-3, 4.0)
+    sharp = split(case, truth, made.runs[0], made)
+    found = split(case, replace(truth, agreement={"position": agreed}), made.runs[0], made)
+    assert found.known["step"] == sharp.known["step"]
+    assert found.known["model"] == max(sharp.known["step"], agreed)
+
+
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0])
 @pytest.mark.parametrize("model", [0.0, 1e-3])
 def test_parts_are_those_that_a_run_was_made_of_and_add_up(case: Case, order: float, model: float) -> None:
@@ -158,7 +168,7 @@ SOFT = """
 
 def rows_of(path: str, **settings: Any) -> dict[str, Verdict]:
     case = cases.load(path, t_end=0.5)
-    result = jobs.run_case(case, jobs.picks(["mujoco:default"]), settings=settings)
+    result = jobs.run_case(case, jobs.picks(["mujoco:as_is"]), settings=settings)
     return {row.metric: row for row in judged(case, result.entries, result.truth, "crossbody run")}
 
 
@@ -193,9 +203,9 @@ def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: p
     path = tmp_path / "soft.xml"
     path.write_text(SOFT.format(solref="-1e4 -200"), encoding="utf-8")
     case = cases.load(str(path), t_end=0.5)
-    right = jobs.run_case(case, jobs.picks(["mujoco:default"]))
+    right = jobs.run_case(case, jobs.picks(["mujoco:as_is"]))
     monkeypatch.setattr(scene, "_from_file", wrong)
-    run = engines.load("mujoco").prepare(case, "default").run()
+    run = engines.load("mujoco").prepare(case, "as_is").run()
     assert right.entries[0].study is not None
     found = splits(case, right.truth, run, right.entries[0].study)["position"]
     before = splits(case, right.truth, right.entries[0].run, right.entries[0].study)["position"]
@@ -219,7 +229,7 @@ def test_contacts_of_the_scene_are_as_soft_as_those_of_its_file(tmp_path: Path) 
     path = tmp_path / "bouncing.xml"
     path.write_text(BOUNCING, encoding="utf-8")
     case, engine = cases.load(str(path), t_end=0.6), engines.load("mujoco")
-    own, built = (engine.prepare(case, "default", reader=reader).run() for reader in ("file", "scene"))
+    own, built = (engine.prepare(case, "as_is", reader=reader).run() for reader in ("file", "scene"))
     assert len(own.events) == len(built.events) > 0
     assert np.abs(own.q - built.q).max() < 1e-12
 
@@ -237,7 +247,7 @@ def test_a_published_biped_is_soft_by_its_file_and_converges_where_it_is_stiff()
 
     def off(dt: float, how: str) -> Any:
         """Differences to the rigid motion (instants, coordinates)."""
-        scene: Any = engines.load("mujoco").prepare(case, "default", dt=dt)
+        scene: Any = engines.load("mujoco").prepare(case, "as_is", dt=dt)
         model, data = scene.scene.model, scene.scene.data
         if how == "stiff":
             model.eq_solimp[:, :2] = MAX_IMPEDANCE

@@ -27,6 +27,7 @@ from crossbody.reference import System, simulate
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
+from crossbody.reports.runs import jobs
 
 ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",
@@ -204,6 +205,58 @@ def test_a_loop_given_twice_moves_as_once(tmp_path: Path) -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
+TILTED = (
+    FOUR_BAR.replace("<mujoco>", '<mujoco><option gravity="3 0 -9.81"/>')
+    .replace('name="coupler" axis="0 1 0"', 'name="coupler" axis="{tilt} 1 0"')
+    .replace('qpos=".2 .1 -.3"', 'qpos="0 0 0"')
+)
+
+
+def tilted(folder: Path, tilt: float, **parameters: Any) -> cases.Case:
+    """A four-bar that is closed where it starts, one of whose axes is off by an angle, rad."""
+    path = folder / "tilted.xml"
+    loop = '<connect name="loop" body1="last" anchor="0 0 -.4" solref="-1 -2"/>'
+    path.write_text(TILTED.format(loops=loop, tilt=tilt), encoding="utf-8")
+    return cases.load(str(path), t_end=0.2, without="contacts", **parameters)
+
+
+@pytest.mark.parametrize("tilt", [1e-5, 1e-6, 1e-7])
+def test_a_row_that_is_nearly_dependent_is_named_and_left_out_or_kept(tmp_path: Path, tilt: float) -> None:
+    """Without it the four-bar moves, with it it stands: both are told, and in both witnesses `rank` decides."""
+    for rank, moves in ((-1, True), (2, True), (3, False)):
+        case = tilted(tmp_path, tilt, rank=rank)
+        runs = [
+            engines.load(name).prepare(case, profile, rtol=1e-10).run()
+            for name, profile in (("reference", "compiled"), ("reference", "cvode"), ("pinocchio", "law"))
+        ]
+        for run in runs:
+            assert run.outcome is Outcome.FINISHED, run.message
+            assert bool(np.abs(run.q[-1]).max() > 1e-2) is moves
+            assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= 1e-7
+        assert "near_dependent: a pivot between 1e-08 and 0.0001 of the first has 'loop y' (" in runs[0].message
+        assert f"{2 if moves else 3} of 3 rows hold" in runs[0].message
+
+
+@pytest.mark.parametrize(
+    ("tilt", "rank", "valid"), [(0.0, 3, "2, of 3"), (1e-6, 1, "from 2 to 3"), (0.3, 2, "3, of 3")]
+)
+def test_a_rank_that_rounding_does_not_leave_open_is_refused(
+    tmp_path: Path, tilt: float, rank: int, valid: str
+) -> None:
+    with pytest.raises(SceneError, match=f"rank is {rank}; valid: {valid}"):
+        engines.load("reference").prepare(tilted(tmp_path, tilt, rank=rank))
+    with pytest.raises(SceneError, match="no loops"):
+        cases.load(write(tmp_path), "raised", rank=3)
+
+
+def test_a_nearly_dependent_row_is_told_before_the_run(tmp_path: Path) -> None:
+    path = tilted(tmp_path, 1e-6).file
+    arguments = ["run", path, "-e", "reference:compiled", "--t-end", ".1", "--without", "contacts", "--rank", "3"]
+    result = CliRunner().invoke(cli, [*arguments, "--out", str(tmp_path / "out")])
+    assert "note: tilted.xml: near_dependent" in result.stderr
+    assert "3 of 3 rows hold" in result.stderr
+
+
 WELDED = """
 <mujoco><option timestep="1e-3"/>
   <default><joint axis="0 1 0" damping=".01"/><geom type="capsule" size=".02" contype="0" conaffinity="0"/></default>
@@ -265,12 +318,12 @@ def test_an_unnamed_floating_box_runs_in_every_engine(tmp_path: Path) -> None:
     for engine, profile in (
         ("reference", "compiled"),
         ("mujoco", "matched"),
-        ("mujoco", "default"),
+        ("mujoco", "as_is"),
         ("pinocchio", "law"),
     ):
         run = engines.load(engine).prepare(case, profile).run()
         assert run.outcome is Outcome.FINISHED
-        assert run.q[-1, 4] == pytest.approx(2.0 - 0.5 * 9.81 * 0.2**2, abs=1e-2 if profile == "default" else 1e-9)
+        assert run.q[-1, 4] == pytest.approx(2.0 - 0.5 * 9.81 * 0.2**2, abs=1e-2 if profile == "as_is" else 1e-9)
 
 
 def test_an_arm_moves_alike_in_three_engines(tmp_path: Path) -> None:
@@ -292,7 +345,7 @@ def test_an_arm_moves_alike_in_three_engines(tmp_path: Path) -> None:
 def test_a_file_as_it_stands_steps_as_mujoco_does(tmp_path: Path, integrator: str) -> None:
     path = write(tmp_path, integrator=integrator)
     case = cases.load(path, "raised", t_end=0.2)
-    run = engines.load("mujoco").prepare(case, "default").run()
+    run = engines.load("mujoco").prepare(case, "as_is").run()
     model = mujoco.MjModel.from_xml_path(path)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -312,6 +365,51 @@ def test_bounds_are_rows_that_open_and_close(tmp_path: Path) -> None:
     assert len(times[0]) == len(times[1])
     assert np.abs(times[0] - times[1]).max() <= 1e-8
     assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() <= 1e-7
+
+
+BALL = """
+<mujoco><compiler angle="radian"/><option timestep="1e-3"/><worldbody><body pos="0 0 1"><joint name="ball" type="ball"
+damping=".05" limited="true" range="0 {range}" solreflimit="-{K} -20" solimplimit="1 1 .001"/>
+<geom type="capsule" fromto="0 0 0 .1 0 -.4" size=".03" mass="1"/><geom size=".05" pos="0 .1 -.2" mass=".5"/>
+</body></worldbody><keyframe><key qpos="1 .1 .2 .1" qvel="{v}"/></keyframe></mujoco>
+"""
+
+
+def ball_joint(folder: Path, **fields: Any) -> str:
+    path = folder / "ball.xml"
+    path.write_text(BALL.format(**fields), encoding="utf-8")
+    return str(path)
+
+
+def test_a_ball_joint_meets_its_bound_alike_in_every_engine(tmp_path: Path) -> None:
+    case = cases.load(ball_joint(tmp_path, range=0.9, K=4000, v="5 -6 4"), t_end=0.3)
+    assert case.contacts == ("ball high",)
+    asked: Any = [("reference", "compiled"), ("reference", "cvode"), ("reference", "ida"), ("pinocchio", "law")]
+    runs = [engines.load(name).prepare(case, profile, rtol=1e-11).run() for name, profile in asked]
+    touches = [np.array([event.t for event in run.events]) for run in runs]
+    assert len(touches[0]) == 3
+    for run, times in zip(runs, touches, strict=True):
+        assert np.abs(times - touches[0]).max() <= 1e-9
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= 1e-8
+    # A step of MuJoCo's is first order where it meets the bound, and its row is gone where it stops pushing.
+    case = dataclasses.replace(case, t_end=0.19)
+    run = engines.load("mujoco").prepare(case, "matched", dt=1e-4).run()
+    ours = engines.load("reference").prepare(case, "compiled").run()
+    assert np.abs(run.q[-1] - ours.q[-1]).max() <= 1e-4
+
+
+def test_the_bound_of_a_ball_joint_turns_round_at_half_a_turn(tmp_path: Path) -> None:
+    """Too soft to hold, it is turned through: what has pushed back pushes on, from an instant that is located."""
+    case = cases.load(ball_joint(tmp_path, range=2.9, K=1, v="0 24 0"), t_end=0.3)
+    runs = [engines.load("reference").prepare(case, name, rtol=1e-11).run() for name in ("compiled", "cvode", "ida")]
+    for run in runs:
+        assert run.outcome is Outcome.FINISHED
+        flips = [switch.t for switch in run.switches if switch.t > 0.0]
+        assert len(flips) == 1
+        at = np.searchsorted(run.t, flips[0])
+        assert abs(run.q[at, 0]) <= 1e-10
+        assert run.mode[at, 0] == cases.Mode.CONTACT
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= 1e-8
 
 
 @pytest.mark.parametrize("safe", ["enable", "disable"])
@@ -425,7 +523,7 @@ def test_a_push_gives_a_floating_body_its_momentum(tmp_path: Path) -> None:
         '<geom type="box" size=".1 .2 .3" mass="2"/></body></worldbody></mujoco>', encoding="utf-8",
     )  # fmt: skip
     case = cases.load(str(path), t_end=0.5, push="box 1 -2 3 .1 .3")
-    for engine, profile in (("reference", "compiled"), ("mujoco", "default"), ("pinocchio", "law")):
+    for engine, profile in (("reference", "compiled"), ("mujoco", "as_is"), ("pinocchio", "law")):
         run = engines.load(engine).prepare(case, profile).run()
         assert run.outcome is Outcome.FINISHED
         assert np.abs(run.v[-1] - [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]).max() < 1e-9, engine
@@ -465,13 +563,58 @@ def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> 
     assert np.abs(run.q[-1, :4] - first.q[-1, :4]).max() <= 2e-5
 
 
-def test_what_a_string_cannot_do_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "rope.xml"
-    path.write_text(ROPE.replace("limited", 'stiffness="3" limited', 1), encoding="utf-8")
-    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+WINCH = """
+<mujoco><option timestep="1e-3"/><worldbody><site name="hook" pos=".1 0 1.2"/>
+<body pos="0 0 1"><joint name="boom" axis="0 1 0" damping=".1" actuatorfrclimited="true" actuatorfrcrange="-3 3"/>
+<geom type="capsule" fromto="0 0 0 .5 0 0" size=".03" mass="1" contype="0" conaffinity="0"/>
+<site name="tip" pos=".5 0 0"/></body><body pos=".6 .1 .5"><freejoint/>
+<geom type="box" size=".05 .08 .1" mass=".8" contype="0" conaffinity="0"/><site name="load" pos="0 0 .1"/></body>
+</worldbody><tendon><spatial name="brace" stiffness="40 5 2" damping="1 .2 .1" springlength=".3 .45"><site site="hook"/>
+<site site="tip"/></spatial><spatial name="rope" stiffness="60" springlength=".2"><site site="tip"/>
+<site site="load"/></spatial></tendon>
+<actuator><position name="winch" tendon="rope" kp="30" kv="2" gear="1.5" forcerange="-20 20"/>
+<motor name="pull" tendon="brace" gear="-2"/></actuator>
+<keyframe><key ctrl=".4 1" qvel="0 .3 .2 0 2 -1 3"/></keyframe></mujoco>
+"""
+
+
+def test_forces_along_tendons_between_points_move_alike_in_every_engine(tmp_path: Path) -> None:
+    """A brace with a dead band, a rope with a servo; and the account of energy is closed."""
+    path = tmp_path / "winch.xml"
+    path.write_text(WINCH, encoding="utf-8")
+    moves_as_in_mujoco(compiled(path), scene_of(compiled(path)))
+    case = cases.load(str(path), t_end=0.4)
+    runs = [
+        engines.load(name).prepare(case, profile, **settings).run()
+        for name, profile, settings in (
+            ("reference", "compiled", {"rtol": 1e-11}), ("reference", "cvode", {"rtol": 1e-11}),
+            ("reference", "ida", {"rtol": 1e-10}), ("pinocchio", "law", {"rtol": 1e-11}),
+            ("mujoco", "matched", {"dt": 1e-4}),
+        )
+    ]  # fmt: skip
+    for k, run in enumerate(runs):
+        assert run.outcome is Outcome.FINISHED
+        # A fixed step that meets the end of a range or of a dead band is second order.
+        assert np.abs(run.q[-1] - runs[0].q[-1]).max() <= (1e-6 if k == 4 else 1e-8)
+        assert np.abs(run.energy[-1].sum() - runs[0].energy[-1].sum()) <= 1e-5
+    ledger = runs[0].ledger
+    assert ledger is not None
+    account = runs[0].total_energy - ledger.input + ledger.dissipated
+    assert np.abs(account - account[0]).max() <= 1e-8 * np.abs(runs[0].energy).max()
+
+
+def test_a_loop_that_couples_the_distance_of_points_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "winch.xml"
+    loop = '<equality><tendon name="both" tendon1="rope" tendon2="brace"/></equality>'
+    path.write_text(WINCH.replace("<actuator>", f"{loop}<actuator>"), encoding="utf-8")
+    with pytest.raises(SceneError, match=r"Tendon '(rope|brace)' runs between two points: no loop \('both'\)"):
         cases.load(str(path))
-    path.write_text(ROPE.replace('<motor name="a" joint="x"/>', '<motor name="a" tendon="string"/>'), encoding="utf-8")
-    with pytest.raises(SceneError, match="Tendon 'string' runs between two points: it can have a range"):
+
+
+def test_inertia_of_an_actuator_on_a_tendon_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "winch.xml"
+    path.write_text(WINCH.replace("<motor ", '<motor armature=".1" '), encoding="utf-8")
+    with pytest.raises(SceneError, match="Actuator 'pull' has armature on a tendon"):
         cases.load(str(path))
 
 
@@ -497,7 +640,7 @@ def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
     assert "'wall'" in found.message
     free = cases.load(path, "down", t_end=3.0, without="contacts")
     assert engines.load("reference").prepare(free, "compiled").run().outcome is Outcome.FINISHED
-    assert engines.load("mujoco").prepare(free, "default").run().outcome is Outcome.FINISHED
+    assert engines.load("mujoco").prepare(free, "as_is").run().outcome is Outcome.FINISHED
 
 
 @pytest.mark.parametrize(
@@ -530,6 +673,44 @@ def test_nothing_is_left_out_that_is_not_there(tmp_path: Path, word: str) -> Non
 def test_a_file_that_is_not_there_is_told() -> None:
     with pytest.raises(UnknownName, match=r"none\.xml"):
         cases.load("none.xml")
+
+
+def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path) -> None:
+    """`default` is that of shipped cases, and each sentence names the other."""
+    engine, case, shipped = engines.load("mujoco"), cases.load(write(tmp_path), "raised"), cases.load("bouncing_ball")
+    assert "as_is" in str(engine.why_not(case, "default"))
+    assert "default" in str(engine.why_not(shipped, "as_is"))
+    for one, profiles in ((case, {"matched", "as_is"}), (shipped, {"matched", "default"})):
+        assert {jobs.of_case(pick, one).profile for pick in jobs.picks(["mujoco"])} == profiles
+    asked = jobs.picks(["mujoco:default"])[0]
+    assert jobs.of_case(asked, case).profile == "default"
+
+
+SERVO = """
+<mujoco><compiler angle="radian"/><worldbody><body><joint name="hinge" axis="0 1 0" damping="2"/>
+<geom type="capsule" fromto="0 0 0 .4 0 0" size=".03" mass="1.2"/></body></worldbody><actuator>
+<position name="servo" joint="hinge" kp="8"/><motor name="lift" joint="hinge"/></actuator>
+<keyframe><key ctrl="-.4 -1" qpos="-.3"/></keyframe></mujoco>
+"""
+
+
+def test_an_analysis_trims_at_the_controls_that_are_held(tmp_path: Path) -> None:
+    """Of the keyframe, or of the table at that instant; and MuJoCo's linear model there is the same."""
+    from crossbody.reports.analysis.counterparts import counterparts
+    from crossbody.reports.analysis.places import places
+
+    path, table = tmp_path / "servo.xml", tmp_path / "u.csv"
+    path.write_text(SERVO, encoding="utf-8")
+    table.write_text("t,servo,lift\n0,.1,-2\n2.5,0,0\n", encoding="utf-8")
+    for ctrl, wanted in (("", [-0.4, -1.0]), (str(table), [0.1, -2.0])):
+        (place,) = places(cases.load(str(path), t_end=3.0, ctrl=ctrl))
+        assert place.trim.outcome is Outcome.FINISHED
+        assert place.trim.u.tolist() == wanted
+        q = float(place.trim.q[0])
+        weight = 1.2 * 9.81 * 0.2 * np.cos(q)
+        assert 8.0 * (wanted[0] - q) + wanted[1] + weight == pytest.approx(0.0, abs=1e-12)
+        told = counterparts([place])[0]
+        assert told.loc[told["engine"] == "mujoco", "slope"].min() <= 1e-7
 
 
 def test_the_command_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -212,6 +212,36 @@ def test_distances_of_points_are_those_of_the_engines(seed: int) -> None:
     assert close(h, [data.ten_length[0] - 0.11, 0.19 - data.ten_length[0]])
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_bounds_of_ball_joints_are_those_of_mujoco(seed: int) -> None:
+    """Gap and row; H'v by what MuJoCo's row is at two instants of a motion."""
+    scene = random_scene(seed).replace(loops=(), tendons=(), pairs=(), shapes=(), actuators=())
+    scene = scene.replace(joints=tuple(
+        dataclasses.replace(joint, range=(0.0, 0.1) if joint.type == "ball" else (-np.inf, np.inf))
+        for joint in scene.joints))  # fmt: skip
+    if not any(joint.limited for joint in scene.joints):
+        return
+    model = build.compiled(build.spec_of(scene), scene)
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+
+    def row(q: Any, v: Any) -> tuple[Any, Any]:
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        return np.array(data.efc_pos - data.efc_margin), np.array(data.efc_J).reshape(-1, model.nv)
+
+    for _ in range(5):
+        q, v, u = random_state(scene, rng)
+        H, h, Hdv = rows_at(scene, q, v, u)
+        theirs, J = row(q, v)
+        assert close(h, theirs)
+        assert close(H, J)
+        step, ends = 1e-6, [np.array(q), np.array(q)]
+        mujoco.mj_integratePos(model, ends[0], v, step)
+        mujoco.mj_integratePos(model, ends[1], v, -step)
+        moved = (row(ends[0], v)[1] - row(ends[1], v)[1]) @ v / (2.0 * step)
+        assert np.abs(moved - Hdv).max() <= 1e-6 * max(1.0, np.abs(Hdv).max())
+
+
 SITES = """
 <mujoco><worldbody>
   <body pos="0 0 1"><freejoint/><geom size=".1"/><site name="a" pos=".1 .2 .3" euler="20 30 40"/></body>
@@ -295,14 +325,13 @@ def test_coordinates_of_pinocchio_lead_there_and_back(seed: int) -> None:
     [
         ({"type": "free", "stiffness": (1.0, 0.0, 0.0)}, {}, "springs of a free joint"),
         ({"type": "ball"}, {"bias": (0.0, -3.0, 0.0)}, "length"),
-        ({"type": "ball", "range": (0.0, 1.0)}, {}, "bounds of a ball joint"),
+        ({"type": "free", "range": (0.0, 1.0)}, {}, "a free joint has no bounds"),
+        ({"type": "ball", "range": (0.0, 0.01), "margin": 0.01}, {}, "largest angle"),
+        ({"type": "ball", "range": (0.5, 1.0)}, {}, "largest angle"),
     ],
 )
 def test_what_turns_and_is_not_done_is_refused(joint: dict[str, Any], actuator: dict[str, Any], said: str) -> None:
     body = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    scene = Scene(
-        bodies=(body,), joints=(Joint(name="j", body="b", **joint),),
-        actuators=(Actuator(name="a", joint="j", gear=(1.0, 0.0, 0.0), **actuator),) if actuator else (),
-    )  # fmt: skip
+    actuators = (Actuator(name="a", joint="j", gear=(1.0, 0.0, 0.0), **actuator),) if actuator else ()
     with pytest.raises(SceneError, match=said):
-        tabulate(scene)
+        tabulate(Scene(bodies=(body,), joints=(Joint(name="j", body="b", **joint),), actuators=actuators))

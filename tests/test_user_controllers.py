@@ -208,7 +208,9 @@ def test_random_scenes_with_an_impedance_law_move_alike_in_four_engines(seed: in
         replace(one, control_range=(-np.inf, np.inf), force_range=(-np.inf, np.inf)) for one in scene.actuators
     )
     joints = tuple(replace(one, force_range=(-np.inf, np.inf), range=(-np.inf, np.inf)) for one in scene.joints)
-    springs = tuple(replace(one, rest=(0.0, 0.0)) for one in scene.tendons if one.joints)
+    springs = tuple(
+        replace(one, rest=(0.0, 0.0), range=(-np.inf, np.inf) if one.bodies else one.range) for one in scene.tendons
+    )
     scene = scene.replace(
         actuators=free, joints=joints, loops=(), pairs=(), tendons=springs, pushes=(Push(name="push", body="body 0"),)
     )
@@ -453,7 +455,7 @@ def test_a_file_takes_a_control_from_python_or_by_name(files: Path) -> None:
         calls.append(t)
         return 4.0 * (0.5 - float(q[0]))
 
-    given = run_in(cases.from_file("arm.xml", control=Control(held, 0.02), t_end=0.2), "mujoco", "default")
+    given = run_in(cases.from_file("arm.xml", control=Control(held, 0.02), t_end=0.2), "mujoco", "as_is")
     assert calls == [k * 0.02 for k in range(10)]
     with pytest.raises(InvalidValue, match="tick is given beside a Control"):
         cases.from_file("arm.xml", control=Control(held, 0.02), tick=0.01)
@@ -475,7 +477,7 @@ def test_a_file_takes_a_control_from_python_or_by_name(files: Path) -> None:
 )  # fmt: skip
 def test_wrong_controls_are_a_sentence(files: Path, words: list[str], told: str) -> None:
     (files / "u.csv").write_text("t,m\n0,1\n")
-    done = CliRunner().invoke(cli, ["run", "arm.xml", "-e", "mujoco:default", "--control", *words])
+    done = CliRunner().invoke(cli, ["run", "arm.xml", "-e", "mujoco:as_is", "--control", *words])
     assert done.exit_code == 2 or done.exception is not None
     text = done.output + str(done.exception)
     assert told in text.replace("\n", " ")

@@ -31,6 +31,7 @@ PARAMETERS = {
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
     "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
+    "rank": Parameter(default=-1, doc="rows of the loops that hold; -1: those that surely do", low=-1, high=1e6),
     "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
@@ -67,11 +68,13 @@ class FileCase:
             q0 = assembled(model_of(self.path, str(p["without"])), q0)
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
+        act0 = np.zeros(self.model.na) if index < 0 else self.model.key_act[index]
         scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
-            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, t_end=float(p["t_end"]),
+            scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, rank=int(p["rank"]),
+            t_end=float(p["t_end"]),
             findings=findings_of(self.path),
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
@@ -111,6 +114,8 @@ def case_of(
     variant: str = REFERENCE_POSE,
     q0: Any = None,
     v0: Any = None,
+    act0: Any = None,
+    rank: int = -1,
     inputs: Inputs | None = None,
     control: Control | None = None,
     t_end: float = 1.0,
@@ -126,6 +131,8 @@ def case_of(
         variant: of the case.
         q0: start (nq,); the reference pose if not given.
         v0: velocities there (nv,); at rest if not given.
+        act0: activations there (na,) of the actuators that have one; 0 if not given.
+        rank: how many rows of the loops hold; below 0 those that surely do.
         inputs: controls of the actuators, then the components of the pushes; zero if not given.
         control: gives the controls at its ticks; those of the inputs are zero then.
         t_end: horizon, s.
@@ -137,6 +144,8 @@ def case_of(
         SceneError: for a scene that no engine here can run, naming what stands against it.
     """
     check_runnable(scene)
+    if rank >= 0 and not scene.loops:
+        raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
     names, laws, unilateral = rows_of(scene)
     law = Law(
@@ -148,7 +157,8 @@ def case_of(
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         contacts=tuple(names), q0=start,
-        v0=np.zeros(scene.nv) if v0 is None else v0, t_end=t_end, law=law, inputs=inputs or held(scene), scene=scene,
+        v0=np.zeros(scene.nv) if v0 is None else v0, act0=np.zeros(0) if act0 is None else act0, t_end=t_end, law=law,
+        inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
     )  # fmt: skip
 
@@ -162,13 +172,10 @@ def check_runnable(scene: Scene) -> None:
     for part in scene.bounded:
         if part.friction_loss:
             raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
-    used = {part.tendon for part in scene.actuators}
-    used |= {name for loop in scene.loops if loop.type == "tendon" for name in (loop.first, loop.second)}
-    for tendon in scene.tendons:
-        if tendon.bodies and (any(tendon.stiffness) or any(tendon.damping) or tendon.name in used):
-            raise SceneError(
-                f"Tendon {tendon.name!r} runs between two points: it can have a range, and nothing acts along it."
-            )
+    spans = {tendon.name for tendon in scene.tendons if tendon.bodies}
+    for loop in scene.loops:
+        for name in {loop.first, loop.second} & spans if loop.type == "tendon" else ():
+            raise SceneError(f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple it.")
 
 
 ENTRIES = {

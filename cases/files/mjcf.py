@@ -223,15 +223,14 @@ def _tendon(model: Any, i: int) -> Tendon:
     where = slice(first, first + count)
     name = _name(model, "tendon", i)
     kinds, parts = model.wrap_type[where].tolist(), model.wrap_objid[where].tolist()
-    joined: dict[str, Any] = {
-        "joints": tuple(_name(model, "jnt", j) for j in parts), "coefficients": _floats(model.wrap_prm[where]),
-    }  # fmt: skip
+    joined: dict[str, Any] = {}
     if kinds == [SITE_WRAP, SITE_WRAP]:
-        joined = {
-            "bodies": tuple(_name(model, "body", int(model.site_bodyid[j])) for j in parts),
-            "positions": tuple(_floats(model.site_pos[j]) for j in parts),
-        }
-    elif set(kinds) != {JOINT_WRAP}:
+        joined["bodies"] = tuple(_name(model, "body", int(model.site_bodyid[j])) for j in parts)
+        joined["positions"] = tuple(_floats(model.site_pos[j]) for j in parts)
+    elif set(kinds) == {JOINT_WRAP}:
+        joined["joints"] = tuple(_name(model, "jnt", j) for j in parts)
+        joined["coefficients"] = _floats(model.wrap_prm[where])
+    else:
         raise SceneError(f"Tendon {name!r} runs over shapes or more than two sites; a scene has two points, or joints.")
     if model.tendon_armature[i] != 0.0:
         raise SceneError(f"Tendon {name!r} has armature, which a scene does not have.")
@@ -248,14 +247,24 @@ def _tendon(model: Any, i: int) -> Tendon:
     )
 
 
+ACTIVATIONS = {
+    "mjDYN_NONE": "", "mjDYN_INTEGRATOR": "integrator", "mjDYN_FILTER": "filter", "mjDYN_FILTEREXACT": "filter",
+}  # fmt: skip
+"""MuJoCo's word -> the scene's: how exactly it integrates a filter is a matter of steps."""
+
+
 def _actuator(model: Any, i: int) -> Actuator:
     import mujoco
 
     name = _name(model, "actuator", i)
     kind = mujoco.mjtTrn(model.actuator_trntype[i])
     gain, bias = mujoco.mjtGain(model.actuator_gaintype[i]), mujoco.mjtBias(model.actuator_biastype[i])
-    if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-        raise SceneError(f"Actuator {name!r} has an activation, which a scene does not have.")
+    dynamics = mujoco.mjtDyn(model.actuator_dyntype[i])
+    if dynamics.name not in ACTIVATIONS or (model.actuator_actnum[i] > 1 or model.actuator_actearly[i]):
+        early = " that acts early" if model.actuator_actearly[i] else ""
+        valid = ", ".join(name.removeprefix("mjDYN_").lower() for name in ACTIVATIONS)
+        raise SceneError(f"Actuator {name!r} has the activation {dynamics.name}{early}; valid: one of {valid}.")
+    kind_of = ACTIVATIONS[dynamics.name]
     if gain.name not in ("mjGAIN_FIXED", "mjGAIN_AFFINE") or bias.name not in ("mjBIAS_NONE", "mjBIAS_AFFINE"):
         raise SceneError(f"Actuator {name!r} has {gain.name} and {bias.name}; valid: fixed and affine ones.")
     target = int(model.actuator_trnid[i, 0])
@@ -275,4 +284,7 @@ def _actuator(model: Any, i: int) -> Actuator:
         damping=float(model.actuator_damping[i]),
         control_range=_floats(model.actuator_ctrlrange[i]) if model.actuator_ctrllimited[i] else UNBOUNDED,
         force_range=_floats(model.actuator_forcerange[i]) if model.actuator_forcelimited[i] else UNBOUNDED,
+        activation=kind_of,
+        time_constant=float(model.actuator_dynprm[i, 0]) if kind_of == "filter" else 0.0,
+        activation_range=_floats(model.actuator_actrange[i]) if kind_of and model.actuator_actlimited[i] else UNBOUNDED,
     )

@@ -22,7 +22,8 @@ READ = frozenset(
     tendon_solimp_lim tendon_frictionloss tendon_armature tendon_actfrcrange tendon_actfrclimited tendon_type wrap_type
     wrap_objid wrap_prm actuator_trntype actuator_trnid actuator_gear actuator_gaintype actuator_gainprm
     actuator_biastype actuator_biasprm actuator_dyntype actuator_dynprm actuator_ctrlrange actuator_ctrllimited
-    actuator_forcerange actuator_forcelimited actuator_armature actuator_damping key_qpos key_qvel key_ctrl
+    actuator_forcerange actuator_forcelimited actuator_armature actuator_damping actuator_actlimited
+    actuator_actrange actuator_actearly key_qpos key_qvel key_ctrl
     key_act key_time
     """.split()  # noqa: SIM905
 )
@@ -37,7 +38,7 @@ DERIVED = frozenset(
     pair_signature tendon_treeid tendon_treenum tendon_length0 tendon_invweight0 tendon_actuatorid
     tendon_solref_fri tendon_solimp_fri actuator_acc0 actuator_length0 actuator_lengthrange actuator_ctrladr
     actuator_ctrlnum actuator_outadr actuator_outnum actuator_actadr actuator_actnum actuator_ctrlspec
-    actuator_historyadr actuator_actlimited actuator_actrange actuator_actearly actuator_cranklength
+    actuator_historyadr actuator_cranklength
     tree_bodyadr tree_bodynum tree_dofadr tree_dofnum tree_sleep_policy B_colind B_rowadr B_rownnz D_colind
     D_diag D_rowadr D_rownnz M_colind M_rowadr M_rownnz ten_J_colind ten_J_rowadr ten_J_rownnz
     """.split()  # noqa: SIM905

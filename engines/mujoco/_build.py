@@ -78,6 +78,8 @@ def _add_joint(body: Any, joint: Joint) -> None:
     )  # fmt: skip
     added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
     added.limited, added.range = _bounds(joint.range)
+    if joint.type == "ball":
+        added.range[0] = 0.0
     added.actfrclimited, added.actfrcrange = _bounds(joint.force_range)
     added.solref_limit, added.solimp_limit = _solref(joint.law), IMPEDANCE
 
@@ -129,5 +131,9 @@ def _add_actuator(spec: Any, actuator: Actuator) -> None:
     added.gaintype, added.biastype = mujoco.mjtGain.mjGAIN_AFFINE, mujoco.mjtBias.mjBIAS_AFFINE
     added.gainprm[:3], added.biasprm[:3] = actuator.gain, actuator.bias
     added.armature, added.damping[0] = actuator.armature, actuator.damping
+    if actuator.activation:
+        added.dyntype = getattr(mujoco.mjtDyn, f"mjDYN_{actuator.activation.upper()}")
+        added.dynprm[0] = actuator.time_constant
+        added.actlimited, added.actrange = _bounds(actuator.activation_range)
     added.ctrllimited, added.ctrlrange = _bounds(actuator.control_range)
     added.forcelimited, added.forcerange = _bounds(actuator.force_range)

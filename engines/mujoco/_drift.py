@@ -1,4 +1,6 @@
-"""H' v of contacts and strings: MuJoCo has J v' = -a1 h' - a0 h there, where the law has h'' = H v' + H' v.
+"""H' v of contacts, strings and bounds of ball joints, which MuJoCo leaves out.
+
+It has J v' = -a1 h' - a0 h there, where the law has h'' = H v' + H' v.
 
 By a difference of H along the motion, in a second set of data; MuJoCo has the term of `connect` and `weld`.
 """
@@ -12,13 +14,14 @@ import mujoco
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import Joint, Scene, Tendon
 from crossbody.engines._contacts import Contacts, drift
+from crossbody.engines._scene import angle_of, places
 from crossbody.engines.mujoco._observe import numbers, pose_of
 
 
 class Drift:
-    """H' v of the contacts of a scene, and of the distances of its tendons between points.
+    """H' v of the contacts of a scene, of the distances of its tendons between points, and of angles of ball joints.
 
     Args:
         scene: whose.
@@ -30,10 +33,10 @@ class Drift:
         self.model, self.data, self.contacts = model, mujoco.MjData(model), contacts
         self.numbers = numbers(scene)
         self.pose = pose_of(self.data, self.numbers)
-        self.tendons = scene.tendons
+        self.bounded, self.at, self.place = scene.bounded, *places(scene)
 
-    def __call__(self, q: Floats, v: Floats, tendons: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
-        """Return that of the lengths of some tendons, 0 for sums of joints, and of some rows of the contacts, m/s^2."""
+    def __call__(self, q: Floats, v: Floats, parts: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return that of some of what may have bounds, 0 of a sum of joints, and of some rows of the contacts."""
         self.data.qvel[:] = v
 
         def rates(t: float) -> Floats:
@@ -44,15 +47,22 @@ class Drift:
             mujoco.mj_comVel(self.model, self.data)
             touches = self.contacts.touches(self.pose, rows)
             closing = [t.normal @ (self._carried(t.second, t.point) - self._carried(t.first, t.point)) for t in touches]
-            return np.array([*map(self._length_rate, tendons), *closing])
+            return np.array([*(self._rate(self.bounded[i], v) for i in parts), *closing])
 
-        lengths, touches = np.split(drift(rates, v), [len(tendons)])
+        lengths, touches = np.split(drift(rates, v), [len(parts)])
         return lengths, touches
 
-    def _length_rate(self, i: int) -> float:
-        tendon = self.tendons[i]
-        if not tendon.bodies:
-            return 0.0
+    def _rate(self, part: Joint | Tendon, v: Floats) -> float:
+        """Return how fast an angle of a ball joint or a distance of points changes, 0 of anything else."""
+        if isinstance(part, Joint):
+            return self._angle_rate(part, v) if part.type == "ball" and part.limited else 0.0
+        return self._length_rate(part) if part.bodies else 0.0
+
+    def _angle_rate(self, joint: Joint, v: Floats) -> float:
+        first, turn = self.place[joint.name], angle_of(self.data.qpos[self.at[joint.name] :][:4])
+        return float(turn @ v[first : first + 3] / np.linalg.norm(turn))
+
+    def _length_rate(self, tendon: Tendon) -> float:
         at = []
         for body, position in zip(tendon.bodies, tendon.positions, strict=True):
             R, p = self.pose(body)

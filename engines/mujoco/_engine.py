@@ -85,16 +85,20 @@ class Mujoco:
     profiles: Mapping[str, str] = {
         "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events; memoryless",
         "default": "the obvious model: contact constants, integrator (Euler) and step (2 ms) as MuJoCo sets them",
+        "as_is": "a robot file as it stands: its own step, integrator, solref, solimp and cone",
     }
+    of_scenes: Mapping[str, str] = {"default": "as_is"}
     versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
-    orders: Mapping[str, float] = {"matched": 4.0, "default": 1.0}
+    orders: Mapping[str, float] = {"matched": 4.0, "default": 1.0, "as_is": 1.0}
     interpreted: Mapping[str, str] = {
         "matched": "the loop over steps, the record, the search for events, what solref cannot say of the law",
         "default": "the loop over steps, the record",
+        "as_is": "the loop over steps, the record",
     }
     hidden: Mapping[str, Mapping[str, str]] = {
         "*": {"ledger": "MuJoCo's steps keep no account of the work of its forces."},
         "default": {"H": "The obvious model's contacts are pairs of shapes, with frames of their own."},
+        "as_is": {"H": "The file's contacts are pairs of shapes, with frames of their own."},
     }
 
     def why_not(self, case: Case, profile: str) -> str | None:
@@ -102,6 +106,8 @@ class Mujoco:
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         known = _mechanisms()
+        if profile == "as_is" and case.scene is None:
+            return f"The profile as_is runs a robot file as it stands, and {case.name} is none; its own is default."
         if case.mechanism in known:
             own = getattr(_mechanism(case.mechanism), "why_not", None)
             return own(case, profile) if own else None

@@ -52,6 +52,7 @@ def rebuilt(scene: Scene, model: Any) -> Any:
                 getattr(made.opt, name)[:] = value
             else:
                 setattr(made.opt, name, value)
+    made.actuator_dyntype[:] = model.actuator_dyntype  # filters alike, stepped by a formula or by the integrator
     on = model.eq_active0.astype(bool)
     made.eq_solref[:], made.eq_solimp[:] = model.eq_solref[on], model.eq_solimp[on]
     for name in ("jnt_solref", "jnt_solimp", "tendon_solref_lim", "tendon_solimp_lim"):

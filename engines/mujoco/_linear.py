@@ -98,6 +98,8 @@ def _same_coordinates(mechanism: ModuleType, dt: float) -> Callable[[Case, Spot]
             raise CaseUnsupported(f"MuJoCo's model of {case.mechanism!r} has other coordinates, without a chart here.")
         scene.start()
         scene.data.qpos[:], scene.data.qvel[:] = spot.q, spot.v
+        if case.scene is not None:
+            scene.change(spot.t)
         if scene.arm is not None:
             scene.arm(spot.modes(case))
         return Stand(model=scene.model, data=scene.data, chart=same(len(spot.v)), hook=scene.hook)

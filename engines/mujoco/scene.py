@@ -1,9 +1,10 @@
-"""Any scene in MuJoCo: matched, built from the scene; default, the file as it stands."""
+"""Any scene in MuJoCo: matched, built from the scene; as_is, the file as it stands."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,12 @@ from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases._arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import UNBOUNDED, Scene
 from crossbody.cases.scene_contacts import Contact
 from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Modes, Observe
-from crossbody.engines._scene import Forces
+from crossbody.engines._scene import Forces, angle_of
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.engines.mujoco._drift import Drift
@@ -39,7 +40,9 @@ HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
-    if profile != "default":
+    if profile == "default":
+        return "What MuJoCo makes of a robot file by itself is the profile as_is; default is one of the shipped cases."
+    if profile != "as_is":
         return None
     if not case.file:
         return "There is no file to run as it stands."
@@ -52,14 +55,14 @@ def why_not(case: Case, profile: str) -> str | None:
 
 def settings(case: Case, profile: str) -> dict[str, Parameter]:
     """Return the setting that says who reads the file: MuJoCo, or the project, which builds its scene."""
-    if profile != "default":
+    if profile != "as_is":
         return {}
     return {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
 
 
 def default_step(case: Case, profile: str) -> float:
     """Return the file's own step, s, or for matched a part of the fastest time constant that forces of joints have."""
-    if profile == "default":
+    if profile == "as_is":
         return float(_from_file(case).opt.timestep)
     return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0))
 
@@ -70,18 +73,21 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = q, v
     mujoco.mj_forward(model, data)
-    M, n, forces, step = mass_matrix(model, data), model.nv, Forces(scene), 1e-6
+    M, n, step = mass_matrix(model, data), model.nv, 1e-6
     lift = step * np.eye(n)
 
-    def moved(d: Floats) -> Floats:
-        found = np.array(q)
-        mujoco.mj_integratePos(model, found, d, 1.0)
-        return found
+    def forces(d: Floats, rate: Floats) -> Floats:
+        data.qpos[:], data.qvel[:] = q, v + rate
+        mujoco.mj_integratePos(model, data.qpos, d, 1.0)
+        mujoco.mj_forward(model, data)
+        return np.array(data.qfrc_passive + data.qfrc_actuator)
 
-    K = np.array([(forces(moved(d), v) - forces(moved(-d), v)) / (2.0 * step) for d in lift]).T
-    D = np.array([(forces(q, v + d) - forces(q, v - d)) / (2.0 * step) for d in lift]).T
+    still = np.zeros(n)
+    K = np.array([(forces(d, still) - forces(-d, still)) / (2.0 * step) for d in lift]).T
+    D = np.array([(forces(still, d) - forces(still, -d)) / (2.0 * step) for d in lift]).T
     A = np.block([[np.zeros((n, n)), np.eye(n)], [np.linalg.solve(M, K), np.linalg.solve(M, D)]])
-    return max(float(np.abs(np.linalg.eigvals(A)).max()), 1.0)
+    filters = [1.0 / actuator.time_constant for actuator in scene.actuators if actuator.time_constant > 0.0]
+    return max(float(np.abs(np.linalg.eigvals(A)).max()), *filters, 1.0)
 
 
 def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared:
@@ -91,19 +97,21 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         ValueError: MuJoCo's own, for a model that it refuses.
     """
     scene = _scene(case)
-    if profile == "default":
+    if profile == "as_is":
         model = held(_from_file(case))
         model = model if reader == "file" else rebuilt(scene, model)
     else:
         model = matched(scene)
     data = mujoco.MjData(model)
     rows, acting = Rows(scene, model, data), Acting(case)
+    driver = Forces(scene) if profile == "matched" and scene.activated else None
     prepared = Prepared(
-        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting), modes=rows.modes,
-        lam=rows.lam, safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
-        observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting),
+        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting, driver),
+        modes=rows.modes, lam=rows.lam,
+        safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
+        observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
-        hook=rows.hook() if profile == "matched" else None, always=True,
+        hook=_hook(scene, rows, driver) if profile == "matched" else None, always=True,
     )  # fmt: skip
     prepared.audit = _audit(case, profile, model, rows)
     return prepared
@@ -123,7 +131,14 @@ def _from_file(case: Case) -> Any:
 
 
 def matched(scene: Scene) -> Any:
-    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no other contacts."""
+    """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no other contacts.
+
+    Controls stand for the activations of actuators that have one: MuJoCo's stages let these pass the ends of ranges.
+    """
+    scene = scene.replace(actuators=tuple(
+        replace(one, activation="", time_constant=0.0, control_range=UNBOUNDED) if one.activation else one
+        for one in scene.actuators
+    ))  # fmt: skip
     spec = spec_of(scene)
     option = spec.option
     option.integrator, option.solver = mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_NEWTON
@@ -135,17 +150,37 @@ def matched(scene: Scene) -> Any:
     return model
 
 
-def _start(case: Case, model: Any, data: Any, acting: Acting) -> Callable[[], None]:
+def _start(case: Case, model: Any, data: Any, acting: Acting, driver: Forces | None) -> Callable[[], None]:
     def start() -> None:
         acting.reset()
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = case.q0, case.v0
+        if driver is not None:
+            driver.begin(case.act0)
+        else:
+            data.act[:] = case.act0
         mujoco.mj_forward(model, data)  # the rows that are always on stand there only then
 
     return start
 
 
-def _change(scene: Scene, data: Any, acting: Acting) -> Callable[[float], None]:
+def _hook(scene: Scene, rows: Rows, driver: Forces | None) -> Hook | None:
+    """Return what MuJoCo calls in every stage: terms of rows that it leaves out, and activations at that instant."""
+    own = rows.hook()
+    if driver is None:
+        return own
+    activated = list(scene.activated)
+
+    def hook(model: Any, data: Any) -> None:
+        driver.t = data.time
+        data.ctrl[activated] = driver.driven()[activated]
+        if own is not None:
+            own(model, data)
+
+    return hook
+
+
+def _change(scene: Scene, data: Any, acting: Acting, driver: Forces | None) -> Callable[[float], None]:
     bodies = numbers(scene)
     pushed = [bodies[push.body] for push in scene.pushes]
 
@@ -154,6 +189,8 @@ def _change(scene: Scene, data: Any, acting: Acting) -> Callable[[float], None]:
             given = acting.at(t, data.qpos, data.qvel)
         controls, pushes = np.split(given, [len(scene.actuators)])
         data.ctrl[:] = controls
+        if driver is not None:
+            driver.change(given, t)
         data.xfrc_applied[:] = 0.0
         np.add.at(data.xfrc_applied[:, :3], pushed, pushes.reshape(-1, 3))
 
@@ -225,6 +262,8 @@ class Rows:
     def _place(self, j: int, kind: int, part: int) -> int:
         """Return which bound an active row is: of a joint the upper one has a falling gap, of a tendon it is nearer."""
         J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
+        if kind == LIMITS[0] and self.scene.joints[part].type == "ball":
+            return self.places[kind, part, True]
         if kind == LIMITS[0]:
             return self.places[kind, part, bool(J.sum() < 0.0)]
         (low, high), length = self.scene.tendons[part].range, self.data.ten_length[part]
@@ -232,20 +271,23 @@ class Rows:
         return self.places[kind, part, bool(off[1] < off[0])]
 
     def hook(self) -> Hook | None:
-        """Return what gives contacts and strings the part of the law that MuJoCo leaves out; None without such rows."""
-        strings = {i for i, tendon in enumerate(self.scene.tendons) if tendon.bodies}
-        if not strings and not self.touching.count:
+        """Return what gives contacts, strings and bounds of ball joints their H' v; None without such rows."""
+        joints, tendons = self.scene.joints, self.scene.tendons
+        bent = {(int(LIMITS[0]), i): i for i, joint in enumerate(joints) if joint.type == "ball" and joint.limited}
+        bent |= {(int(LIMITS[1]), i): len(joints) + i for i, tendon in enumerate(tendons) if tendon.bodies}
+        if not bent and not self.touching.count:
             return None
         drift, first = Drift(self.scene, self.model, self.touching), self.nc - self.touching.count
 
         def hook(_model: Any, data: Any) -> None:
             acting = [(j, int(data.efc_type[j]), int(data.efc_id[j])) for j in range(data.ne, data.nefc)]
-            acting = [one for one in acting if one[1] == TOUCH or (one[1] == LIMITS[1] and one[2] in strings)]
+            acting = [one for one in acting if one[1] == TOUCH or one[1:] in bent]
             if not acting:
                 return
             touched = [(j, self._touch(part) - first) for j, kind, part in acting if kind == TOUCH]
             pulled = [(j, kind, part) for j, kind, part in acting if kind != TOUCH]
-            lengths, touches = drift(data.qpos, data.qvel, [part for _, _, part in pulled], [row for _, row in touched])
+            parts, rows = [bent[kind, part] for _, kind, part in pulled], [row for _, row in touched]
+            lengths, touches = drift(data.qpos, data.qvel, parts, rows)
             for (j, _), term in zip(touched, touches, strict=True):
                 data.efc_aref[j] -= term
             for (j, kind, part), term in zip(pulled, lengths, strict=True):
@@ -266,12 +308,14 @@ class Rows:
 
         def heights(q: Floats) -> list[float]:
             h: list[float] = []
-            x_all = forces.x(q)
-            lengths = [*(x_all[forces.place[joint.name]] for joint in self.scene.joints), *data.ten_length]
-            for part, x in zip(self.scene.bounded, lengths, strict=True):
+            x = forces.x(q)
+            lengths = [float(np.linalg.norm(angle_of(q[forces.at[joint.name] :][:4]))) if joint.type == "ball"
+                       else x[forces.place[joint.name]] for joint in self.scene.joints]  # fmt: skip
+            lengths += list(data.ten_length)
+            for part, length in zip(self.scene.bounded, lengths, strict=True):
                 low, high = part.range
-                h += [x - low - part.margin] if np.isfinite(low) else []
-                h += [high - x - part.margin] if np.isfinite(high) else []
+                h += [length - low - part.margin] if np.isfinite(low) else []
+                h += [high - length - part.margin] if np.isfinite(high) else []
             return h
 
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:

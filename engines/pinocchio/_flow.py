@@ -52,8 +52,8 @@ class Flow:
         options: dict[str, Any] = {"rtol": rtol, "atol": atol, "method": method, "max_num_steps": PER_SOLVE}
         watched = WATCHED * self.rows.nc
 
-        def watch(_t: float, y: NDArray[Any], out: NDArray[Any]) -> None:  # CVODE hangs attributes on it
-            self._watch(y, out)
+        def watch(t: float, y: NDArray[Any], out: NDArray[Any]) -> None:  # CVODE hangs attributes on it
+            self._watch(t, y, out)
             out[out == 0.0] = TINY
 
         if watched:
@@ -134,6 +134,7 @@ class Flow:
 
     def _switch(self, t: float, y: Floats, fired: Fired, first: bool = False) -> Floats:
         """Record an instant, let the machine look at it, and record it again if something switched."""
+        self._tell(t)
         q, v = self._state(y)
         lam = self.rows.accelerate(q, v, self.modes)[1]
         if not first:
@@ -176,15 +177,22 @@ class Flow:
         if self.coordinates is not None:
             self.coordinates.normalise(q)
 
-    def _rhs(self, _t: float, y: NDArray[Any], yp: NDArray[Any]) -> None:
+    def _tell(self, t: float) -> None:
+        """Tell the time, s, to what depends on it."""
+        if self.world.clock is not None:
+            self.world.clock(t)
+
+    def _rhs(self, t: float, y: NDArray[Any], yp: NDArray[Any]) -> None:
         n = self.n
         self.rhs += 1
+        self._tell(t)
         self.q[:], self.v[:] = y[:n], y[n:]
         yp[:n] = self.v if self.coordinates is None else self.coordinates.rates(self.q, self.v)
         self._normalise(self.q)
         yp[n:] = self.vd = self.rows.accelerate(self.q, self.v, self.modes)[0]
 
-    def _watch(self, y: NDArray[Any], out: NDArray[Any]) -> None:
+    def _watch(self, t: float, y: NDArray[Any], out: NDArray[Any]) -> None:
+        self._tell(t)
         self.q[:], self.v[:] = y[: self.n], y[self.n :]
         self._normalise(self.q)
         self.machine.watch(self.q, self.v, self.modes, out)

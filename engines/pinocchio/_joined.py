@@ -22,6 +22,7 @@ from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian
 
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
+NEAR = (1e-8, 1e-4)  # what a row adds to the others, over the first: below it follows, above it holds by itself
 AXES = pin.LOCAL_WORLD_ALIGNED
 
 
@@ -139,6 +140,29 @@ def moved(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
     return rate + np.cross(turn, arm), own + np.cross(spin, arm) + np.cross(turn, np.cross(turn, arm))
 
 
+class Spans:
+    """Distances of two points: lengths, and their derivatives along Pinocchio's velocities.
+
+    Args:
+        model, placed: as of `Joined`.
+        tendons: those between points.
+    """
+
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
+        self.model, self.data = model, model.createData()
+        self.ends = [ends_of(placed, tendon) for tendon in tendons]
+
+    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return l (nt,) and dl/dv (nt, nv)."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        lengths, rows = np.zeros(len(self.ends)), np.zeros((len(self.ends), self.model.nv))
+        for i, (one, two) in enumerate(self.ends):
+            lengths[i], n = apart(self.data, one, two)
+            J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
+            rows[i] = n @ (J[1] - J[0])
+        return lengths, rows
+
+
 class Strings:
     """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
 
@@ -155,9 +179,7 @@ class Strings:
         self.model, self.data, self.none = model, model.createData(), np.zeros(model.nv)
         self.rows: list[tuple[float, float, End, End]] = []  # sign, bound, ends
         for tendon in tendons:
-            ends = [
-                _end(placed[body], place, UPRIGHT) for body, place in zip(tendon.bodies, tendon.positions, strict=True)
-            ]
+            ends = ends_of(placed, tendon)
             for sign, bound in zip((1.0, -1.0), tendon.range, strict=True):
                 if np.isfinite(bound):
                     self.rows.append((sign, bound + sign * tendon.margin, ends[0], ends[1]))
@@ -165,7 +187,7 @@ class Strings:
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""
         pin.forwardKinematics(self.model, self.data, q)
-        return np.array([sign * (self._along(one, two)[0] - bound) for sign, bound, one, two in self.rows])
+        return np.array([sign * (apart(self.data, one, two)[0] - bound) for sign, bound, one, two in self.rows])
 
     def jacobian(self, q: Floats) -> Floats:
         """Return H (rows, nv)."""
@@ -173,7 +195,7 @@ class Strings:
         found = []
         for sign, _, one, two in self.rows:
             J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
-            found.append(sign * self._along(one, two)[1] @ (J[1] - J[0]))
+            found.append(sign * apart(self.data, one, two)[1] @ (J[1] - J[0]))
         return np.array(found).reshape(-1, self.model.nv)
 
     def drift(self, q: Floats, v: Floats) -> Floats:
@@ -182,16 +204,23 @@ class Strings:
         found = []
         for sign, _, one, two in self.rows:
             (v1, a1), (v2, a2) = (moved(self.model, self.data, end) for end in (one, two))
-            d, n = self._along(one, two)
+            d, n = apart(self.data, one, two)
             across = (v2 - v1) - n @ (v2 - v1) * n
             found.append(sign * (n @ (a2 - a1) + across @ across / d))
         return np.array(found)
 
-    def _along(self, one: End, two: End) -> tuple[float, Floats]:
-        """Return the distance, and the direction from the first to the second."""
-        apart = at(self.data, two).translation - at(self.data, one).translation
-        d = float(np.linalg.norm(apart))
-        return d, apart / d
+
+def apart(data: Any, one: End, two: End) -> tuple[float, Floats]:
+    """Return the distance of two ends, and the direction from the first to the second."""
+    way = at(data, two).translation - at(data, one).translation
+    d = float(np.linalg.norm(way))
+    return d, way / d
+
+
+def ends_of(placed: dict[str, tuple[int, Any]], tendon: Tendon) -> tuple[End, End]:
+    """Return the ends of a tendon between points."""
+    one, two = (_end(placed[body], place, UPRIGHT) for body, place in zip(tendon.bodies, tendon.positions, strict=True))
+    return one, two
 
 
 def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:
@@ -199,19 +228,62 @@ def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:
     return End(joint, where * pose(position, orientation))
 
 
-def by_least_norm(model: Any, data: Any, tau: Floats) -> Solve:
-    """The same equations where rows may depend on each other: v' is unique, lam the least."""
+def loose_rows(A: Floats, widths: Sequence[int], rank: int) -> tuple[list[int], float]:
+    """Return which rows of loops are left out, and the singular value over the largest that counts as zero.
+
+    By Gram and Schmidt, each time the row that is longest behind those before it: what is nearly dependent is left out
+    (what follows but for rounding is not: the least norm deals with it), or all that is beyond a rank.
+
+    Args:
+        A: H M^-1/2 of the loops (rows, nv) where they are closed.
+        widths: rows of each loop; they are scaled by one length.
+        rank: how many hold; below 0 those that surely do.
+    """
+    left = np.concatenate(
+        [part / (np.linalg.norm(part, axis=1).max() or 1.0) for part in np.split(A, np.cumsum(widths)[:-1])]
+    )
+    order: list[int] = []
+    pivots: list[float] = []
+    while len(order) < len(A):
+        sizes = np.linalg.norm(left, axis=1)
+        sizes[order] = -1.0
+        order.append(int(np.argmax(sizes)))
+        pivots.append(float(sizes[order[-1]]) / (pivots[0] if pivots else 1.0))
+        way = left[order[-1]] / (sizes[order[-1]] or 1.0)
+        left = left - np.outer(left @ way, way)
+    if rank >= 0:
+        return order[rank:], min(DEPENDENT, 1e-2 * min(pivots[1:rank], default=1.0))
+    near = [row for row, pivot in zip(order[1:], pivots[1:], strict=True) if NEAR[0] <= pivot < NEAR[1]]
+    return near, DEPENDENT
+
+
+def by_least_norm(
+    model: Any, data: Any, tau: Floats, left_out: Sequence[int] = (), dependent: float = DEPENDENT
+) -> Solve:  # fmt: skip
+    """The same equations where rows may depend on each other: v' is unique, lam the least.
+
+    Args:
+        model: Pinocchio's.
+        data: its own.
+        tau: generalised forces (nv,) beside gravity and the rows.
+        left_out: rows that do not hold, among the first.
+        dependent: singular value of the rows, over the largest, that counts as zero.
+    """
 
     def solve(q: Floats, v: Floats, J: Floats, gamma: Floats) -> tuple[Floats, Floats]:
+        holds = np.ones(len(J), dtype=bool)
+        holds[list(left_out)] = False
         root = np.linalg.cholesky(mass_matrix(model, data, q))
         free = np.linalg.solve(root, tau - pin.nonLinearEffects(model, data, q, v))
-        A = np.linalg.solve(root, J.T).T
+        A = np.linalg.solve(root, J[holds].T).T
         U, s, Vt = np.linalg.svd(A, full_matrices=False)
-        kept = s > DEPENDENT * s[0]
-        missing = -gamma - A @ free
+        kept = s > dependent * s[0]
+        missing = -gamma[holds] - A @ free
         wanted = U[:, kept].T @ missing / s[kept]
         vd = np.linalg.solve(root.T, free + Vt[kept].T @ wanted)
-        return vd, U[:, kept] @ (wanted / s[kept])
+        lam = np.zeros(len(J))
+        lam[holds] = U[:, kept] @ (wanted / s[kept])
+        return vd, lam
 
     return solve
 

@@ -33,6 +33,7 @@ class World:
         instants: when the inputs change, s, increasing.
         change: (t, q, v) puts in force what acts from such an instant on.
         reset: back to the start: no input, no memory.
+        clock: is told the time of all that is asked next, s; None where nothing depends on it.
         acting: what acts on a case's scene from outside, controllers included; None elsewhere.
         safe: (q, v) -> whether the state is one that the scene can reach.
     """
@@ -40,6 +41,7 @@ class World:
     instants: Sequence[float] = ()
     change: Callable[[float, Floats, Floats], None] = _nothing
     reset: Callable[[], None] = lambda: None
+    clock: Callable[[float], None] | None = None
     acting: Acting | None = None
     safe: Callable[[Floats, Floats], bool] = _finite
 

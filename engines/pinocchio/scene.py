@@ -15,7 +15,7 @@ from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, Strings, by_least_norm, none_pulling
+from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -42,6 +42,7 @@ def build(case: Case, algebra: str) -> Prepared:
     model, placed = tree(scene)
     model.armature[:] = forces.armature
     to = Coordinates(scene)
+    forces.spans = spans(scene, model, placed, to)
     centres = at_centres(scene, forces, model, model.createData(), placed)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
@@ -77,10 +78,14 @@ def build(case: Case, algebra: str) -> Prepared:
         model, jacobian, heights, lambda q, v: drift_of(q, v, slice(None)), law=case.law, algebra=algebra, forces=apply,
         drift_of=drift_of,
     )  # fmt: skip
-    if loops or touching.count > 1:  # planar loops have rows that depend on each other, and bodies on many feet
-        pinned.solve = by_least_norm(model, pinned.data, pinned.tau)
-        pinned.shared = none_pulling
     start = to.theirs(case.q0)
+    if loops or touching.count > 1:  # planar loops have rows that depend on each other, and bodies on many feet
+        widths = [loop.width for loop in scene.loops]
+        root = np.linalg.cholesky(mass_matrix(model, pinned.data, start))
+        A = np.linalg.solve(root, jacobian(start)[: sum(widths)].T).T
+        loose = loose_rows(A, widths, case.rank) if loops else ()
+        pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
+        pinned.shared = none_pulling
     return Prepared(
         rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
         sizes=(np.ones(to.nq), np.ones(to.nv)),
@@ -88,6 +93,19 @@ def build(case: Case, algebra: str) -> Prepared:
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def spans(scene: Scene, model: Any, placed: Placed, to: Coordinates) -> Callable[[Floats, Floats], parts.Stretch]:
+    """Return what gives the lengths of tendons between points, in the scene's coordinates."""
+    measured = Spans(model, placed, [tendon for tendon in scene.tendons if tendon.bodies])
+
+    def stretch(q: Floats, v: Floats) -> parts.Stretch:
+        r = to.theirs(q)
+        lengths, rows = measured(r)
+        H = to.velocities(r, rows)
+        return lengths, H @ v, H
+
+    return stretch
 
 
 def _order(scene: Scene) -> list[int]:
@@ -184,13 +202,18 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
     def change(t: float, q: Floats, v: Floats) -> None:
         r = q.copy()
         to.normalise(r)
-        forces.change(acting.at(t, to.ours(r), to.velocities(r, v)))
+        forces.change(acting.at(t, to.ours(r), to.velocities(r, v)), t)
 
     def reset() -> None:
-        forces.still()
+        forces.begin(case.act0)
         acting.reset()
 
-    return World(instants=acting.instants, change=change, reset=reset, acting=acting)
+    def clock(t: float) -> None:
+        forces.t = t
+
+    return World(
+        instants=acting.instants, change=change, reset=reset, acting=acting, clock=clock if len(case.act0) else None
+    )  # fmt: skip
 
 
 def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:

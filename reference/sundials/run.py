@@ -17,6 +17,7 @@ import numpy as np
 
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
 from crossbody.cases._control import Control, NotFinite
+from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
@@ -101,6 +102,7 @@ class SundialsRun:
         """Run to the end; how it ended, and the wall time in s."""
         control = self.system.control
         self.controller = control.begin(self.system.inputs) if isinstance(control, Control) else None
+        self.live = Live(self.system.activations) if self.system.activations is not None else None
         began = time.perf_counter()
         self.start()
         outcome = Outcome.FINISHED
@@ -320,6 +322,8 @@ class SundialsRun:
             self.failed = f"{failure} "
             raise Ended(Outcome.NOT_FINITE) from None
         self.equations.u[: self.controller.width] = given[: self.controller.width]
+        if self.live is not None:
+            self.live.put(s.t, self.equations.u)
 
     def trajectory(self, outcome: Outcome, wall_s: float) -> Trajectory:
         """What was recorded, as a Trajectory."""

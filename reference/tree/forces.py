@@ -1,4 +1,4 @@
-"""Forces on the joints: springs, dampers, weight that is taken off, tendons and actuators."""
+"""Forces on the joints: springs, dampers, tendons and actuators; those between points come behind the poses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array
-from crossbody.reference.tree import layout
+from crossbody.reference.tree import layout, strings
 
 
 @kernels.helper
@@ -86,13 +86,38 @@ def tendon(p: Array, i: int) -> int:
     """Return where tendon i stands in p."""
     o = int(p[layout.AT_TENDON].real)
     for _ in range(i):
-        o += layout.FIRST + 3 * int(p[o + layout.COUNT].real)
+        o += layout.FIRST + 3 * abs(int(p[o + layout.COUNT].real))
     return o
 
 
 @kernels.helper
+def resisting(p: Array, o: int, x: Any, speed: Any) -> Any:
+    """Return what spring and damper of the tendon at p[o:] do against its length."""
+    return spring(p, o + layout.STIFF, slack(p, o, x)) + damper(p, o + layout.DAMP, speed)
+
+
+@kernels.helper
+def stretched(p: Array, w: Array, f: Array) -> None:
+    """Add to f (n,) what springs and dampers between points do, by the poses in w."""
+    for i in range(int(p[layout.TENDONS].real)):
+        o = tendon(p, i)
+        if p[o + layout.COUNT].real < 0.0:
+            d = strings.between(p, o + layout.FIRST, w)[0]
+            strings.along(p, o + layout.FIRST, w, -resisting(p, o, d[0], d[1]), f)
+
+
+@kernels.helper
+def measured(q: Array, v: Array, p: Array, w: Array, o: int) -> tuple[Any, Any]:
+    """Return length and rate of the tendon at p[o:], by the poses in w if it is one between points."""
+    if p[o + layout.COUNT].real < 0.0:
+        d = strings.between(p, o + layout.FIRST, w)[0]
+        return d[0], d[1]
+    return length(q, p, o), rate(v, p, o)
+
+
+@kernels.helper
 def passive(q: Array, v: Array, p: Array, f: Array) -> None:
-    """Fill f (n,) with what springs and dampers do."""
+    """Fill f (n,) with what springs and dampers do, but those between points."""
     at_dof, at_node = int(p[layout.AT_DOF].real), int(p[layout.AT_NODE].real)
     for j in range(int(p[layout.DOFS].real)):
         f[j] = -damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
@@ -113,8 +138,8 @@ def passive(q: Array, v: Array, p: Array, f: Array) -> None:
         f[j], f[j + 1], f[j + 2] = f[j] - stiffness * x, f[j + 1] - stiffness * y, f[j + 2] - stiffness * z
     for i in range(int(p[layout.TENDONS].real)):
         o = tendon(p, i)
-        force = spring(p, o + layout.STIFF, slack(p, o, length(q, p, o))) + damper(p, o + layout.DAMP, rate(v, p, o))
-        pull(p, o, -force, f)
+        if p[o + layout.COUNT].real > 0.0:
+            pull(p, o, -resisting(p, o, length(q, p, o), rate(v, p, o)), f)
 
 
 @kernels.helper
@@ -126,15 +151,19 @@ def pull(p: Array, o: int, force: Any, f: Array) -> None:
 
 
 @kernels.helper
-def actuated(q: Array, v: Array, u: Array, p: Array, sums: Array) -> None:
-    """Add the actuators' forces to sums (n,), each within its own bounds."""
+def actuated(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, sums: Array) -> None:
+    """Add the actuators' forces to sums (n,), each within its own bounds; w holds poses if one acts between points."""
     for i in range(int(p[layout.ACTUATORS].real)):
         o = int(p[layout.AT_ACTUATOR].real) + layout.ACTUATOR * i
-        which = int(p[o + layout.WHICH].real)
+        which, a = int(p[o + layout.WHICH].real), activation(t, u, p, o, i)
         if p[o + layout.TARGET].real == layout.ON_TENDON:
             at = tendon(p, which)
-            force = actuator(p, o, u[i], p[o + layout.GEAR] * length(q, p, at), p[o + layout.GEAR] * rate(v, p, at))
-            pull(p, at, p[o + layout.GEAR] * force, sums)
+            x, speed = measured(q, v, p, w, at)
+            force = p[o + layout.GEAR] * actuator(p, o, a, p[o + layout.GEAR] * x, p[o + layout.GEAR] * speed)
+            if p[at + layout.COUNT].real < 0.0:
+                strings.along(p, at + layout.FIRST, w, force, sums)
+            else:
+                pull(p, at, force, sums)
             continue
         width, speed = 0, 0.0 * v[0]
         for k in range(6):
@@ -142,15 +171,27 @@ def actuated(q: Array, v: Array, u: Array, p: Array, sums: Array) -> None:
                 speed += p[o + layout.GEAR + k] * v[which + k]
                 width = k + 1
         x = p[o + layout.GEAR] * q[int(p[o + layout.ANGLE].real)] if width == 1 else 0.0 * speed
-        force = actuator(p, o, u[i], x, speed)
+        force = actuator(p, o, a, x, speed)
         for k in range(width):
             sums[which + k] += p[o + layout.GEAR + k] * force
 
 
 @kernels.helper
-def actuator(p: Array, o: int, u: Any, x: Any, speed: Any) -> Any:
-    """Return the force of the actuator at p[o:] at a length and its rate."""
-    u = clamped(u, p[o + layout.CONTROL], p[o + layout.CONTROL + 1])
+def activation(t: float, u: Array, p: Array, o: int, i: int) -> Any:
+    """Return what drives actuator i at p[o:]: its control, or the activation that follows it from an instant on."""
+    c = clamped(u[i], p[o + layout.CONTROL], p[o + layout.CONTROL + 1])
+    kind = p[o + layout.ACTIVATION].real
+    if kind == layout.DIRECT:
+        return c
+    k = int(p[o + layout.SINCE].real)
+    since, a = t - u[k], u[k + 1]
+    a = a + c * since if kind == layout.INTEGRATOR else c + (a - c) * np.exp(-since / p[o + layout.TAU])
+    return clamped(a, p[o + layout.SPAN], p[o + layout.SPAN + 1])
+
+
+@kernels.helper
+def actuator(p: Array, o: int, a: Any, x: Any, speed: Any) -> Any:
+    """Return the force of the actuator at p[o:] at a length and its rate, driven by a."""
     gain = p[o + layout.GAIN] + p[o + layout.GAIN + 1] * x + p[o + layout.GAIN + 2] * speed
-    force = gain * u + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
+    force = gain * a + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
     return clamped(force, p[o + layout.FORCE], p[o + layout.FORCE + 1])

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 FREE, BALL, SLIDE, HINGE = range(4)
 
-# Head of the table: sizes, gravity, where each part begins, the potential energy of what never moves, and how many
-# rows need the poses of bodies.
+# Head of the table: sizes, gravity, where each part begins, the potential energy of what never moves, how many rows
+# need the poses of bodies, and along how many tendons between two points something acts.
 NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, AT_PAIR = (
     0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13,
 )  # fmt: skip
-RESTING, POSED, PUSHES, AT_PUSH, HEAD = 14, 15, 16, 17, 18
+RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, HEAD = 14, 15, 16, 17, 18, 19, 20
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (
@@ -17,16 +17,21 @@ TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIF
 )  # fmt: skip
 # A degree of freedom: the one before it on the way to the world, armature, damping, bounds of its actuators' sum.
 BEFORE, ARMATURE, DAMPING, FORCE_LOW, FORCE_HIGH, DOF = 0, 1, 2, 5, 6, 7
-# An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds.
-TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTUATOR = 0, 1, 2, 3, 9, 12, 15, 17, 19
+# An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds; of its
+# activation what it is, its time constant and bounds, and where in u the instant and the value stand that it goes from.
+TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTIVATION, TAU, SPAN, SINCE, ACTUATOR = (
+    0, 1, 2, 3, 9, 12, 15, 17, 19, 20, 21, 23, 24,
+)  # fmt: skip
 ON_JOINT, ON_TENDON = 0, 1
+DIRECT, INTEGRATOR, FILTER = range(3)
 # A push: the node that it acts on, and where in its frame.
 PUSHED, PUSH = 0, 4
-# A tendon: its spring, damper and bounds; then joint by joint the coordinate, the velocity and the coefficient.
-COUNT, STIFF, DAMP, BAND, FIRST = 0, 1, 4, 7, 9
+# A tendon: its spring, damper and bounds; then joint by joint the coordinate, the velocity and the coefficient. One
+# between two points has -3 joints, and in their room a node and a point in its frame, twice.
+COUNT, STIFF, DAMP, BAND, FIRST, POINTS = 0, 1, 4, 7, 9, -3
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
-LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING = range(8)
+LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING, BALL_LIMIT = range(9)
 LED, LEADS, POLYNOMIAL = 1, 4, 7  # of a coupling: coordinate and velocity, or tendon; where it rests; coefficients
 OF_POSES = (CONNECT, CONTACT, TURN, STRING)
 

@@ -11,7 +11,7 @@ from crossbody.reference._kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.pairs.rows import gradient, touch
-from crossbody.reference.tree import forces, layout, loops, strings, sweeps
+from crossbody.reference.tree import balls, forces, layout, loops, strings, sweeps
 from crossbody.reference.tree.points import point, pull
 
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
@@ -37,15 +37,17 @@ def _pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
 def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Array, w: Array) -> None:
     """M by composite inertias; f = springs, dampers, actuators less the bias."""
     forces.passive(q, v, p, f)
+    sweeps.outwards(q, v, p, w)
     if len(u) > 0:
         n, at_dof = len(f), int(p[layout.AT_DOF].real)
         sums = w[len(w) - n :]
         sums[:] = 0.0
-        forces.actuated(q, v, u, p, sums)
+        forces.actuated(t, q, v, u, p, w, sums)
         for j in range(n):
             o = at_dof + layout.DOF * j
             f[j] += forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
-    sweeps.outwards(q, v, p, w)
+    if p[layout.SPANNED].real > 0.0:
+        forces.stretched(p, w, f)
     sweeps.inwards(p, w, M, f)
     for i in range(int(p[layout.PUSHES].real)):
         node, x, force = _pushed(u, p, w, i)
@@ -83,12 +85,14 @@ def _along(p: Array, kind: int, o: int, slope: Any, H: Array) -> None:
 
 
 @kernels.helper
-def _row(q: Array, v: Array, p: Array, i: int) -> tuple[Any, Any, Any]:
+def _row(q: Array, v: Array, p: Array, i: int) -> Any:
     """Return gap, rate and H' v of row i."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     kind = int(p[o].real)
     if kind == layout.LIMIT:
         return p[o + 1] * (q[int(p[o + 2].real)] - p[o + 4]), p[o + 1] * v[int(p[o + 3].real)], 0.0 * v[0]
+    if kind == layout.BALL_LIMIT:
+        return balls.bound(q, v, p, o)
     if kind == layout.TENDON_LIMIT:
         at = forces.tendon(p, int(p[o + 2].real))
         return p[o + 1] * (forces.length(q, p, at) - p[o + 3]), p[o + 1] * forces.rate(v, p, at), 0.0 * v[0]
@@ -105,6 +109,8 @@ def _gradient(q: Array, v: Array, p: Array, i: int, H: Array) -> None:
     kind = int(p[o].real)
     if kind == layout.LIMIT:
         H[int(p[o + 3].real)] = p[o + 1]
+    elif kind == layout.BALL_LIMIT:
+        balls.bound_columns(q, p, o, H)
     elif kind == layout.TENDON_LIMIT:
         forces.pull(p, forces.tendon(p, int(p[o + 2].real)), p[o + 1] + 0.0 * q[0], H)
     else:
@@ -202,7 +208,7 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
         kinetic += p[int(p[layout.AT_DOF].real) + layout.DOF * j + layout.ARMATURE] * v[j] * v[j]
     for i in range(int(p[layout.TENDONS].real)):
         o = forces.tendon(p, i)
-        potential += forces.stored(p, o + layout.STIFF, forces.slack(p, o, forces.length(q, p, o)))
+        potential += forces.stored(p, o + layout.STIFF, forces.slack(p, o, forces.measured(q, v, p, w, o)[0]))
     e[0], e[1] = 0.5 * kinetic, potential
 
 
@@ -211,9 +217,11 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
     """Of the actuators and pushes, and what dampers take."""
     n, at_dof = len(v), int(p[layout.AT_DOF].real)
     given, taken = 0.0 * v[0], 0.0 * v[0]
+    posed = p[layout.PUSHES].real > 0.0 or p[layout.SPANNED].real > 0.0
+    w = _posed(q, v, p) if posed else np.empty(0, dtype=q.dtype)
     if len(u) > 0:
         sums = np.zeros(n, dtype=q.dtype)
-        forces.actuated(q, v, u, p, sums)
+        forces.actuated(t, q, v, u, p, w, sums)
         for j in range(n):
             o = at_dof + layout.DOF * j
             given += v[j] * forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
@@ -221,13 +229,12 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         taken += v[j] * forces.damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
     for i in range(int(p[layout.TENDONS].real)):
         o = forces.tendon(p, i)
-        speed = forces.rate(v, p, o)
-        taken += speed * forces.damper(p, o + layout.DAMP, speed)
-    if p[layout.PUSHES].real > 0.0:
-        w = _posed(q, v, p)
-        for i in range(int(p[layout.PUSHES].real)):
-            _, x, force = _pushed(u, p, w, i)
-            given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]
+        if p[o + layout.COUNT].real > 0.0 or p[layout.SPANNED].real > 0.0:
+            speed = forces.measured(q, v, p, w, o)[1]
+            taken += speed * forces.damper(p, o + layout.DAMP, speed)
+    for i in range(int(p[layout.PUSHES].real)):
+        _, x, force = _pushed(u, p, w, i)
+        given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]
     e[0], e[1] = given, taken
 
 

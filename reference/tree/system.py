@@ -9,15 +9,32 @@ import numpy as np
 
 from crossbody.cases import Law
 from crossbody.cases._control import Control
+from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
+from crossbody.reference._activations import Activations
 from crossbody.reference._kinds import Floats
-from crossbody.reference._redundant import redundant
+from crossbody.reference._redundant import ranked
+from crossbody.reference.tree import balls
 from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import tabulate
 
 
-def system(scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None) -> System:
+def activations(scene: Scene, act0: Floats | None) -> Activations:
+    """Return the activations of a scene's actuators, which start at act0 (na,), or at 0."""
+    parts = [scene.actuators[i] for i in scene.activated]
+    return Activations(
+        driven=np.array(scene.activated, dtype=np.int64), tau=np.array([part.time_constant for part in parts]),
+        control=np.array([part.control_range for part in parts]),
+        span=np.array([part.activation_range for part in parts]),
+        start=np.zeros(len(parts)) if act0 is None else np.array(act0),
+    )  # fmt: skip
+
+
+def system(
+    scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None, act0: Floats | None = None,
+    rank: int = -1,
+) -> System:  # fmt: skip
     """Return the equations of a scene; nothing is compiled for it.
 
     Args:
@@ -26,20 +43,40 @@ def system(scene: Scene, law: Law, q0: Floats | None = None, control: Control | 
         q0: an assembled start (nq,), at which rows of loops that follow from others are found and left out; without it
             none is.
         control: of the user's own, which gives the controls.
+        act0: activations (na,) at the start; 0 if not given.
+        rank: how many rows of loops hold; below 0 those whose pivot is above 1e-4 of the first.
 
     Raises:
-        SceneError: for a scene that the kernels cannot do.
+        SceneError: for a scene that the kernels cannot do, or a rank that the rows do not have.
     """
     table = tabulate(scene)
-    turning = {"velocity": velocity, "quaternions": table.quaternions} if table.quaternions else {}
+    turning: dict[str, Any] = {}
+    if table.quaternions:
+        turning = {"velocity": velocity, "quaternions": table.quaternions}
+    if table.sides:
+        turning |= {
+            "watch": balls.watch,
+            "switch": balls.switch,
+            "guards": table.sides,
+            "discrete": np.zeros(table.sides),
+        }
     fields: dict[str, Any] = dict(
-        n=scene.nv, nq=scene.nq, parameters=table.p, **turning,
+        n=scene.nv, nq=scene.nq, parameters=table.p[: len(table.p) - table.sides], **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
-        inputs=len(scene.inputs), scratch=table.scratch, control=control, **KERNELS,
+        inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
+        activations=activations(scene, act0) if scene.activated else None, **KERNELS,
     )  # fmt: skip
     whole = System(**fields)
     if q0 is None or not scene.loops:
         return whole
     ends = np.cumsum([0, *(loop.width for loop in scene.loops)]).tolist()
-    left_out = redundant(whole, q0, [range(a, b) for a, b in pairwise(ends)])
-    return System(**fields, redundant=left_out) if left_out else whole
+    found = ranked(whole, q0, [range(a, b) for a, b in pairwise(ends)])
+    count = found.held(rank)
+    finding = found.finding(count, rows_of(scene)[0])
+    out = sorted(zip(found.order[count:], found.pivots[count:], strict=True))
+    if not out and not finding:
+        return whole
+    return System(
+        **fields, redundant=[row for row, _ in out], loose=[pivot for _, pivot in out],
+        findings=(finding,) if finding else (),
+    )  # fmt: skip

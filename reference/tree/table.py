@@ -69,7 +69,7 @@ class Table:
     """A scene for the kernels.
 
     Attributes:
-        p: the parameters of the kernels.
+        p: the parameters of the kernels, `sides` discrete variables at their end.
         places: body -> where it stands.
         nodes: number of nodes.
         dofs: joint -> its first velocity.
@@ -81,6 +81,7 @@ class Table:
     nodes: int
     dofs: dict[str, int]
     coordinates: dict[str, int]
+    sides: int
 
     @property
     def quaternions(self) -> list[int]:
@@ -136,6 +137,7 @@ class _Builder:
         self.dofs: dict[str, int] = {}
         self.nq = 0
         self.resting = 0.0
+        self.sides = 0
 
     def table(self) -> Table:
         for body in self.scene.bodies:
@@ -143,8 +145,9 @@ class _Builder:
         for row, inertia in zip(self.rows, self.inertias, strict=True):
             row[layout.MASS : layout.STIFFNESS] = inertia.row()
         return Table(
-            p=self._packed(), places=self.places, nodes=len(self.rows), dofs=self.dofs, coordinates=self.coordinates
-        )
+            p=self._packed(), places=self.places, nodes=len(self.rows), dofs=self.dofs, coordinates=self.coordinates,
+            sides=self.sides,
+        )  # fmt: skip
 
     def _place(self, body: Body) -> None:
         """Hang a body on its parent: a node for each of its joints, none if it has none."""
@@ -206,11 +209,13 @@ class _Builder:
         head[layout.POSED] = sum(row[layout.KIND] in layout.OF_POSES for row in rows)
         pushes = [self._push(push) for push in scene.pushes]
         head[layout.PUSHES] = len(pushes)
-        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places), pushes]
+        head[layout.SPANNED] = sum(scene.acts_along(tendon) for tendon in scene.tendons if tendon.bodies)
+        sides = [np.zeros(self.sides)]
+        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places), pushes, sides]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[
             layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR,
-            layout.AT_PUSH,
+            layout.AT_PUSH, layout.AT_SIDE,
         ]] = starts[:-1]  # fmt: skip
         packed = np.concatenate([head, *(row for part in parts for row in part)])
         finite: Floats = np.clip(packed, -1e300, 1e300)
@@ -248,8 +253,8 @@ class _Builder:
             row[[layout.TARGET, layout.WHICH, layout.ANGLE]] = layout.ON_JOINT, dof, self.coordinates[joint.name]
             row[layout.GEAR : layout.GEAR + width] = actuator.gear[:width]
             for k in range(width):
-                self.dof_rows[dof + k][layout.ARMATURE] += actuator.gear[k] ** 2 * actuator.armature
-                self.dof_rows[dof + k][layout.DAMPING] += actuator.gear[k] ** 2 * actuator.damping
+                self.dof_rows[dof + k][layout.ARMATURE] += actuator.gear[0] ** 2 * actuator.armature
+                self.dof_rows[dof + k][layout.DAMPING] += actuator.gear[0] ** 2 * actuator.damping
         else:
             raise SceneError(f"Actuator {actuator.name!r} acts on neither a joint nor a tendon.")
         row[layout.GAIN : layout.GAIN + 3], row[layout.BIAS : layout.BIAS + 3] = actuator.gain, actuator.bias
@@ -257,15 +262,28 @@ class _Builder:
             actuator.control_range,
             actuator.force_range,
         )
+        if actuator.activation:
+            kind = ("integrator", "filter").index(actuator.activation) + layout.INTEGRATOR
+            place = [self.scene.actuators[i].name for i in self.scene.activated].index(actuator.name)
+            row[layout.ACTIVATION : layout.SINCE + 1] = (
+                kind, actuator.time_constant, *actuator.activation_range, len(self.scene.inputs) + 2 * place,
+            )  # fmt: skip
         return row
 
     def _tendon(self, tendon: Tendon) -> Floats:
+        b0, *others = tendon.damping
+        b0 += sum(a.gear[0] ** 2 * a.damping for a in self.scene.actuators if a.tendon == tendon.name)
+        if tendon.bodies:
+            ends = [self.placed(*end) for end in zip(tendon.bodies, tendon.positions, strict=True)]
+            return np.array([
+                layout.POINTS, *tendon.stiffness, b0, *others, *tendon.rest, *ends[0], *ends[1], 0.0,
+            ])  # fmt: skip
         steps = [
             (self.coordinates[name], self.dofs[name], c)
             for name, c in zip(tendon.joints, tendon.coefficients, strict=True)
         ]
         return np.array([
-            len(steps), *tendon.stiffness, *tendon.damping, *tendon.rest, *np.ravel(steps),
+            len(steps), *tendon.stiffness, b0, *others, *tendon.rest, *np.ravel(steps),
         ])  # fmt: skip
 
 
@@ -336,11 +354,12 @@ def _row(kind: int, *numbers: float) -> Floats:
 
 
 def _limit(joint: Joint, builder: _Builder, sign: float) -> Floats:
-    if joint.type not in ("hinge", "slide"):
-        raise SceneError(f"Joint {joint.name!r}: bounds of a {joint.type} joint are not done.")
-    bound = joint.range[0 if sign > 0 else 1]
+    bound = joint.range[0 if sign > 0 else 1] + sign * joint.margin
     place = builder.coordinates[joint.name], builder.dofs[joint.name]
-    return _row(layout.LIMIT, sign, *place, bound + sign * joint.margin)
+    if joint.type == "ball":
+        builder.sides += 1
+        return _row(layout.BALL_LIMIT, *place, bound, builder.sides - 1)
+    return _row(layout.LIMIT, sign, *place, bound)
 
 
 def _followed(loop: Loop, name: str, builder: _Builder) -> tuple[float, float, float]:

@@ -1,7 +1,8 @@
 """Equilibria of a case, each in a mode set, with the linear model there (spec 2.7).
 
 The model at a place is minimal: rows that are held stay held, unless their law is what is looked at (a ball in contact,
-soft fingers). A mechanism without a list of places is looked at where its run passes: in every mode set that it visits.
+soft fingers). What acts from outside on a scene is held at what it is there. A mechanism without a list of places is
+looked at where its run passes: in every mode set that it visits.
 """
 
 from __future__ import annotations
@@ -100,7 +101,8 @@ def _place(
     inputs: Sequence[int] = (), system: System | None = None,
 ) -> Place:  # fmt: skip
     made = build(case) if system is None else system
-    found = trim(made, case.q0 if q is None else q, v, active=active, free=free, rates=rates, inputs=inputs, t=t)
+    u = case.inputs.at(t) if case.scene is not None and case.inputs is not None else None
+    found = trim(made, case.q0 if q is None else q, v, u, active=active, free=free, rates=rates, inputs=inputs, t=t)
     model = None
     if found.outcome.ok:
         names = [coordinate.name for coordinate in case.velocities]

@@ -24,7 +24,7 @@ from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
 from crossbody.reports.judging.truth import Truth
 from crossbody.reports.runs import watch
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.jobs import Pick, of_case
 
 COLUMNS = (
     "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "touches",
@@ -69,7 +69,7 @@ def _rungs(
     case: Case, picks: Sequence[Pick], effort: Effort, tell: Callable[[str], None], limit: float
 ) -> Iterator[Rung]:
     truths = Truths(case)
-    for pick in picks:
+    for pick in (of_case(one, case) for one in picks):
         label = f"{case.label}: {pick.engine}:{pick.profile}"
         tell(label)
         watch.limited(label, limit)

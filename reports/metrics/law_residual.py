@@ -68,6 +68,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
     told = np.asarray(closed.any(axis=1))
     inputs = case.inputs if run.inputs is None else run.inputs
+    if system.activations is not None and inputs is not None:
+        inputs = system.activations.extended(inputs)
     if inputs is not None:  # where they jump, a sample does not say on which side it stands
         told &= ~np.isin(run.t, inputs.times)
     worst, scale = 0.0, 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -46,11 +46,18 @@ READER = "reader"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pick:
-    """One engine under one profile, or the sentence that says why it cannot be had."""
+    """One engine under one profile, or the sentence that says why it cannot be had.
+
+    Attributes:
+        engine, profile: who.
+        skipped: why it cannot be had; empty if it can.
+        every: whether it is one of all profiles, so that another may stand for it (`of_case`).
+    """
 
     engine: str
     profile: str
     skipped: str = ""
+    every: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,8 +111,18 @@ def _profiles(name: str, profile: str | None) -> Iterator[Pick]:
         return
     if profile is not None and profile not in engine.profiles:
         raise UnknownName(f"profile of {name}", profile, engine.profiles)
+    others = getattr(engine, "of_scenes", {}).values()
     for each in engine.profiles if profile is None else (profile,):
-        yield Pick(engine=name, profile=each)
+        if profile is not None or each not in others:
+            yield Pick(engine=name, profile=each, every=profile is None)
+
+
+def of_case(pick: Pick, case: Case) -> Pick:
+    """Return a pick, or for one of all profiles the one that stands for it where the case is a scene."""
+    if not pick.every or pick.skipped or case.scene is None:
+        return pick
+    others: Mapping[str, str] = getattr(engines.load(pick.engine), "of_scenes", {})
+    return replace(pick, profile=others.get(pick.profile, pick.profile))
 
 
 def load_cases(names: Sequence[str], variant: str | None, overrides: Mapping[str, Value]) -> tuple[Case, ...]:
@@ -152,7 +169,7 @@ def run_case(
     truth = truth_of(case) if truth is None else truth
     reference = _reference_audit(case)
     entries = []
-    for pick in wanted:
+    for pick in (of_case(one, case) for one in wanted):
         label = f"{case.label}: {pick.engine}:{pick.profile}"
         tell(label)
         watch.limited(label, limit)
