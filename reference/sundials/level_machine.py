@@ -225,8 +225,9 @@ class LevelMachine:
         def presses() -> bool:
             return self._presses(i, h, t, q, v)
 
-        if mode in ACTIVE:
-            return self._released(i, h) if view.lam[i] < -view.noise[i] else mode
+        if mode in ACTIVE:  # of rows that share a load `share` tells which let go
+            pulls = self.sharing is None and view.lam[i] < -view.noise[i]
+            return self._released(i, h) if pulls else mode
         if not self._touches(i, h, q) or (h > 0.0 and mode != Mode.FREE):
             return Mode.FREE
         if closing and i in self.frozen:

@@ -23,6 +23,7 @@ from crossbody.reference.sundials.equations import ULP, Ended, Equations
 Flags = NDArray[np.bool_]
 RANK = 1e-5  # singular value of the rows, scaled to length one, over the largest, that counts as zero
 NOTHING = 1e-9  # part of the largest multiplier below which a row carries nothing
+PULL = 1e-12  # part of the largest multiplier below which one that is negative is rounding
 CONSISTENT = 1e-9  # part of its terms by which a row may be off its law
 STATE = 64.0 * ULP
 
@@ -124,6 +125,11 @@ def share(
     carrying = _carrying(at, y, one_sided, every, spent, span)
     if carrying is None:
         return Sharing([], nothing, [i for i in every if i in spent])
+    raw = at.A[carrying] * at.length[carrying, None]
+    lam = np.linalg.lstsq(raw.T, y - at.free, rcond=RANK)[0]
+    pulling = [every[k] for k, x in zip(carrying, lam, strict=True) if one_sided[k] and x < -PULL * np.abs(lam).max()]
+    if pulling:  # a row that nothing presses, and that the others need to be held
+        return Sharing([], nothing, pulling)
     order = qr(at.A[carrying].T, mode="r", pivoting=True)[-1][:span]
     basis = sorted(carrying[k] for k in order)
     lengths = at.length[:, None] / at.length[basis]
