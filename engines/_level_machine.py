@@ -30,6 +30,8 @@ COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 GAP, PUSH, SPENT = 0, 1, 2
 """The functions watched of a row: touch or leave; turn, release or catch; hand-over."""
 SLOW, DEEP, EPS = 1e-9, 1e-9, 0.01
+UNMOVED = 1e-24
+"""Of the largest diagonal entry of H M^-1 H^T: the rate of a row which no motion moves is rounding, and has no dips."""
 
 
 @dataclass(slots=True)
@@ -54,6 +56,7 @@ class LevelMachine:
         self.own = switched(rows)
         self.slow = 0.0
         self._closed: set[int] = set()
+        self._unmoved: set[int] = set()
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
         """FREE: h and h' (whose zero is where a dip is deepest); active: lam; BALLISTIC: -h, and the catch."""
@@ -65,7 +68,7 @@ class LevelMachine:
             mode, at = modes[i], WATCHED * i
             if mode == FREE:
                 out[at + GAP] = max(h[i], hd[i] + self.slow) if i in self._closed else h[i]
-                out[at + PUSH] = hd[i] + self.slow  # not the rounding of a row that no motion moves
+                out[at + PUSH] = 1.0 if i in self._unmoved else hd[i]
             elif mode in ACTIVE and lam is not None:
                 out[at + PUSH] = lam[i]
                 out[at + SPENT] = self._left(q, v, modes, lam, i) if mode == COLLISION else 1.0
@@ -119,6 +122,7 @@ class LevelMachine:
         vd, lam = self.rows.accelerate(q, v, modes)
         press, noise = self.rows.pressure(q, v, vd)
         G = np.diag(self.rows.delassus(q))
+        self._unmoved = set(np.flatnonzero(UNMOVED * G.max(initial=0.0) >= G).tolist())
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
         return View(h, hd, lam, allowed, press > noise)
 

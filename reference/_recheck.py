@@ -31,6 +31,7 @@ from crossbody.reference.sundials.compiled.evaluation import Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 from crossbody.reference.sundials.evaluator import Evaluator
 from crossbody.reference.sundials.level_machine import DEEP, Guard, Term
+from crossbody.reference.sundials.sharing import share
 
 UNDECIDED = 10.0  # times rtol: a pass closer than that is neither a touch nor none
 CLOSING = 1e-6  # part of the largest rate of a row from which on its gap closes
@@ -185,6 +186,13 @@ class _Recheck:
         discrete = self._discrete()[first]
         e.p[len(e.p) - len(discrete) :] = discrete
         e.activate(modes)
+        contact = [i for i in self.rows if modes[i] in ACTIVE]
+        if len(contact) > 1 and not self.frozen:
+            always = [i for i in e.active if i not in contact]
+            found = share(e, run.t[first], run.q[first], run.v[first], contact, always, ())
+            if found is not None and not found.lifted:
+                e.activate(modes, {*e.active}.difference(found.basis))
+                e.spread = found.spread
         guards = [self._terms(i, Mode(modes[i])) for i in self.rows]
         self.looks.begin(guards, self.frozen)
         y = np.hstack([run.q, run.v])
@@ -232,6 +240,9 @@ class _Recheck:
         """What the tolerance leaves open in a multiplier, N: as rounding does, but by errors of the motion."""
         e, run = self.equations, self.run
         active = e.active
+        if e.spread is not None:  # rows that share a load share their noise
+            most = float(e.noise(run.t[row], run.q[row].copy(), run.v[row].copy())[0].max())
+            return UNDECIDED * self.rtol / (8.0 * ULP) * most
         modes = [*run.mode[row].tolist()]
         if i not in active:
             modes[i] = Mode.CONTACT if i in self.frozen or not e.has_fast[i] else Mode.COLLISION

@@ -116,7 +116,8 @@ def watched(system: System, run: Trajectory) -> Trajectory:
             return replace(run, outcome=Outcome.INCONSISTENT, message=message)
     lam = np.array(run.lam)
     lam[:, left_out] = np.nan
-    return replace(run, lam=lam, counts={**run.counts, "redundant": len(left_out)}, message=_told(system, run))
+    count = len(left_out) + run.counts.get("redundant", 0)
+    return replace(run, lam=lam, counts={**run.counts, "redundant": count}, message=_told(system, run))
 
 
 def _told(system: System, run: Trajectory) -> str:

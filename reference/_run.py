@@ -226,7 +226,9 @@ class CompiledRun:
             events=self._event_list(), switches=self._switch_list(), outcome=outcome, message=self._message(outcome),
             steps=int(state["steps"]), wall_s=wall_s,
             counts=MappingProxyType(
-                {name: int(state[name]) for name in _COUNTERS} | {"events": int(state["events"] + state["dropped"])}
+                {name: int(state[name]) for name in _COUNTERS}
+                | {"events": int(state["events"] + state["dropped"])}
+                | ({"redundant": int(state["redundant"])} if state["redundant"] else {})
             ),
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
             if self.nz

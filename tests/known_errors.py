@@ -130,9 +130,14 @@ def of_each(signal: str) -> Scale:
     return lambda run: np.abs(getattr(run, signal)).max(axis=0)
 
 
-def energies(run: Trajectory) -> np.ndarray:
+def kinetic(run: Trajectory) -> np.ndarray:
     """The largest kinetic energy."""
     return run.energy[:, 0].max()
+
+
+def energies(run: Trajectory) -> np.ndarray:
+    """The largest kinetic energy, or the swing of the potential."""
+    return max(run.energy[:, 0].max(), np.ptp(run.energy[:, 1]))
 
 
 def moving(signal: str) -> Callable[[Scene], Sequence[int]]:
@@ -186,13 +191,13 @@ def given(s: Scene) -> tuple[Trajectory, float]:
     assert s.run.ledger is not None
     k, row = s.sample(), s.one(np.flatnonzero(s.case.law.unilateral))
     before = float(s.run.ledger.contact[k, s.case.law.unilateral].sum())
-    return booked(s.run, "contact", (k, row), OFF * float(energies(s.run)) - before), OFF
+    return booked(s.run, "contact", (k, row), OFF * float(kinetic(s.run)) - before), OFF
 
 
 def switched(s: Scene) -> tuple[Trajectory, float]:
     """Work at the end that no switch has made."""
     at = (-1, s.one(range(s.run.gap.shape[1])))
-    return booked(s.run, "contact", at, s.sign() * OFF * float(energies(s.run))), OFF
+    return booked(s.run, "contact", at, s.sign() * OFF * float(kinetic(s.run))), OFF
 
 
 def closed(s: Scene, shut: bool = True) -> tuple[int, int]:

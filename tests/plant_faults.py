@@ -3,11 +3,13 @@
     python tests/plant_faults.py                     all faults of faults.toml, with what has been seen before left out
     python tests/plant_faults.py --jobs 2 --only lam those whose name has "lam", two at a time
     python tests/plant_faults.py --quick             those that cost little: the sample that the gate takes
+    python tests/plant_faults.py --faults mine.toml  those of a list of one's own, written as faults.toml is
 
 A fault is a change of the text of one file. It is seen by `run` if `crossbody run` with those arguments says that a
-number is outside (exit code 1), and by `test` if pytest fails there. Both must pass on the sources as they are: each is
-asked once without a fault. What was seen is kept in `--kept`, by a digest of all sources, so that a run that was
-interrupted goes on; the exit code is 1 if fewer were seen than `RUN_SEES` and `ALL_SEE` ask for.
+number is outside (exit code 1), and by `test`, which is asked where `run` sees nothing, if pytest fails there. What
+sees a fault must pass on the sources as they are: it is asked once without any. What was seen is kept in `--kept`, by
+a digest of all sources, so that a run that was interrupted goes on; the exit code is 1 if fewer were seen than
+`RUN_SEES` and `ALL_SEE` ask for.
 """
 
 from __future__ import annotations
@@ -64,9 +66,9 @@ class Fault:
         return tuple((kind, said) for kind, said in (("run", self.run), ("test", self.test)) if said)
 
 
-def faults() -> tuple[Fault, ...]:
-    """Every fault of the table."""
-    return tuple(Fault(**fault) for fault in tomllib.loads(FAULTS.read_text(encoding="utf-8"))["fault"])
+def faults(table: Path = FAULTS) -> tuple[Fault, ...]:
+    """Every fault of a table."""
+    return tuple(Fault(**fault) for fault in tomllib.loads(table.read_text(encoding="utf-8"))["fault"])
 
 
 class Tree:
@@ -156,18 +158,24 @@ class Kept:
 
 
 def seen(tree: Tree, fault: Fault, kept: Kept) -> dict[str, bool]:
-    """Whether each of the checks that a fault names fails with it, and without it passes.
-
-    A fault that ends a check in a third way is seen: nobody takes that for a pass.
-    """
-    found = {kind: not failing(tree, (kind, arguments), kept) for kind, arguments in fault.checks}
-    with tree.planted(fault):
-        for kind, arguments in fault.checks:
-            try:
-                found[kind] = found[kind] and tree.fails(kind, arguments)
-            except (ValueError, subprocess.TimeoutExpired) as error:
-                print(f"{fault.name}: {error}", file=sys.stderr)
+    """Whether the checks that a fault names fail with it, and without it pass, up to the first that does."""
+    found: dict[str, bool] = {}
+    for kind, arguments in fault.checks:
+        with tree.planted(fault):
+            fails = stopped(tree, fault, kind, arguments)
+        found[kind] = fails and not failing(tree, (kind, arguments), kept)
+        if found[kind]:
+            break
     return found
+
+
+def stopped(tree: Tree, fault: Fault, kind: str, arguments: str) -> bool:
+    """Whether a check fails with a fault. One that ends in a third way does: nobody takes that for a pass."""
+    try:
+        return tree.fails(kind, arguments)
+    except (ValueError, subprocess.TimeoutExpired) as error:
+        print(f"{fault.name}: {error}", file=sys.stderr)
+        return True
 
 
 def failing(tree: Tree, check: tuple[str, str], kept: Kept) -> bool:
@@ -222,10 +230,12 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", action="append", help="part of the name of a fault or of its file; repeatable")
     parser.add_argument("--quick", action="store_true", help="the sample of the gate")
+    parser.add_argument("--faults", type=Path, default=FAULTS, help="the table")
     parser.add_argument("--kept", type=Path, default=ROOT / "build" / "faults.jsonl", help="what was seen before")
     asked = parser.parse_args()
     named = asked.only or [""]
-    wanted = [f for f in faults() if any(x in f"{f.name} {f.file}" for x in named) and (f.quick or not asked.quick)]
+    every = faults(asked.faults)
+    wanted = [f for f in every if any(x in f"{f.name} {f.file}" for x in named) and (f.quick or not asked.quick)]
     kept = Kept(asked.kept)
     words, enough = summary(look(wanted, kept, asked.jobs))
     print(words)

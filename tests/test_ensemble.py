@@ -1,11 +1,14 @@
 """Many runs in threads: the same as one by one, whatever the number of threads; and runs whose memory stays flat."""
 
+import zlib
+
 import numpy as np
 import pytest
 from mechanisms import ball, sliders
 
 from crossbody.cases import InvalidValue, Outcome, SceneError, UnknownName
-from crossbody.reference import Options, ensemble, prepare, simulate
+from crossbody.reference import Options, System, ensemble, prepare, simulate
+from crossbody.reference.systems import ball as ball_kernels
 
 N = 40
 HEIGHTS = np.linspace(0.1, 1.0, N)
@@ -22,6 +25,32 @@ def test_every_run_is_the_single_run_bit_by_bit() -> None:
         assert many.v[i, 0] == last.v[-1, 0]
         assert many.steps[i] == one.steps
         assert many.events[i] == len(last.events)
+
+
+NUMBERS = {
+    "a0": (50.0, 200.0), "a1": (2.0, 20.0), "a2": (1e5, 1e6), "b0": (1e4, 1e5), "b1": (5.0, 50.0),
+    "mass": (0.5, 2.0), "gravity": (5.0, 15.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_every_number_of_a_run_is_its_own(name: str) -> None:
+    """Each constant and parameter alone differs from run to run, in contacts of one set of constants and of two."""
+
+    def of(**given: float) -> System:
+        known = {key: low if name[0] != "a" or key[0] != "b" else 0.0 for key, (low, _) in NUMBERS.items()} | given
+        named = {key: known.pop(key) for key in ("mass", "gravity")}
+        return System(n=1, parameters=named, constant_mass=True, affine=True, **known, **ball_kernels.KERNELS)
+
+    values = np.random.default_rng(zlib.crc32(name.encode())).uniform(*NUMBERS[name], 4)
+    own = {"parameters" if name in ("mass", "gravity") else "law": {name: values}}
+    how = {"rtol": 1e-9, "collisions": "resolved"}
+    many = ensemble(of(), np.full((4, 1), 0.3), np.zeros((4, 1)), 1.0, threads=1, **own, **how)
+    alone = [simulate(of(**{name: value}), [0.3], [0.0], 1.0, samples=[1.0], **how) for value in values.tolist()]
+    assert [run.outcome for run in alone] == list(many.outcome)
+    np.testing.assert_array_equal(many.q, [run.q[-1] for run in alone])
+    np.testing.assert_array_equal(many.v, [run.v[-1] for run in alone])
+    assert name == "mass" or len(set(many.v[:, 0].tolist())) == 4
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])

@@ -65,6 +65,16 @@ def split(case: Case, truth: Truth, run: Trajectory, made: Study) -> Split:
 STEPS = [0.02, 0.01, 0.005]
 
 
+@pytest.mark.parametrize("agreed", [0.0, 1e-9, 1e-4])
+def test_the_models_part_is_known_no_better_than_the_truth(case: Case, agreed: float) -> None:
+    truth = from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.C, "")
+    made = study(case, STEPS, 1e-3, 4.0)
+    sharp = split(case, truth, made.runs[0], made)
+    found = split(case, replace(truth, agreement={"position": agreed}), made.runs[0], made)
+    assert found.known["step"] == sharp.known["step"]
+    assert found.known["model"] == max(sharp.known["step"], agreed)
+
+
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0])
 @pytest.mark.parametrize("model", [0.0, 1e-3])
 def test_parts_are_those_that_a_run_was_made_of_and_add_up(case: Case, order: float, model: float) -> None:

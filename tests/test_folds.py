@@ -29,6 +29,40 @@ def one_coordinate_held_twice():
     return System(n=1, dynamics=_free, gaps=_twice, rows=_both, unilateral=False, a0=[400.0] * 2, a1=40.0)
 
 
+@kernels.dynamics
+def _still(t, q, v, u, p, M, f, w):
+    for i in range(3):
+        M[i, 0], f[i] = 1.0, 0.0
+
+
+@kernels.gaps
+def _closing_gaps(t, q, v, p, h, hd):
+    h[0], hd[0] = q[0], v[0]
+    h[1], hd[1] = q[0] + (1.0 - q[2]) * q[1], v[0] + (1.0 - q[2]) * v[1] - v[2] * q[1]
+
+
+@kernels.rows
+def _closing_rows(t, q, v, p, w, idx, na, H, h, Hdv):
+    for j in range(na):
+        H[j, 0], H[j, 1], H[j, 2] = 1.0, 0.0, 0.0
+        h[j], Hdv[j] = q[0], 0.0
+        if idx[j] == 1:
+            H[j, 1], H[j, 2] = 1.0 - q[2], -q[1]
+            h[j], Hdv[j] = q[0] + (1.0 - q[2]) * q[1], -2.0 * v[1] * v[2]
+
+
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+@pytest.mark.parametrize(("left", "outcome"), [(4e-4, Outcome.ILL_POSED), (2.5e-3, Outcome.FINISHED)])
+def test_rows_are_flat_at_a_thousandth_of_their_start_though_they_never_turn_over(left, outcome, solver):
+    """x = 0 and x + s y = 0 with s falling evenly: pivot and least singular value go as s, and s ends above 0."""
+    system = System(
+        n=3, mass_block=1, dynamics=_still, gaps=_closing_gaps, rows=_closing_rows, unilateral=False, a0=[1.0] * 2,
+        a1=2.0,
+    )  # fmt: skip
+    run = simulate(system, [0.0] * 3, [0.0, 0.0, 1.0], 1.0 - left, rtol=1e-6, solver=solver, max_step=0.1)
+    assert run.outcome is outcome, run.message
+
+
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11])
 @pytest.mark.parametrize(
     ("lengths", "ground", "start", "fold"),

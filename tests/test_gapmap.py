@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from crossbody import engines
-from crossbody.cases import EngineUnavailable
+from crossbody.cases import EngineUnavailable, Mode, Trajectory
 from crossbody.reports.cli import main
 from crossbody.reports.maps import gapmap
 from crossbody.reports.maps.gapmap_figure import gap_map as figure
@@ -118,3 +118,21 @@ def test_wrong_use_is_one_sentence(arguments: list[str], says: str, capsys: pyte
     assert end.value.code == 2
     assert says in told
     assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_collisions_are_over_where_no_gap_closes_and_nothing_pushes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    v, modes = np.sort(rng.normal(size=4)), rng.choice([Mode.FREE, Mode.BALLISTIC, Mode.COLLISION_SEPARATION], 3)
+    closing, pushing = rng.random(2) < 0.5
+    if closing:
+        i = rng.integers(3)
+        v[[i, i + 1]] = v[[i + 1, i]]
+    if pushing:
+        modes[rng.integers(3)] = rng.choice([Mode.CONTACT, Mode.COLLISION])
+    nothing = np.zeros((1, 3))
+    run = Trajectory(
+        t=np.ones(1), q=np.zeros((1, 4)), v=v[None], gap=nothing, lam=nothing, energy=np.zeros((1, 2)),
+        mode=modes[None].astype(np.int8),
+    )  # fmt: skip
+    assert gapmap.over(run) == (not closing and not pushing)

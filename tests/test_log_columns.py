@@ -14,6 +14,8 @@ from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import ColumnMapError, InvalidValue
+from crossbody.hw.reading.join import join
+from crossbody.hw.reading.rows import Rows
 from crossbody.hw.reading.units import to_si
 
 GOOD = """[time]
@@ -197,3 +199,24 @@ def test_a_unit_that_no_such_signal_has_is_refused(role: str, unit: str, says: s
     text = f'{GOOD}\n[{role}.{"q11" if role == "velocities" else "z"}]\ncolumn = "w"\nunit = "{unit}"\n'
     with pytest.raises(ValueError, match=says):
         hw.read(tmp_path / "log.csv", hw.parse_columns(text))
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_joined_signals_are_the_last_ones_or_lie_between_neighbours(seed: int) -> None:
+    """On a grid of times, so that some of both are equal: a command counts from its own instant on."""
+    rng = np.random.default_rng(seed)
+    instants, own = (np.sort(rng.choice(40, size, replace=False)) * 0.25 for size in rng.integers(2, 20, 2))
+    values = rng.normal(size=len(own))
+    other = Rows(rows=np.arange(len(own)), time=own, values=(values,))
+    (held,), lead = join(Path("log"), "hold", instants, other, "x")
+    (between,), _ = join(Path("log"), "linear", instants, other, "x")
+    assert lead == sum(t < own[0] for t in instants)
+    for t, hold, line in zip(instants.tolist(), held.tolist(), between.tolist(), strict=True):
+        known = [k for k in range(len(own)) if own[k] <= t]
+        assert hold == values[known[-1]] if known else np.isnan(hold)
+        if not known or t > own[-1]:
+            assert np.isnan(line)
+            continue
+        a, b = known[-1], min(known[-1] + 1, len(own) - 1)
+        share = 0.0 if a == b else (t - own[a]) / (own[b] - own[a])
+        assert line == pytest.approx(values[a] + share * (values[b] - values[a]), abs=1e-12)

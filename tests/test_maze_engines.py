@@ -9,8 +9,10 @@ import pytest
 from crossbody.cases import CaseUnsupported, Outcome, load
 from crossbody.cases._maze import closed_forms as cf
 from crossbody.engines import load as load_engine
+from crossbody.engines._maze.edges import SOLID, sector
 from crossbody.engines._maze.machine import MazeMachine
-from crossbody.engines._maze.rows import MazeRows, Place
+from crossbody.engines._maze.memory import BALLISTIC, CONTACT, FREE, Memory, over_edge, through_gap
+from crossbody.engines._maze.rows import ABOVE, BELOW, MazeRows, Place
 from crossbody.engines._maze.scene import ball_maze
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import audit
@@ -36,6 +38,31 @@ def measured(name, case, motion):
 
 def ring_times(motion):
     return [s.t for s in motion.switches if s.variable == 0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_a_ball_does_to_its_memory_it_undoes_on_the_way_back(seed):
+    """Through a gap and back, over an edge and back: on the way the contacts go on, on the ring's other side."""
+    rng = np.random.default_rng(seed)
+    maze = ball_maze(load("ball_maze", variant="solve"))
+    channel, modes = int(rng.integers(1, len(maze.rings))), [FREE] * maze.nc
+    ring, gap = maze.rings[channel - 1], int(rng.integers(maze.rings[channel - 1].gaps))
+    end, theta = int(rng.integers(2)), rng.uniform(-3.0, 3.0)
+    at = theta + ring.tips(gap)[end] + (1 - 2 * end) * rng.uniform(0.01, 0.2) * ring.reach
+    q = (theta, ring.middle * math.cos(at), ring.middle * math.sin(at), 0.0)
+    modes[BELOW + 1 + end] = int(rng.choice([CONTACT, BALLISTIC]))
+    placed = Place(channel, gap, sector(maze.rings[channel], at - theta))
+    there = Memory(modes=tuple(modes), place=placed)
+    inside = through_gap(there, maze.rings, True, q)
+    assert (inside.place.channel, inside.place.above) == (channel - 1, gap)
+    assert inside.modes[ABOVE + 1 + end] == modes[BELOW + 1 + end]
+    assert sorted(inside.modes) == sorted(modes)
+    assert through_gap(inside, maze.rings, False, q) == there
+    rolled = over_edge(there, maze.rings, BELOW, q)
+    assert rolled.place.below == SOLID
+    assert rolled.modes[BELOW] == modes[BELOW + 1 + end]
+    assert sorted(rolled.modes) == sorted(modes)
+    assert over_edge(rolled, maze.rings, BELOW, q) == there
 
 
 @pytest.mark.parametrize(("engine", "profile"), FOLLOWS)

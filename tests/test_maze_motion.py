@@ -31,6 +31,24 @@ def run(variant, rtol=1e-9, samples=None, **parameters):
     return case, simulate(system, case.q0, case.v0, case.t_end, **options)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_cap_touches_the_flat_end_of_its_wall_and_both_faces(seed):
+    """The flat ends lie on the rays at half a gap's width; what a ball may pass is between the caps."""
+    rng = np.random.default_rng(seed)
+    inner = rng.uniform(0.01, 0.1)
+    ring = Ring(
+        inner=inner, outer=inner * rng.uniform(1.02, 1.5), gaps=int(rng.integers(1, 5)), width=rng.uniform(0.1, 1.2),
+        phase=rng.uniform(-3.0, 3.0),
+    )  # fmt: skip
+    for gap in range(ring.gaps):
+        ends = ring.middle * np.exp(1j * np.array(ring.tips(gap)))
+        rays = np.exp(1j * (ring.phase + 2.0 * math.pi * gap / ring.gaps + 0.5 * ring.width * np.array([-1.0, 1.0])))
+        off = (ends / rays).imag  # from the ray, counter-clockwise
+        np.testing.assert_allclose(off, [-ring.cap, ring.cap], rtol=1e-12)
+        np.testing.assert_allclose([np.abs(ends) - ring.cap, np.abs(ends) + ring.cap], [[inner] * 2, [ring.outer] * 2])
+        assert abs(ends[1] - ends[0]) - 2.0 * ring.cap == pytest.approx(ring.free_width, rel=1e-9)
+
+
 def measure(name, motion, case):
     return metrics.load(name).measure(None, motion, case)
 

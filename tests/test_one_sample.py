@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from known_errors import ERRORS, OFF, account, right, scene
+from known_errors import ERRORS, OFF, account, booked, changed, right, scene
 from known_values import VALUES
 
 from crossbody import cases
@@ -40,6 +40,31 @@ def test_an_error_at_one_place_is_what_the_metric_says(name: str) -> None:
         run, wanted = known(scene(which, seed))
         assert floor < 0.05 * abs(wanted)
         assert measure(metric, case, truth, run) == pytest.approx(wanted, rel=1e-6, abs=2.0 * floor), seed
+
+
+COLUMNS = {
+    "position": "q", "velocity": "v", "start_error": "q", "gap_error": "gap", "gap_residual": "gap",
+    "energy_residual": "energy", "contact_work": "contact", "law_residual": "lam", "lam_error": "lam",
+    "lam_impulse": "lam", "lam_impulse_path": "lam", "angle_error": "q",
+}  # fmt: skip
+"""Metrics of several columns, each of which counts by itself, and what they are columns of."""
+
+
+@pytest.mark.parametrize("name", COLUMNS)
+def test_errors_of_two_columns_do_not_cancel(name: str) -> None:
+    """The same error with the other sign in another column leaves the number as large as it was."""
+    (which, known), signal = ERRORS[name], COLUMNS[name]
+    case, truth = right(which)
+    for seed in SEEDS:
+        s = scene(which, seed)
+        run, wanted = known(s)
+        ledger = signal == "contact"
+        off = (run.ledger.contact - s.run.ledger.contact) if ledger else getattr(run, signal) - getattr(s.run, signal)
+        (k,), (column,) = (np.unique(at) for at in np.nonzero(off))
+        other = s.one([i for i in range(off.shape[1]) if i != column])
+        spoil = booked if ledger else changed
+        run = spoil(run, signal, (k, other), -float(off[k, column]))
+        assert measure(name, case, truth, run) >= abs(wanted) * (1.0 - 1e-6), seed
 
 
 @pytest.mark.parametrize("name", VALUES)

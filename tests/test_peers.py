@@ -14,7 +14,10 @@ from crossbody.engines._line import line
 from crossbody.engines._peer import ended, sampled
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import audit
+from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.truth import law_of
+from crossbody.reports.judging.verdict import Word
+from crossbody.reports.runs import jobs
 
 PACKAGES = {"exudyn": "exudyn", "drake": "pydrake", "dart": "dartpy", "pymunk": "pymunk"}
 LAW = ("exudyn", "drake")
@@ -105,6 +108,30 @@ def test_restitution_of_an_impact(name: str, e: float) -> None:
     assert run.v[-1, 0] == pytest.approx(e, abs=SOFTENED[name])
     impulse = float(np.sum(run.lam[1:, 0] * np.diff(run.t)))
     assert impulse == pytest.approx(1.0 + e, rel=SOFTENED[name])
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("name", STEPPED)
+def test_forces_bear_the_weight_and_change_the_momentum(name: str, seed: int) -> None:
+    """INT lam dt = m (v(T) - v(0) + g T), in the air, in impacts and at rest on the floor."""
+    rng = np.random.default_rng(seed)
+    m, g, t_end = rng.uniform(0.1, 5.0), rng.uniform(1.0, 20.0), rng.uniform(1.0, 2.0)
+    case = cases.load("bouncing_ball", "linear", mass=m, gravity=g, height=rng.uniform(0.02, 0.3), t_end=t_end)
+    run = peer(name).prepare(case, restitution=rng.uniform(0.0, 0.5)).run()
+    given = float(np.sum(run.lam[1:, 0] * np.diff(run.t)))
+    assert given == pytest.approx(m * float(run.v[-1, 0] - run.v[0, 0] + g * t_end), rel=1e-6)
+
+
+@pytest.mark.parametrize(("case", "variant"), [("bouncing_ball", "linear"), ("newtons_cradle", "sliders")])
+@pytest.mark.parametrize("name", PACKAGES)
+def test_no_engine_is_outside_in_a_shipped_case(name: str, case: str, variant: str) -> None:
+    """Its own contact is a known property: what follows from it is judged by its size, and not left out."""
+    peer(name)
+    (loaded,) = jobs.load_cases([case], variant, {})
+    result = jobs.run_case(loaded, jobs.picks([name]), refine=False)
+    rows = judged(loaded, result.entries, result.truth, "")
+    assert [(row.profile, row.metric, row.why) for row in rows if row.verdict == Word.OUTSIDE] == []
+    assert {entry.profile for entry in result.entries} == {r.profile for r in rows if r.metric == "position"}
 
 
 def test_a_discrete_plant_loses_energy_that_a_continuous_one_keeps() -> None:

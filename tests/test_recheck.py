@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -9,8 +10,11 @@ import numpy as np
 import pytest
 from springs import drawn, known, suite
 
-from crossbody.cases import Law, Mode
-from crossbody.reference import recheck, simulate
+from crossbody.cases import Law, Mode, load
+from crossbody.reference import Violation, recheck, simulate
+from crossbody.reports.judging import truth
+from crossbody.reports.judging.comparison import truth_row
+from crossbody.reports.judging.verdict import Word
 
 
 def far(system: Any, row: int) -> Any:
@@ -63,3 +67,22 @@ def test_a_wrong_mode_is_told_with_its_reason(right: Mode, wrong: Mode) -> None:
     mode[run.mode == right] = wrong
     found = recheck(system, replace(run, mode=mode))
     assert (0, wrong, WRONG[right, wrong]) in [(one.contact, one.mode, one.reason) for one in found]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_truth_is_trusted_up_to_the_first_mode_that_does_not_hold(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two integrators that agree may have missed the same touch: the case's row of its truth is outside then."""
+    case = replace(load("bouncing_ball", "linear", t_end=0.6), closed_form=None)
+    assert truth.truth_of(case).trusted == math.inf
+    early, late = np.sort(np.random.default_rng(seed).uniform(0.0, case.t_end, 2)).tolist()
+    found = tuple(
+        Violation(t=t, contact=0, mode=mode, amount=1.0, reason="below the surface")
+        for t, mode in ((early, Mode.FREE), (late, Mode.CONTACT))
+    )
+    monkeypatch.setattr(truth, "violated", lambda *_: found)
+    told = truth.truth_of(case)
+    assert told.trusted == early
+    assert f"FREE at t = {early:.6g} s, but below the surface: not trusted from there" in told.source
+    (row,) = truth_row(case, told, "")
+    assert row.verdict == Word.OUTSIDE
+    assert row.compared == pytest.approx(early / case.t_end)

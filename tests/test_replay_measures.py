@@ -79,6 +79,20 @@ def test_a_lag_is_undone_with_the_noise_it_says() -> None:
     assert within == pytest.approx(0.954, abs=0.015)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_force_without_its_lag_scatters_as_it_says(seed: int) -> None:
+    """Of 20000 readings of noise alone, at rates and times between samples at random: 1 % is two deviations."""
+    rng = np.random.default_rng(seed)
+    rate, noise = rng.uniform(20.0, 2000.0), rng.uniform(0.01, 1.0)
+    quantum = rng.uniform(0.1, 1.0) * noise
+    t = np.cumsum(np.tile(rng.uniform(0.5e-3, 2e-3, 2), 10000))
+    y = quantum * np.rint(noise * rng.normal(size=(len(t), 1)) / quantum)
+    found = unlagged(t, y, rate, noise, quantum)
+    for part in (slice(0, None, 2), slice(1, None, 2)):  # the two times between samples
+        assert found.std[part].std() <= 1e-9 * found.std[part].mean()
+        assert found.force[part].std() == pytest.approx(found.std[part, 0][0], rel=0.03)
+
+
 def test_sensors_delay_and_round() -> None:
     t = STEP * np.arange(500)
     x, xd = np.sin(5.0 * t)[:, None], 5.0 * np.cos(5.0 * t)[:, None]

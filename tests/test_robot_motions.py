@@ -57,9 +57,13 @@ def test_both_witnesses_move_a_published_robot_alike(name: str) -> None:
     assert differences(ours.q[-1:], theirs.q[-1:], case.quaternions).max() <= 1e-8
 
 
-@pytest.mark.parametrize(("name", "t_end"), [("unitree_go1/go1", 5.0), ("agility_cassie/cassie", 1.0)])
-def test_a_floating_robot_closes_its_account_of_energy(name: str, t_end: float) -> None:
-    """Energy less the work of loops, inputs and dampers, to 1e-10 of its size; quaternions keep their length."""
+@pytest.mark.parametrize("name", ["unitree_go1/go1", "agility_cassie/cassie"])
+def test_a_floating_robot_closes_its_account_of_energy(name: str) -> None:
+    """Energy less the work of loops, inputs and dampers, to 1e-10 of its size; loops stay closed, quaternions long.
+
+    Over 5 s it falls 120 m: what its bodies are to each other must not be told from places in the world.
+    """
+    t_end = 5.0
     case = robot(name, without="friction,contacts,limits,actuators", t_end=t_end)
     if "go1" in name:
         case = replace(case, v0=0.5 * np.random.default_rng(1).normal(size=len(case.v0)))
@@ -71,6 +75,7 @@ def test_a_floating_robot_closes_its_account_of_energy(name: str, t_end: float) 
     assert np.abs(account - account[0]).max() <= 1e-10 * np.abs(run.energy).max()
     for at in case.quaternions:
         assert np.abs(np.linalg.norm(run.q[:, at : at + 4], axis=1) - 1.0).max() <= 1e-10
+    assert np.abs(run.gap).max(initial=0.0) <= 1e-9
 
 
 FLOOR = """<mujoco><worldbody><geom name="floor" type="plane" size="9 9 .1"/>

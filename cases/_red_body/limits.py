@@ -44,15 +44,10 @@ _CLAIMS: Bounds = {
 """Judged where the case claims a number."""
 
 _MATCHED_BOUNDS: Bounds = {
-    "position": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
-    "event_times": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
     "mode_times": (4e-5, "the hand-over is taken at the end of its step of 39 us"),
     "energy_drift": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
-    "lam_impulse": (1e-4, "samples at every step of 39 us"),
     "foot_lam": (1e-3, "the engine's own solver leaves this much of lam"),
-    "gap_error": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
     "velocity": (1e-4, "Runge-Kutta 4 with located events at 39 us"),
-    "lam_impulse_path": (1e-4, "samples at every step of 39 us"),
 }
 """What MuJoCo's fixed step costs where it follows the case's law."""
 

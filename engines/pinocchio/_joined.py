@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import nnls
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
 from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian, pose
 
+NO_SUCH = 1e-10  # residual below which inequalities have no solution
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
 NEAR = (1e-8, 1e-4)  # what a row adds to the others, over the first: below it follows, above it holds by itself
 AXES = pin.LOCAL_WORLD_ALIGNED
@@ -276,10 +278,36 @@ def by_least_norm(
         A = np.linalg.solve(root, J[holds].T).T
         U, s, Vt = np.linalg.svd(A, full_matrices=False)
         kept = s > dependent * s[0]
-        wanted = U[:, kept].T @ (-gamma[holds] - A @ free) / s[kept]
+        missing = -gamma[holds] - A @ free
+        wanted = U[:, kept].T @ missing / s[kept]
         vd = np.linalg.solve(root.T, free + Vt[kept].T @ wanted)
         lam = np.zeros(len(J))
         lam[holds] = U[:, kept] @ (wanted / s[kept])
         return vd, lam
 
     return solve
+
+
+def none_pulling(lam: Floats, J: Floats, one_sided: Sequence[bool]) -> Floats:
+    """Return the least multipliers that exert the forces of these, none of a one-sided row below zero.
+
+    Args:
+        lam: multipliers (na,) of rows that depend on each other.
+        J: the rows (na, nv).
+        one_sided: which of them may not pull.
+
+    Returns:
+        They (na,), or `lam` where there are none: rows have to let go.
+    """
+    bounds = np.eye(len(lam))[list(one_sided)]
+    U, s, _ = np.linalg.svd(J.T, full_matrices=False)
+    B = U[:, s > DEPENDENT * s[0]].T @ J.T
+    size = float(np.abs(B @ lam).max()) or 1.0
+    G, h = np.vstack([bounds, B, -B]), np.concatenate([np.zeros(len(bounds)), B @ lam / size, -(B @ lam) / size])
+    E, target = np.vstack([G.T, h]), np.append(np.zeros(len(lam)), 1.0)
+    found, off = nnls(E, target)  # the least x with G x >= h: Lawson and Hanson 1974, ch. 23
+    if off < NO_SUCH:
+        return lam
+    rest = E @ found - target
+    least: Floats = -rest[:-1] / rest[-1] * size
+    return np.where(one_sided, np.maximum(least, 0.0), least)

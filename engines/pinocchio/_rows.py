@@ -17,6 +17,8 @@ Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
 Chosen = Sequence[int] | slice
 """Indices of rows; all of them as slice(None)."""
+Shared = Callable[[Floats, Floats, Any], Floats]
+"""(lam (na,), J (na, nv), which rows may not pull (na,)) -> lam (na,) that exert the same forces."""
 Forces = Callable[[Floats, Floats, Floats], None]
 """(q, v, tau): writes the generalised forces tau (nv,) beside gravity and the rows, N or N m."""
 ULP = 2.3e-16
@@ -92,6 +94,7 @@ class PinRows:
         drift_of: (q, v, rows) -> that of some rows; where it costs less than that of all.
         law: constants of every row.
         follows: index of the row whose mode each one shares; -1 for none.
+        shared: what makes multipliers of rows that depend on each other such that none pulls; None where rows do not.
     """
 
     def __init__(
@@ -118,6 +121,7 @@ class PinRows:
         quick = np.stack((law.b0, law.b1, np.zeros(self.nc)))
         self.entered = np.where(law.b0 > 0.0, quick, self.slow)  # what a row has that is just entered
         self._sets: dict[Modes, Any] = {}
+        self.shared: Shared | None = None
         self.solve = ALGEBRA[algebra](model, self.data, self.tau)
 
     def rigid(self) -> PinRows:
@@ -159,12 +163,14 @@ class PinRows:
         """Acceleration (nv,) and multipliers (nc,)."""
         if self.forces is not None:
             self.forces(q, v, self.tau)
-        rows, a0, a1, a2 = self._chosen(modes)
+        rows, one_sided, a0, a1, a2 = self._chosen(modes)
         if rows is None:
             return pin.aba(self.model, self.data, q, v, self.tau), np.zeros(self.nc)
         J, h = self.jacobian(q)[rows], self.heights(q)[rows]
         gamma = self.drift_of(q, v, rows) + a1 * J.dot(v) + (a0 + a2 * h * h) * h
         vd, part = self.solve(q, v, J, gamma)
+        if self.shared is not None and np.min(part[one_sided], initial=0.0) < 0.0:
+            part = self.shared(part, J, one_sided)
         if len(part) == self.nc:
             return vd, part
         lam = np.zeros(self.nc)
@@ -178,7 +184,7 @@ class PinRows:
             on = list(active(modes))
             rows = None if not on else slice(None) if len(on) == self.nc else on
             law = np.where([m == Mode.COLLISION for m in modes], self.entered, self.slow)
-            found = self._sets[modes] = (rows, *law[:, on])
+            found = self._sets[modes] = (rows, np.array(self.unilateral, dtype=bool)[on], *law[:, on])
         return found
 
     def strike(self, q: Floats, v: Floats, struck: Sequence[int], e: Sequence[float]) -> tuple[Floats, Floats]:

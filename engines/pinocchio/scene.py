@@ -15,7 +15,7 @@ from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
 from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows
+from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -79,11 +79,13 @@ def build(case: Case, algebra: str) -> Prepared:
         drift_of=drift_of,
     )  # fmt: skip
     start = to.theirs(case.q0)
-    if loops:  # planar loops have rows that depend on each other
+    if loops or touching.count > 1:  # planar loops have rows that depend on each other, and bodies on many feet
         widths = [loop.width for loop in scene.loops]
         root = np.linalg.cholesky(mass_matrix(model, pinned.data, start))
         A = np.linalg.solve(root, jacobian(start)[: sum(widths)].T).T
-        pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose_rows(A, widths, case.rank))
+        loose = loose_rows(A, widths, case.rank) if loops else ()
+        pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
+        pinned.shared = none_pulling
     return Prepared(
         rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
         sizes=(np.ones(to.nq), np.ones(to.nv)),

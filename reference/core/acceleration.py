@@ -3,7 +3,7 @@
     (H_A M^-1 H_A^T) lam_A = -( H_A M^-1 f + H_A' v + a1 h' + a0 h + a2 h^3 )_A
     v' = M^-1 ( f + H_A^T lam_A )
 
-Only active rows are evaluated and solved.
+Only active rows are evaluated and solved. Where some depend on each other the multipliers are those of `shares`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference._kinds import Array, Bytes, Floats
 from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
+from crossbody.reference.core.shares import solve_dependent
 
 # numba compiles a function anew for every literal that it is called with; numpy's integers are values, not literals.
 OWN, GENERAL, SMOOTH = np.arange(3)
@@ -73,17 +74,24 @@ def add_row(m: Model, w: Work, j: int, i: int) -> None:
 
 @compiled
 def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """List the active rows and put their constants in force; a row that follows another shares its mode."""
-    na = 0
+    """List the active rows and put their constants in force; a row that follows another shares its mode.
+
+    Rows that the others hold are not among them.
+    """
+    na, idle = 0, 0
     follows = m.follows
-    for i in range(s.nc):
+    for k in range(s.nc):
+        i = w.order[k] if s.sharing else k
         if follows[i] >= 0:
             mode[i] = mode[follows[i]]
         if is_active(mode[i]):
-            add_row(m, w, na, i)
-            na += 1
+            if w.idle_rows[i]:
+                idle += 1
+            else:
+                add_row(m, w, na, i)
+                na += 1
     laws_in_force(s, m, w, mode)
-    s.na = na
+    s.na, s.idle, s.dependent = na, idle, 0
 
 
 @inlined
@@ -97,7 +105,7 @@ def scatter(s: Any, w: Work, lam: Array) -> None:
 
 
 @inlined
-def _free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+def free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
     """Vd = M^-1 f; leaves the factor of M. In an affine scene it is worked out once for every set of inputs."""
     if s.have_free:
         copy(w.free, w.vd)
@@ -147,13 +155,18 @@ def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
 
 @compiled
 def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array, v: Array) -> int:
-    """Evaluate the active rows, their law on (1) or off (0), and factor their Schur complement G = H M^-1 H^T."""
+    """Evaluate the active rows, their law on (1) or off (0), and factor their Schur complement G = H M^-1 H^T.
+
+    Returns:
+        1 if a row depends on others that must not.
+    """
     na = s.na
     rows(t, q, v, m.p, w.w, w.idx, na, w.H, w.ha, w.Hdv)
     for j in range(na):
         _rate_and_drive(s, m, w, on, j, v)
         _schur_row(s, m, w, j)
-    return factor_schur(w.G, na, w.reach)
+    s.dependent = factor_schur(w.G, na, w.reach, w.idx, w.shares)
+    return int(s.dependent < 0)
 
 
 @inlined
@@ -208,12 +221,15 @@ def accelerate(
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
     if s.n == 1 and na <= 1:
         return _scalar(dynamics, rows, s, m.p, w, on, t, q, v)
-    if _free(dynamics, s, m.p, w, t, q, v) != 0:
+    if free(dynamics, s, m.p, w, t, q, v) != 0:
         return 1
     if na == 0:
         return 0
     if assemble(rows, s, m, w, on, t, q, v) != 0:
         return 1
-    solve_schur(w.G, na, w.reach, w.r, w.la)
+    if s.dependent == 0:
+        solve_schur(w.G, na, w.reach, w.r, w.la)
+    elif not solve_dependent(s, w, q, v):
+        return 1
     push_rows(m, w, na, w.la, 1.0, w.vd)
     return 0

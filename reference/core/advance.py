@@ -24,6 +24,7 @@ from crossbody.reference.core import (
 )
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
+from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
     DONE,
     EVENTS_FULL,
@@ -216,12 +217,21 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     record.step_end(K, s, m, w, b.mode, b.out, b.modes)
     if s.method == EXPLICIT or s.method == IMPLICIT:
         choice.choose_method(s, w)
+    if s.idle > 0:
+        code = _share_anew(K, s, m, w, b)
     if at_stop and s.stop < s.t_end:
         _take_inputs(K, s, m, w, b)
         code = _resume(K, s, m, w, b)
         if code == 0:
             record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     return code
+
+
+@inlined
+def _share_anew(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Ask anew which rows idle: they carry again where they would push, and must have followed their laws."""
+    code = settle.share(K, s, m, w, b)
+    return _restart(K, s, m, w, b) if code == MOVED else code
 
 
 @inlined
@@ -240,8 +250,7 @@ def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     lost = False
     if not s.started:
         s.started = 1
-        for i in range(s.nc):
-            s.switching |= m.unilateral[i]
+        settle.begin(s, m, w)
         s.history_t, s.collision_t = np.inf, np.inf
         w.highest[:] = -np.inf
         lost = s.has_switch and settle.switch(K, s, m, w, b, START) == IS_LOST

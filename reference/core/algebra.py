@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference._kinds import Array, Bytes, Floats, Index
 
 ULP = 2.3e-16
 RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
+DEPENDENT = 1e-10  # a pivot below it is that of a row which depends on the rows before, where that may be
 
 
 @inlined
@@ -69,23 +70,39 @@ def solve_mass(L: Floats, x: Array, k: int, first: int, last: int) -> None:
 
 
 @compiled
-def factor_schur(G: Floats, na: int, reach: Index) -> int:
-    """Cholesky factor of the Schur complement in its lower triangle; 1 if it lost rank.
+def factor_schur(G: Floats, na: int, reach: Index, idx: Index, shares: Bytes) -> int:
+    """Cholesky factor of the Schur complement in its lower triangle.
 
-    Row i begins at column reach[i]: what stands before is zero and stays zero, so a chain's factor is a band.
+    Row i begins at column reach[i]: what stands before is zero and stays zero, so a chain's factor is a band. A row
+    that depends on those before it, and may, has an infinite pivot: whatever is solved for gives it no multiplier.
+
+    Args:
+        G: the Schur complement, overwritten.
+        na: its size.
+        reach: first column of every row.
+        idx: which row of the system stands where.
+        shares: whether a row of the system may depend on others.
+
+    Returns:
+        Number of rows that depend on those before them; -1 if one does that may not.
     """
+    dependent = 0
     for i in range(na):
         for j in range(reach[i], i + 1):
             total = G[i, j]
             for m in range(max(reach[i], reach[j]), j):
                 total -= G[i, m] * G[j, m]
             if i == j:
-                if not total > RANK * G[i, i]:
-                    return 1
+                if not total > DEPENDENT * G[i, i]:
+                    if shares[idx[i]] and abs(total) <= DEPENDENT * G[i, i]:
+                        total = np.inf
+                        dependent += 1
+                    elif not total > RANK * G[i, i]:
+                        return -1
                 G[i, i] = np.sqrt(total)
             else:
                 G[i, j] = total / G[j, j]
-    return 0
+    return dependent
 
 
 @compiled

@@ -163,7 +163,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     for i in range(s.nc):
         hit[i] = NEVER
         kind[i] = NONE
-        if unilateral[i] and follows[i] < 0 and filters.row_may_switch(s, w, mode, i):
+        if unilateral[i] and follows[i] < 0 and not w.idle_rows[i] and filters.row_may_switch(s, w, mode, i):
             hit[i] = 1.0
             any_gap = True
             any_multiplier = any_multiplier or is_active(mode[i])
@@ -212,6 +212,9 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
     rest: the instant tells whether it presses.
     """
     kind = w.kind[i]
+    if kind == RELEASE and (s.dependent > 0 or s.idle > 0):
+        w.spent[i] = 1  # others may carry on for it
+        return int(mode[i])
     if kind == RELEASE:
         return BALLISTIC if s.fsm != LEVEL else released_mode(mode[i], h)
     if kind == LEAVE:

@@ -98,7 +98,7 @@ def _stays(s: Any, w: Work, unilateral: Bytes) -> bool:
 @compiled
 def plan(s: Any, w: Work, unilateral: Bytes) -> float:
     """Longest arc that may be taken in closed form from here; 0 if none."""
-    if not s.affine or (s.na > 0 and (s.ledger or s.has_solve or not is_linear(s, w))):
+    if not s.affine or s.dependent > 0 or s.idle > 0 or (s.na > 0 and (s.ledger or s.has_solve or not is_linear(s, w))):
         return 0.0
     length = np.inf
     if s.na > 0 and not (s.na == s.nc and _stays(s, w, unilateral)):

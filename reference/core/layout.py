@@ -53,6 +53,7 @@ STATE = np.dtype(
         ("natural", "i8"),
         ("ledger", "i8"),
         ("audited", "i8"),  # the energy account is judged
+        ("sharing", "i8"),  # some rows may depend on each other and share a load
         ("loops", "i8"),  # rows that are always on, by the general algebra: they may lose rank on the way
         ("keep_events", "i8"),
         ("has_energy", "i8"),
@@ -78,6 +79,9 @@ STATE = np.dtype(
         ("switching", "i8"),
         ("hold_short", "i8"),
         ("na", "i8"),
+        ("idle", "i8"),  # rows in contact that carry nothing: the active ones hold them
+        ("dependent", "i8"),  # active rows that depend on those before them
+        ("redundant", "i8"),  # the most rows at one instant that follow from others
         ("have_dense", "i8"),
         ("have_mass", "i8"),
         ("have_free", "i8"),
@@ -191,6 +195,13 @@ class Work:
     vd: Floats
     free: Floats  # (n,) M^-1 f of an affine scene: constant between inputs
     law: Floats2  # (nc, 3) in force now; written where the modes are, and nowhere else
+    null: Floats2  # (nc, nc) multipliers that together exert nothing, of active rows that depend on each other
+    gram: Floats2  # (nc, nc) H M^-1 H^T of all rows in contact
+    part: Floats2  # (nc, nc) factor of that of the rows which carry
+    share: Floats  # (nc,) what each of them carries
+    trial: Floats  # (nc,) what it would carry without bounds
+    allowed: Floats  # (nc,) by how much a row may be off its law
+    let_go: Floats  # (nc,) instant at which others lifted a row off that shared a load with them
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
     lam_at: Floats2  # (12, nc) multipliers at the stages, 0 left out
@@ -217,12 +228,19 @@ class Work:
     parts: Floats  # (4,) functions of a guard
     bands: Floats  # (4,) below which they count as zero
     tiny: Floats  # (4,) closer than which they are not told apart
+    order: Index  # (nc,) rows as they are listed: of those that depend on each other the most independent ones first
     idx: Index  # active rows
     reach: Index  # first column of each row of the Schur complement's factor
     ends: Index  # largest column past an active row and all before it
     struck: Index  # (nc,) how each row takes part in a frozen collision
     before: Bytes  # modes before a switch
     settled: Bytes  # modes that rows left in the last pass
+    shares: Bytes  # rows that may depend on others
+    idle_rows: Bytes  # rows in contact that carry nothing
+    tied: Bytes  # open rows that depend on the active ones, as far as they were asked
+    spent: Bytes  # rows that share a load and whose multiplier has just vanished
+    carries: Bytes  # places of a smallest set of rows that carries the load
+    holds: Bytes  # these rows
     kind: Index  # (nc,) which guard fired
     pivot: Index
     # Where q' is not v, and empty elsewhere:
@@ -251,7 +269,7 @@ def workspace(
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),
-        **dict.fromkeys(("G", "overlap"), (nc, nc)), "law": (nc, 3),
+        **dict.fromkeys(("G", "overlap", "null", "gram", "part"), (nc, nc)), "law": (nc, 3),
         **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),

@@ -35,10 +35,12 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
+from crossbody.reference.core.shares import CONSISTENT
 
 SLOW = 1e-9  # part of the largest rate seen
 DEEP = 1e-9  # m: a FREE gap below -DEEP was started in penetration
 ROUNDING = 1e-13
+LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 
 
 @inlined
@@ -140,17 +142,63 @@ def multiplier_if_active(
     before = mode[i]
     mode[i] = active_mode(s, m, i)
     activate(s, m, w, mode)
-    lam = -np.inf
+    lam, dependent = -np.inf, -1
+    w.tied[i] = 0
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) == 0:
         noise(s, m, w)
+        dependent = s.dependent
         for j in range(s.na):
             if w.idx[j] == i:
                 lam = w.la[j]
     mode[i] = before
     activate(s, m, w, mode)
+    if s.sharing and dependent != 0:
+        lam = _lacks(K, s, m, w, i, dependent, lam, t, q, v)
     if s.method == EXACT and s.na > 0:  # the arc stands on the factor of its own rows
         accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL)
     return float(lam)
+
+
+@inlined
+def _off_law(m: Model, w: Work, j: int, i: int, on: float, v: Any, vd: Any) -> tuple[float, float]:
+    """H'' and on (1 or 0) times a1 h' + a0 h + a2 h^3 of row i, evaluated in place j, and the size of the terms."""
+    push, size, rate = w.Hdv[j], abs(w.Hdv[j]), 0.0
+    for c in range(m.span[i, 0], m.span[i, 1]):
+        push += w.H[j, c] * vd[c]
+        size += abs(w.H[j, c] * vd[c])  # bodies in free fall cancel
+        rate += w.H[j, c] * v[c]
+    h, a0, a1, a2 = w.ha[j], w.law[i, 0], w.law[i, 1], w.law[i, 2]
+    spring = (a0 + a2 * h * h) * h
+    return push + on * (a1 * rate + spring), size + on * (a1 * abs(rate) + abs(spring))
+
+
+@inlined
+def _alone(K: Any, m: Model, w: Work, j: int, i: int, t: float, q: Any, v: Any) -> None:
+    """Evaluate row i in place j, behind the active ones."""
+    w.idx[j] = i
+    clear(m, w, j)
+    K.rows(t, q, v, m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
+
+
+@inlined
+def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float, t: float, q: Any, v: Any) -> float:
+    """What row i lacks beside the active rows: its multiplier, or if it depends on them by how much it is off its law.
+
+    One that they hold at its law counts as in contact; but not just after it was lifted off, or rounding would choose
+    where a load is about to leave a row. If it were active, so many rows would be `dependent` (-1 if they contradicted
+    each other), and `lam` would be its multiplier.
+    """
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) != 0:
+        return -np.inf
+    if dependent == s.dependent:
+        return lam
+    j = s.na
+    _alone(K, m, w, j, i, t, q, v)
+    off, size = _off_law(m, w, j, i, 1.0, v, w.vd)
+    w.noise[i], w.tied[i] = 0.0, 1
+    band = max(CONSISTENT, s.rtol) * size + 8.0 * _from_state(s, w, i)
+    open_for = (t - w.let_go[i]) * max(np.sqrt(w.law[i, 0]), w.law[i, 1])
+    return float(-off + band if open_for > LIFTED else -off - band)
 
 
 @compiled
@@ -161,7 +209,8 @@ def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: in
         mode[i] = active_mode(s, m, i)
     activate(s, m, w, mode)
     size = 0.0
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) == 0:
+    found = accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) == 0
+    if found and s.dependent == 0:  # a row that depends on the others changes nothing
         for j in range(s.na):
             if w.idx[j] == i:
                 size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
@@ -178,20 +227,9 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
     has no law yet: what is left of its gap and its rate is what collisions left, and presses nothing.
     """
     nq, j = s.nq, s.na
-    w.idx[j] = i
-    clear(m, w, j)
-    K.rows(s.t, w.y[:nq], w.y[nq:], m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
-    push, size, rate = 0.0, abs(w.Hdv[j]), 0.0
-    for c in range(m.span[i, 0], m.span[i, 1]):
-        push += w.H[j, c] * w.k[START, nq + c]
-        size += abs(w.H[j, c] * w.k[START, nq + c])  # bodies in free fall cancel
-        rate += w.H[j, c] * w.y[nq + c]
-    if not at_rest:
-        h, a0, a1, a2 = w.ha[j], w.law[i, 0], w.law[i, 1], w.law[i, 2]
-        spring = (a0 + a2 * h * h) * h
-        push += a1 * rate + spring
-        size += a1 * abs(rate) + abs(spring)
-    return bool(-(push + w.Hdv[j]) > ROUNDING * size + _from_state(s, w, i) + _left_over(s, m, w, i))
+    _alone(K, m, w, j, i, s.t, w.y[:nq], w.y[nq:])
+    off, size = _off_law(m, w, j, i, 0.0 if at_rest else 1.0, w.y[nq:], w.k[START, nq:])
+    return bool(-off > ROUNDING * size + _from_state(s, w, i) + _left_over(s, m, w, i))
 
 
 @inlined
@@ -201,6 +239,15 @@ def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest
         return _own_press(K, s, m, w, i, at_rest)
     lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.nq], w.y[s.nq :])
     return bool(lam > w.noise[i])
+
+
+@inlined
+def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether row i, below the surface, depends on the active rows and follows its law with them."""
+    if not w.shares[i] or s.na == 0:
+        return False
+    lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.nq], w.y[s.nq :])
+    return bool(w.tied[i] and lam > 0.0)
 
 
 @inlined
@@ -216,7 +263,9 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return int(mode[i])
     if mode[i] != FREE:
         closing = rate < -slow(s)
-        return active_mode(s, m, i) if closing and _would_press(K, s, m, w, mode, i, False) else int(mode[i])
+        if closing and (_would_press(K, s, m, w, mode, i, False) or _is_held(K, s, m, w, mode, i)):
+            return active_mode(s, m, i)
+        return int(mode[i])
     if rate < -slow(s):
         return active_mode(s, m, i)
     if h < -DEEP:

@@ -10,6 +10,7 @@ from crossbody.reference._cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.collisions import collide
+from crossbody.reference.core.holding import MOVED, doubtful, hold
 from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
 from crossbody.reference.core.layout import (
     EDGE,
@@ -114,6 +115,27 @@ def _touching(s: Any, w: Work) -> None:
 
 
 @compiled
+def share(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Let the rows in contact share what they carry, and evaluate them; MOVED if some let go instead, or a code.
+
+    Leaves k[0], lam0 and the gaps of node 0 for the next step, as `settle` does.
+    """
+    code = hold(K, s, m, w, b)
+    if code == 0:
+        code = evaluate(K, s, m, w, b.mode)
+        _keep(w)
+    return int(code)
+
+
+@inlined
+def _keep(w: Work) -> None:
+    """Take multipliers, gaps and rates of the present instant for the start of the next step."""
+    copy(w.lam, w.lam0)
+    copy(w.gap, w.gaps[0])
+    copy(w.rate, w.rates[0])
+
+
+@compiled
 def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Collide and switch until the mode set is consistent; 0 or a code."""
     changed = b.history[len(b.history) - 1]
@@ -122,6 +144,10 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     events, joined = s.events, False
     while True:
         code = evaluate(K, s, m, w, b.mode)
+        if s.sharing and (code == ILL_POSED or s.idle > 0 or (s.na > 1 and doubtful(s, w))):
+            code = share(K, s, m, w, b)
+            if code == MOVED:
+                continue
         if code == ILL_POSED and joined and s.fsm == LEVEL and s.one_by_one != ALONE:
             # Rows that joined together depend on each other: back, and one by one. What is left closes by itself.
             copy(w.settled, b.mode)
@@ -147,6 +173,26 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
                 return int(code) if code != 0 else MODE_CYCLE
             s.one_by_one, s.history = 1, 0
             changed[:] = 0
+
+
+@inlined
+def begin(s: Any, m: Model, w: Work) -> None:
+    """Note whether rows switch, and which of them may share a load with rows that they depend on.
+
+    A row that another follows has no part in it: the other's multiplier has either sign. Nor have machines but the
+    level one, collisions that take no time, and systems with an algebra of their own.
+    """
+    w.idle_rows[:], w.spent[:], w.let_go[:] = 0, 0, -np.inf
+    may = s.fsm == LEVEL and not s.frozen and not s.has_solve
+    for i in range(s.nc):
+        w.order[i] = i
+        s.switching |= m.unilateral[i]
+        w.shares[i] = may and m.unilateral[i] and m.follows[i] < 0
+    for i in range(s.nc):
+        if m.follows[i] >= 0:
+            w.shares[m.follows[i]] = 0
+    for i in range(s.nc):
+        s.sharing |= w.shares[i]
 
 
 @inlined
@@ -182,7 +228,6 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             return MODE_CYCLE
         s.history, s.one_by_one = 0, 0
         code = _iterate(K, s, m, w, b)
-    copy(w.lam, w.lam0)
-    copy(w.gap, w.gaps[0])
-    copy(w.rate, w.rates[0])
+    w.spent[:] = 0
+    _keep(w)
     return int(code)

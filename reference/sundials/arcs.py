@@ -118,7 +118,7 @@ class Arc:
         self.nq, self.ny = scene.equations.system.nq, scene.equations.system.nq + scene.equations.system.n
         self.single, self.fresh = single, True
         self.guards = [*scene.machine.guards, *scene.discrete.watched()]
-        scene.looks.begin(self.guards, scene.machine.frozen)
+        scene.looks.begin(self.guards, scene.machine.frozen, scene.machine.tied)
         self.ask = scene.looks.ask
         scene.work["clock"][:2] = -np.inf, _damped_pole(scene.equations)
         scene.work["count"][2:] = 0, ENDLESS, 0
@@ -330,7 +330,7 @@ class IdaArc(Arc):
         )  # fmt: skip
         powers = e.powers(start.t, start.q, start.v, view.lam) if nz else np.zeros(0)
         zero = np.zeros(nb)
-        y = np.concatenate([start.q, start.v, view.lam, zero, start.z])
+        y = np.concatenate([start.q, start.v, view.alone, zero, start.z])
         qd = e.system.rates(start.q, start.v, start.t, e.p)
         solver.init_step(start.t, y, np.concatenate([qd, view.vd, np.zeros(nc), zero, powers]))
         return solver, y
@@ -370,4 +370,8 @@ class IdaArc(Arc):
     def _state(self, t: float, y: Floats) -> State:
         nq, ny = self.nq, self.ny
         # At index 1 lam follows from the state.
-        return State(t, y[:nq], y[nq:ny], y[self.work], y[self.lam] if self.rigid else None)
+        if not self.rigid:
+            return State(t, y[:nq], y[nq:ny], y[self.work])
+        e = self.scene.equations
+        lam = y[self.lam] if e.spread is None else e.spread @ y[self.lam][e.active]
+        return State(t, y[:nq], y[nq:ny], y[self.work], lam)

@@ -9,7 +9,7 @@ pivoting.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 
@@ -47,6 +47,8 @@ class Equations:
         u (nu,): inputs in force. memory: state of the controller.
         active: indices of the active rows.
         law (nc, 3): a0, a1, a2 in force for every row.
+        spread (nc, na): multipliers of all rows from those of the active ones, where these hold others that depend on
+            them; None where there are none.
         evaluations: right-hand sides so far.
     """
 
@@ -60,6 +62,7 @@ class Equations:
         self.law = self.slow.copy()
         self.p, self.u, self.memory = np.array(system.p), np.zeros(system.inputs), np.zeros(system.memory)
         self.active: list[int] = []
+        self.spread: Floats | None = None
         self.evaluations = 0
         self._blocks, self._f, self._w = np.zeros((n, system.mass_block)), np.zeros(n), np.zeros(system.scratch)
         self._H, self._h, self._Hdv = np.zeros((nc, n)), np.zeros(nc), np.zeros(nc)
@@ -68,9 +71,10 @@ class Equations:
         self._index = np.zeros(nc, dtype=np.int64)
         self.activate([])
 
-    def activate(self, modes: Sequence[int]) -> None:
-        """List the active rows of a mode set and put their constants in force."""
-        self.active = [i for i, mode in enumerate(modes) if mode in ACTIVE]
+    def activate(self, modes: Sequence[int], without: Collection[int] = ()) -> None:
+        """List the active rows of a mode set, less those that others hold, and put their constants in force."""
+        self.active = [i for i, mode in enumerate(modes) if mode in ACTIVE and i not in without]
+        self.spread = None
         self._index[: len(self.active)] = self.active
         self._H[:] = 0.0  # kernels need not write the zeros
         for i, mode in enumerate(modes):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from crossbody.reference.sundials.compiled import evaluation
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import Guard
 
+NONE: Mapping[int, float] = MappingProxyType({})
 ENDS = {evaluation.ILL_POSED: Outcome.ILL_POSED, evaluation.NOT_FINITE: Outcome.NOT_FINITE}
 
 
@@ -45,16 +47,24 @@ class Evaluator:
             return code
         raise Ended(ENDS[abs(code)], self.equations.active)
 
-    def begin(self, guards: Sequence[Guard], frozen: Collection[int]) -> None:
+    def begin(self, guards: Sequence[Guard], frozen: Collection[int], tied: Mapping[int, float] = NONE) -> None:
         """Put the active rows, their law and guards in force.
 
         Args:
             guards: what is watched.
+            tied: open rows that depend on the active ones, and since when they are, s.
             frozen: rows whose collisions take no time: inactive, they would follow their slow law.
         """
         work, e = self.work, self.equations
         terms = [(g, term) for g, guard in enumerate(guards) for term in guard.terms]
         work["size"][4:7] = len(e.active), len(terms), len(guards)
+        work["size"][9] = e.spread is not None
+        if e.spread is not None:
+            work["spread"][:, : len(e.active)] = e.spread
+        work["tied"][:] = 0
+        work["tied"][list(tied)] = 1
+        for i in tied:
+            work["let_go"][i] = tied[i]
         work["idx"][: len(e.active)] = e.active
         work["law"][:], work["law_if"][:] = e.law, e.law
         for i in range(e.system.nc):

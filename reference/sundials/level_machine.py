@@ -11,7 +11,7 @@ below -1e-9 m that does not close was started in penetration: it is active if it
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -20,8 +20,9 @@ import numpy as np
 from crossbody.cases import Event, Mode, Outcome
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System, initial_modes
-from crossbody.reference.sundials.compiled.evaluation import Kind
+from crossbody.reference.sundials.compiled.evaluation import LIFTED, Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
+from crossbody.reference.sundials.sharing import CONSISTENT, Sharing, rank, share
 
 SLOW, DEEP = 1e-9, 1e-9
 TOUCH = 64.0 * ULP  # of the largest position, at least 1: a gap this small is closed
@@ -64,7 +65,11 @@ class Guard:
 
 @dataclass(slots=True)
 class View:
-    """Everything the machine asks for at one instant; all (nc,) but vd (n,)."""
+    """Everything the machine asks for at one instant; all (nc,) but vd (n,).
+
+    Attributes:
+        alone: multipliers that the rows which hold all others would have without them.
+    """
 
     gap: Floats
     rate: Floats
@@ -72,6 +77,7 @@ class View:
     lam: Floats
     noise: Floats
     size: Floats
+    alone: Floats
 
 
 class LevelMachine:
@@ -102,6 +108,13 @@ class LevelMachine:
         self._seen: set[tuple[int, ...]] = set()
         self._one_by_one = self._alone = False
         self.guards: list[Guard] = []
+        self.sharing: Sharing | None = None
+        self.spent: set[int] = set()
+        self.tied: dict[int, float] = {}
+        self._lifted: dict[int, float] = {}
+        self.redundant = 0
+        self._bilateral = [i for i in range(system.nc) if not self.switching[i] and self.modes[i] in ACTIVE]
+        self._may_share = len(self.rows) > 1 and max(self.follows, default=-1) < 0
 
     @property
     def slow(self) -> float:
@@ -124,11 +137,32 @@ class LevelMachine:
         """Whether gap i closes."""
         return rate < -self.slow
 
-    def _activate(self, modes: list[Mode]) -> None:
+    def _activate(self, modes: list[Mode], joins: Sequence[int] = ()) -> None:
+        """Put a mode set in force, less the rows that others hold; `joins` are on trial."""
         for i, leader in enumerate(self.follows):
             if leader >= 0:
                 modes[i] = modes[leader]
-        self.equations.activate(modes)
+        if self.sharing is None:
+            self.equations.activate(modes)
+        else:
+            self.equations.activate(modes, {*range(len(modes))}.difference(self.sharing.basis, joins))
+            if not joins:
+                self.equations.spread = self.sharing.spread
+
+    def _share(self, t: float, q: Floats, v: Floats) -> list[int]:
+        """Find how the rows in contact hold each other where some depend on others; those that have to let go."""
+        self.sharing, spent, self.spent = None, self.spent, set()
+        contact = [i for i in self.rows if self.modes[i] in ACTIVE] if self._may_share else []
+        if not contact or self.frozen:
+            return []
+        self._activate(self.modes)
+        found = share(self.equations, t, q, v, contact, self._bilateral, spent)
+        if found is None:
+            return [i for i in contact if i in spent]
+        if not found.lifted:
+            self.sharing = found
+            self.redundant = max(self.redundant, len(contact) + len(self._bilateral) - len(found.basis))
+        return found.lifted
 
     def look(self, t: float, q: Floats, v: Floats) -> View:
         """Evaluate the present mode set."""
@@ -142,13 +176,18 @@ class LevelMachine:
             self._rounding = 8.0 * ULP * float((np.abs(e.held(t, q, v, self.rows)[1]) @ np.abs(v)).max())
         noise, size = e.noise(t, q, v, self.fastest)
         vd, lam = e.accelerate(t, q, v)
-        return View(gap, rate, vd, lam, noise, size)
+        if e.spread is None:
+            return View(gap, rate, vd, lam, noise, size, lam)
+        shared = e.spread @ lam[e.active]
+        return View(gap, rate, vd, shared, np.full(len(lam), noise.max()), np.full(len(lam), size.max()), lam)
 
     def pressure(self, i: int, t: float, q: Floats, v: Floats, error: float = 0.0) -> tuple[float, float]:
         """Multiplier of row i if it were active now, and its noise; -inf if ill posed. `error` is that of `noise`."""
+        if i in self.tied:
+            return self._beyond_law(i, t, q, v), 0.0
         trial = list(self.modes)
         trial[i] = self._active_mode(i)
-        self._activate(trial)
+        self._activate(trial, [i])
         try:
             noise, _ = self.equations.noise(t, q, v, error=error)
             _, lam = self.equations.accelerate(t, q, v)
@@ -157,6 +196,21 @@ class LevelMachine:
             return -np.inf, 0.0
         finally:
             self._activate(self.modes)
+
+    def _beyond_law(self, i: int, t: float, q: Floats, v: Floats) -> float:
+        """By how much row i is below its law, m/s^2, where the active rows determine it; one that is at it counts.
+
+        But not just after it was lifted off, or rounding would choose where a load is about to leave a row.
+        """
+        e = self.equations
+        vd, _ = e.accelerate(t, q, v)
+        with e._selected([i]):
+            H, h, Hdv = e.rows(t, q, v)
+            a0, a1, a2 = e.law[i]
+            terms = np.array([H[0] @ vd, Hdv[0], a1 * (H[0] @ v), (a0 + a2 * h[0] ** 2) * h[0]])
+        open_for = (t - self.tied[i]) * max(a0**0.5, a1)
+        band = CONSISTENT * np.abs(terms).sum()
+        return float((band if open_for > LIFTED else -band) - terms.sum())
 
     def _presses(self, i: int, h: float, t: float, q: Floats, v: Floats) -> bool:
         """Whether row i would push if it were active now."""
@@ -226,6 +280,14 @@ class LevelMachine:
         self._repeats(t)
         while True:
             try:
+                lifted = self._share(t, q, v)
+                for i in lifted:
+                    self._lifted[i] = t
+                    self._switch(t, i, self._released(i, float(self.equations.gaps(t, q, v)[0][i])))
+                changed.update(lifted)
+                if lifted:
+                    continue
+                self._tie(t, q, v)
                 view = self.look(t, q, v)
             except Ended as error:
                 if error.outcome is not Outcome.ILL_POSED or not settled or self._alone:
@@ -251,6 +313,24 @@ class LevelMachine:
                 self._seen.clear()
                 changed.clear()
 
+    def _tie(self, t: float, q: Floats, v: Floats) -> None:
+        """Find the open rows below the surface that depend on the active ones."""
+        self.tied = {}
+        open_ = [i for i in self.rows if self.modes[i] in (Mode.BALLISTIC, Mode.COLLISION_SEPARATION)]
+        if not self._may_share or not open_ or self.frozen:
+            return
+        self._activate(self.modes)
+        active = list(self.equations.active)
+        M, H = self.equations.held(t, q, v, [*active, *open_])
+        A = np.linalg.solve(np.linalg.cholesky(M), H.T).T
+        A /= np.linalg.norm(A, axis=1)[:, None]
+        held = A[: len(active)]
+        self.tied = {
+            i: self._lifted.get(i, -np.inf)
+            for i, row in zip(open_, A[len(active) :], strict=True)
+            if rank(np.vstack([held, row])) <= len(held)
+        }
+
     def _strongest(self, wanted: dict[int, Mode], t: float, q: Floats, v: Floats) -> list[int]:
         """The rows that change v' most, first all that only change their name: their order does not choose."""
         sizes = {
@@ -266,7 +346,7 @@ class LevelMachine:
         for mode in (Mode.FREE, self.modes[i] if self.modes[i] in ACTIVE else self._active_mode(i)):
             trial = list(self.modes)
             trial[i] = mode
-            self._activate(trial)
+            self._activate(trial, [i])
             try:
                 found.append(self.equations.accelerate(t, q, v)[0].copy())
             except Ended:
@@ -285,11 +365,13 @@ class LevelMachine:
             mode = self.modes[i]
             if watch == Watch.OTHER:
                 self._switch(t, i, Mode.CONTACT if mode == Mode.COLLISION else self._active_mode(i))
+            elif mode in ACTIVE and self.sharing is not None:
+                self.spent.add(i)  # others may carry on for it
             elif mode in ACTIVE:
                 self._switch(t, i, self._released(i, float(gap[i])))
             else:
                 self._switch(t, i, self._active_mode(i) if mode == Mode.FREE else Mode.FREE)
-        return len(self.events) > before
+        return len(self.events) > before or bool(self.spent)
 
     def move(self, t: float, modes: list[Mode]) -> None:
         """Take over the modes that the mechanism's `switch` wants."""
@@ -308,6 +390,8 @@ class LevelMachine:
         # just opened, whose next values round to either side; a gap that was open cannot close without a rate below 0.
         still = view.rate[i] <= self.slow or (frozen and mode != Mode.FREE)
         closing = Term(Kind.RATE, i, self.slow if still and (closed or mode != Mode.FREE) else 0.0)
+        if mode in ACTIVE and self.sharing is not None and not self.sharing.spread[i].any():
+            return []  # others hold it
         if mode in ACTIVE:
             lam, noise = float(view.lam[i]), float(view.noise[i])
             band = max(noise, noise - lam) if lam <= noise else 0.0  # one that starts as zero fires on rounding

@@ -35,7 +35,8 @@ LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING, BA
 LED, LEADS, POLYNOMIAL = 1, 4, 7  # of a coupling: coordinate and velocity, or tendon; where it rests; coefficients
 OF_POSES = (CONNECT, CONTACT, TURN, STRING)
 
-# What is kept of a node while it is computed: pose (rotation by rows, position), velocity, acceleration without v',
-# force, inertia; of a degree of freedom: its motion subspace (angular, linear).
-POSE_AT, V_AT, A_AT, F_AT, I_AT, NODE_SCRATCH = 0, 12, 18, 24, 30, 40
+# What is kept of a node while it is computed: pose (rotation by rows, position from its tree's root), velocity,
+# acceleration without v', force, inertia, and of a root its origin in the world; of a degree of freedom: its motion
+# subspace (angular, linear).
+POSE_AT, V_AT, A_AT, F_AT, I_AT, ORIGIN_AT, NODE_SCRATCH = 0, 12, 18, 24, 30, 40, 43
 DOF_SCRATCH = 6

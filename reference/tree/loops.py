@@ -17,7 +17,7 @@ from crossbody.reference import kernels
 from crossbody.reference._kinds import Array
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout
-from crossbody.reference.tree.points import point, pull, twist
+from crossbody.reference.tree.points import apart, point, pull, twist
 from crossbody.reference.tree.sweeps import cross, turned
 
 FIRST, SECOND = 2, 6  # in a row: a node, -1 for the world, and a point in its frame
@@ -40,8 +40,8 @@ def connect(p: Array, i: int, w: Array) -> tuple[Any, Any, Any]:
     """Return gap, rate and H' v of row i: component k of x1 - x2."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     k = int(p[o + 1].real)
-    x1, v1, a1 = _component(_end(p, o + FIRST, w), k)
-    x2, v2, a2 = _component(_end(p, o + SECOND, w), k)
+    first, second = apart(p, w, o + FIRST, o + SECOND)
+    (x1, v1, a1), (x2, v2, a2) = _component(first, k), _component(second, k)
     return x1 - x2, v1 - v2, a1 - a2
 
 

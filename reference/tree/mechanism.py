@@ -190,8 +190,8 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
     kinetic, potential = 0.0 * q[0], p[layout.RESTING] + 0.0 * q[0]
     for i in range(nodes):
         o, x = int(p[layout.AT_NODE].real) + layout.NODE * i, layout.NODE_SCRATCH * i
-        root = layout.NODE_SCRATCH * int(p[o + layout.ROOT].real)
-        sweeps.inertia(p, o, w, x, root)
+        root = layout.NODE_SCRATCH * int(p[o + layout.ROOT].real) + layout.ORIGIN_AT
+        sweeps.inertia(p, o, w, x)
         y, at = x + layout.V_AT, x + layout.I_AT
         n, f = sweeps.times(w, at, w[y], w[y + 1], w[y + 2], w[y + 3], w[y + 4], w[y + 5])
         kinetic += w[y] * n[0] + w[y + 1] * n[1] + w[y + 2] * n[2] + w[y + 3] * f[0] + w[y + 4] * f[1] + w[y + 5] * f[2]
@@ -202,7 +202,7 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
         c2 = m * p[o + layout.COM + 2] - p[lifted + 3]
         moment = sweeps.turned(w, x, c0, c1, c2)
         for k in range(3):
-            potential -= p[layout.GRAVITY + k] * (moment[k] + (m - p[lifted]) * w[x + 9 + k])
+            potential -= p[layout.GRAVITY + k] * (moment[k] + (m - p[lifted]) * (w[root + k] + w[x + 9 + k]))
         potential += _stored(q, p, o)
     for j in range(len(v)):
         kinetic += p[int(p[layout.AT_DOF].real) + layout.DOF * j + layout.ARMATURE] * v[j] * v[j]

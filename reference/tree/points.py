@@ -20,29 +20,62 @@ from crossbody.reference.tree.sweeps import cross, turned
 
 @kernels.helper
 def _root(p: Array, node: int) -> int:
-    """Return where the pose of the root of a node's tree stands in the scratch."""
-    return layout.NODE_SCRATCH * int(p[int(p[layout.AT_NODE].real) + layout.NODE * node + layout.ROOT].real)
+    """Return the root of a node's tree, -1 of the world's."""
+    return int(p[int(p[layout.AT_NODE].real) + layout.NODE * node + layout.ROOT].real) if node >= 0 else -1
+
+
+@kernels.helper
+def _origin(p: Array, w: Array, node: int) -> Any:
+    """Return the reference point of a node's tree in the world."""
+    o = layout.NODE_SCRATCH * _root(p, node) + layout.ORIGIN_AT
+    return w[o], w[o + 1], w[o + 2]
 
 
 @kernels.helper
 def point(p: Array, w: Array, node: int, a: Any, b: Any, c: Any) -> Any:
     """Return three times place, velocity and acceleration at v' = 0 of a point in a node's frame; node -1 rests."""
-    zero = 0.0 * w[0]
     if node < 0:
+        zero = 0.0 * w[0]
         return (a + zero, zero, zero), (b + zero, zero, zero), (c + zero, zero, zero)
-    x, root, g = layout.NODE_SCRATCH * node, _root(p, node), layout.GRAVITY
+    (x, u, e), (y, v, f), (z, t, g) = _from_origin(p, w, node, a, b, c)
+    o = _origin(p, w, node)
+    return (o[0] + x, u, e), (o[1] + y, v, f), (o[2] + z, t, g)
+
+
+@kernels.helper
+def apart(p: Array, w: Array, one: int, other: int) -> Any:
+    """Return the two points at p[one:] and p[other:], each a node and a place in its frame, and their motion.
+
+    They count from the reference point of their tree if it is the same one: their difference is then as exact far from
+    the world's origin as near.
+    """
+    first, second = int(p[one].real), int(p[other].real)
+    if first >= 0 and _root(p, first) == _root(p, second):
+        return (
+            _from_origin(p, w, first, p[one + 1], p[one + 2], p[one + 3]),
+            _from_origin(p, w, second, p[other + 1], p[other + 2], p[other + 3]),
+        )
+    return (
+        point(p, w, first, p[one + 1], p[one + 2], p[one + 3]),
+        point(p, w, second, p[other + 1], p[other + 2], p[other + 3]),
+    )
+
+
+@kernels.helper
+def _from_origin(p: Array, w: Array, node: int, a: Any, b: Any, c: Any) -> Any:
+    """Return the same of a point of a node that moves, its place from the reference point of its tree."""
+    x, g = layout.NODE_SCRATCH * node, layout.GRAVITY
     y, z = x + layout.V_AT, x + layout.A_AT
-    r0, r1, r2 = turned(w, x, a, b, c)
-    r0, r1, r2 = r0 + w[x + 9], r1 + w[x + 10], r2 + w[x + 11]
-    d0, d1, d2 = r0 - w[root + 9], r1 - w[root + 10], r2 - w[root + 11]
+    d0, d1, d2 = turned(w, x, a, b, c)
+    d0, d1, d2 = d0 + w[x + 9], d1 + w[x + 10], d2 + w[x + 11]
     u0, u1, u2 = cross(w[y], w[y + 1], w[y + 2], d0, d1, d2)
     u0, u1, u2 = u0 + w[y + 3], u1 + w[y + 4], u2 + w[y + 5]
     e = cross(w[z], w[z + 1], w[z + 2], d0, d1, d2)
     f = cross(w[y], w[y + 1], w[y + 2], u0, u1, u2)
     return (
-        (r0, u0, w[z + 3] + p[g] + e[0] + f[0]),
-        (r1, u1, w[z + 4] + p[g + 1] + e[1] + f[1]),
-        (r2, u2, w[z + 5] + p[g + 2] + e[2] + f[2]),
+        (d0, u0, w[z + 3] + p[g] + e[0] + f[0]),
+        (d1, u1, w[z + 4] + p[g + 1] + e[1] + f[1]),
+        (d2, u2, w[z + 5] + p[g + 2] + e[2] + f[2]),
     )
 
 
@@ -74,8 +107,8 @@ def pull(p: Array, w: Array, node: int, sign: float, n: Any, at: Any, H: Array) 
     """Add what a force of size `sign` along n at a place of a node is in the velocities on the way to the world."""
     if node < 0:
         return
-    root = _root(p, node)
-    m0, m1, m2 = cross(at[0] - w[root + 9], at[1] - w[root + 10], at[2] - w[root + 11], n[0], n[1], n[2])
+    o = _origin(p, w, node)
+    m0, m1, m2 = cross(at[0] - o[0], at[1] - o[1], at[2] - o[2], n[0], n[1], n[2])
     spaces, at_dof = layout.NODE_SCRATCH * int(p[layout.NODES].real), int(p[layout.AT_DOF].real)
     j = _last(p, node)
     while j >= 0:

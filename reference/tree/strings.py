@@ -9,7 +9,7 @@ from crossbody.reference._kinds import Array
 from crossbody.reference.pairs import solids
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout
-from crossbody.reference.tree.points import point, pull
+from crossbody.reference.tree.points import apart, point, pull
 
 SIGN, ENDS, BOUND = 1, 2, 10  # in a row: 1 below, -1 above; a node and a point in its frame, twice
 END = 4  # numbers of one end
@@ -17,21 +17,22 @@ END = 4  # numbers of one end
 
 @kernels.helper
 def between(p: Array, o: int, w: Array) -> Any:
-    """Return the distance of the second end at p[o:] from the first as a jet, its direction, and both points."""
-    k = o + END
-    one = point(p, w, int(p[o].real), p[o + 1], p[o + 2], p[o + 3])
-    two = point(p, w, int(p[k].real), p[k + 1], p[k + 2], p[k + 3])
+    """Return the distance of the second end at p[o:] from the first as a jet, and its direction."""
+    one, two = apart(p, w, o, o + END)
     d, n = solids.point(two, one)
-    return d, n, value(one), value(two)
+    return d, n
 
 
 @kernels.helper
 def along(p: Array, o: int, w: Array, force: Any, f: Array) -> None:
     """Add what a force that lengthens the distance of the ends at p[o:] does to the joints."""
-    _, n, one, two = between(p, o, w)
+    _, n = between(p, o, w)
     n = (force * n[0], force * n[1], force * n[2])
-    pull(p, w, int(p[o].real), -1.0, n, one, f)
-    pull(p, w, int(p[o + END].real), 1.0, n, two, f)
+    for end in range(2):
+        at = o + END * end
+        node = int(p[at].real)
+        where = value(point(p, w, node, p[at + 1], p[at + 2], p[at + 3]))
+        pull(p, w, node, 2.0 * end - 1.0, n, where, f)
 
 
 @kernels.helper

@@ -1,7 +1,8 @@
 """The two sweeps of a tree: outwards pose, velocity and acceleration; inwards composite inertia, bias and M.
 
 World axes throughout, and one reference point a tree, the origin of its root: a composite inertia is ten additions and
-a force six. Equations: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 and 6, in one frame.
+a force six. Positions count from there, so that what its bodies are to each other is as exact far from the world's
+origin as near. Equations: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 and 6, in one frame.
 """
 
 from __future__ import annotations
@@ -101,7 +102,7 @@ def pose(q: Array, p: Array, o: int, w: Array, x: int, above: int) -> None:
 
 
 @kernels.helper
-def columns(p: Array, o: int, w: Array, x: int, root: int, s: int) -> int:
+def columns(p: Array, o: int, w: Array, x: int, s: int) -> int:
     """Fill the motion subspace at w[s:] of the node at p[o:] with its pose at w[x:]; return its number of columns."""
     kind = int(p[o + layout.TYPE].real)
     if kind == layout.SLIDE:
@@ -110,7 +111,7 @@ def columns(p: Array, o: int, w: Array, x: int, root: int, s: int) -> int:
         put(w, s, (none, none, none), along)
         return 1
     d0, d1, d2 = turned(w, x, p[o + layout.ANCHOR], p[o + layout.ANCHOR + 1], p[o + layout.ANCHOR + 2])
-    d0, d1, d2 = d0 + w[x + 9] - w[root + 9], d1 + w[x + 10] - w[root + 10], d2 + w[x + 11] - w[root + 11]
+    d0, d1, d2 = d0 + w[x + 9], d1 + w[x + 10], d2 + w[x + 11]
     if kind == layout.HINGE:
         axis = turned(w, x, p[o + layout.AXIS], p[o + layout.AXIS + 1], p[o + layout.AXIS + 2])
         put(w, s, axis, cross(d0, d1, d2, axis[0], axis[1], axis[2]))
@@ -136,8 +137,12 @@ def outwards(q: Array, v: Array, p: Array, w: Array) -> None:
         parent, first = int(p[o + layout.PARENT].real), int(p[o + layout.V].real)
         above = layout.NODE_SCRATCH * parent
         pose(q, p, o, w, x, above)
+        if parent < 0:
+            for k in range(3):
+                w[x + layout.ORIGIN_AT + k] = w[x + 9 + k]
+                w[x + 9 + k] = 0.0 * w[x]
         s = layout.NODE_SCRATCH * nodes + layout.DOF_SCRATCH * first
-        count = columns(p, o, w, x, layout.NODE_SCRATCH * int(p[o + layout.ROOT].real), s)
+        count = columns(p, o, w, x, s)
         r = v[first]
         m0, m1, m2, m3, m4, m5 = w[s] * r, w[s + 1] * r, w[s + 2] * r, w[s + 3] * r, w[s + 4] * r, w[s + 5] * r
         for k in range(1, count):
@@ -185,13 +190,13 @@ def times(
 
 
 @kernels.helper
-def lift(p: Array, o: int, w: Array, x: int, root: int) -> None:
+def lift(p: Array, o: int, w: Array, x: int) -> None:
     """Take the weight that the node at p[o:] is spared, -c m g at its parts' centres, from its force."""
     k, g = o + layout.LIFT, layout.GRAVITY
     c0, c1, c2 = turned(w, x, p[k + 1], p[k + 2], p[k + 3])
     for r in range(3):
         w[x + layout.F_AT + 3 + r] += p[k] * p[g + r]
-    d0, d1, d2 = w[x + 9] - w[root + 9], w[x + 10] - w[root + 10], w[x + 11] - w[root + 11]
+    d0, d1, d2 = w[x + 9], w[x + 10], w[x + 11]
     n0, n1, n2 = cross(c0 + p[k] * d0, c1 + p[k] * d1, c2 + p[k] * d2, p[g], p[g + 1], p[g + 2])
     w[x + layout.F_AT] += n0
     w[x + layout.F_AT + 1] += n1
@@ -199,7 +204,7 @@ def lift(p: Array, o: int, w: Array, x: int, root: int) -> None:
 
 
 @kernels.helper
-def inertia(p: Array, o: int, w: Array, x: int, root: int) -> None:
+def inertia(p: Array, o: int, w: Array, x: int) -> None:
     """Fill inertia and force of the node at p[o:]: mass, first moment, second moment (xx yy zz xy xz yz)."""
     i, m = x + layout.I_AT, p[o + layout.MASS]
     if m == 0.0:
@@ -209,7 +214,7 @@ def inertia(p: Array, o: int, w: Array, x: int, root: int) -> None:
             w[x + layout.F_AT + k] = 0.0
         return
     c0, c1, c2 = turned(w, x, p[o + layout.COM], p[o + layout.COM + 1], p[o + layout.COM + 2])
-    c0, c1, c2 = c0 + w[x + 9] - w[root + 9], c1 + w[x + 10] - w[root + 10], c2 + w[x + 11] - w[root + 11]
+    c0, c1, c2 = c0 + w[x + 9], c1 + w[x + 10], c2 + w[x + 11]
     j = o + layout.INERTIA
     xx, yy, zz, xy, xz, yz = p[j], p[j + 1], p[j + 2], p[j + 3], p[j + 4], p[j + 5]
     # R J first, row by row, then R J R^T: its six entries alone.
@@ -233,7 +238,7 @@ def inertia(p: Array, o: int, w: Array, x: int, root: int) -> None:
     g0, g1, g2 = cross(w[y], w[y + 1], w[y + 2], P[0], P[1], P[2])
     put(w, x + layout.F_AT, (n[0] + e0 + k0, n[1] + e1 + k1, n[2] + e2 + k2), (f[0] + g0, f[1] + g1, f[2] + g2))
     if p[o + layout.LIFT] != 0.0:
-        lift(p, o, w, x, root)
+        lift(p, o, w, x)
 
 
 @kernels.helper
@@ -243,7 +248,7 @@ def inwards(p: Array, w: Array, M: Array, f: Array) -> None:
     spaces = layout.NODE_SCRATCH * nodes
     for i in range(nodes):
         o = at_node + layout.NODE * i
-        inertia(p, o, w, layout.NODE_SCRATCH * i, layout.NODE_SCRATCH * int(p[o + layout.ROOT].real))
+        inertia(p, o, w, layout.NODE_SCRATCH * i)
     M[:, :] = 0.0
     for i in range(nodes - 1, -1, -1):
         o, x = at_node + layout.NODE * i, layout.NODE_SCRATCH * i

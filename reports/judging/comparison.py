@@ -265,8 +265,11 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
 
 
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
-    """Metric -> deviation of every judged number of a run, to be stored; NaN for one that it does not have."""
-    rows = verdicts(case, entry, truth, "")
+    """Metric -> deviation of every judged number of a run, to be stored; NaN for one that it does not have.
+
+    The audit is stored beside them and does not stand before them: what is known of an engine is not known yet.
+    """
+    rows = verdicts(case, replace(entry, audit=()), truth, "")
     claims = {claim.metric: claim for claim in case.claims}
     found = {
         row.metric: deviation(row.value, claims.get(row.metric))

@@ -69,12 +69,18 @@ def _digest(case: Case) -> str:
 
 
 def write(measured: Iterable[tuple[Case, Entry, Deviations]]) -> None:
-    """Put runs in the place of those that are stored of the same cases; others stay."""
+    """Put runs in the place of those that are stored of the same cases and engines; others stay.
+
+    So do runs with the same parameters of engines that are not installed here.
+    """
     table = dict(_table())
     fresh: dict[str, Any] = {}
     for case, entry, found in measured:
-        runs = fresh.setdefault(case.label, {"parameters": _digest(case), "runs": {}})["runs"]
-        runs[f"{entry.engine}:{entry.profile}"] = {
+        if case.label not in fresh:
+            old, digest = table.get(case.label, {}), _digest(case)
+            kept = dict(old["runs"]) if old.get("parameters") == digest else {}
+            fresh[case.label] = {"parameters": digest, "runs": kept}
+        fresh[case.label]["runs"][f"{entry.engine}:{entry.profile}"] = {
             "settings": words(entry.settings),
             "deviations": {metric: _short(value) for metric, value in sorted(found.items())},
         }
@@ -95,12 +101,13 @@ def _short(value: float) -> float | str:
 
 
 def _measured(name: str, variant: str) -> list[tuple[Case, Entry, Deviations]]:
-    """What all engines give on one variant."""
+    """What all engines that are installed give on one variant."""
+    from crossbody import engines
     from crossbody.reports.judging.comparison import measured
     from crossbody.reports.runs import jobs
 
     (case,) = jobs.load_cases([name], variant, {})
-    result = jobs.run_case(case, jobs.picks(()), tell=print, refine=False)
+    result = jobs.run_case(case, jobs.picks(engines.names()), tell=print, refine=False)
     return [(case, entry, measured(case, entry, result.truth)) for entry in result.entries if entry.run]
 
 

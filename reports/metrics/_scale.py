@@ -1,4 +1,4 @@
-"""What a coordinate's error is measured by: the largest of its own motion, or of its like where it rests."""
+"""What errors are measured by: of a coordinate the largest of its own motion, or of its like where it rests."""
 
 from __future__ import annotations
 
@@ -10,11 +10,19 @@ import numpy as np
 from crossbody.cases._arrays import Floats
 
 if TYPE_CHECKING:
-    from crossbody.cases import Coordinate
+    from crossbody.cases import Coordinate, Trajectory
 
 RESTS = 1e-4
 """Coordinates of one unit that all stay below this, in SI, rest: what is left of their motion is known to absolute
 tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hundred of them."""
+
+
+def energy(run: Trajectory) -> float:
+    """Return what energies are measured by, J: the largest kinetic energy, or the swing of the potential.
+
+    A robot that stands sags by its servos at hardly any speed: its energy turns over in springs and weights.
+    """
+    return max(float(run.energy[:, 0].max()), float(np.ptp(run.energy[:, 1])))
 
 
 def of_like(largest: Floats, named: Sequence[Coordinate]) -> Floats:

@@ -1,4 +1,4 @@
-"""Work of every row against the truth's on matched arcs, over the largest kinetic energy."""
+"""Work of every row against the truth's on matched arcs, by the truth's largest energy."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import away
+from crossbody.reports.metrics._scale import energy
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -20,13 +21,15 @@ NEEDS = "ledger"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over samples and rows of |W - W_truth| / max T_truth; NaN without an account, None where the truth has none.
+    """Max over samples and rows of |W - W_truth| / the truth's largest energy.
+
+    NaN without an account, None where the truth has none.
 
     The sum over all rows is in `energy_integrator`; here each row has its own. Instants of collisions that take no time
     are left out, as in `energy_drift`.
     """
     inside, exact = aligned(truth, run)
-    scale = float(truth.trajectory.energy[:, 0].max())
+    scale = energy(truth.trajectory)
     if exact.ledger is None or scale == 0.0 or not inside.any() or not run.gap.shape[1]:
         return None
     if run.ledger is None:

@@ -1,4 +1,4 @@
-"""Energy against the truth's on matched arcs, over the largest kinetic energy."""
+"""Energy against the truth's on matched arcs, over the largest kinetic energy or the swing of the potential."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import away
+from crossbody.reports.metrics._scale import energy
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -18,13 +19,13 @@ CLAIMED = False
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |E(t) - E_truth(t)| / max T_truth.
+    """Max |E(t) - E_truth(t)| / the truth's largest energy.
 
     Instants of collisions that take no time are left out: several may share one, and a sample does not say behind which
     it stands.
     """
     inside, exact = aligned(truth, run)
-    scale = float(truth.trajectory.energy[:, 0].max())
+    scale = energy(truth.trajectory)
     if scale == 0.0 or not inside.any():
         return None
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)

@@ -1,4 +1,4 @@
-"""Energy that the integrator made or lost, over the largest kinetic energy.
+"""Energy that the integrator made or lost, over the largest kinetic energy or the swing of the potential.
 
 What is left of E(t) - E(0) after the work of the inputs, of every multiplier and of damping (spec 1.4).
 """
@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.reports.metrics._scale import energy
+
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
     from crossbody.reports.judging.truth import Truth
@@ -20,8 +22,8 @@ NEEDS = "ledger"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |E - E(0) - input + dissipated - work of all rows| / max T of the truth; NaN without an account."""
-    scale = float(truth.trajectory.energy[:, 0].max())
+    """Max |E - E(0) - input + dissipated - work of all rows| / the truth's largest energy; NaN without an account."""
+    scale = energy(truth.trajectory)
     if scale == 0.0:
         return None
     if run.ledger is None:

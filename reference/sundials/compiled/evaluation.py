@@ -49,6 +49,8 @@ class Kind(IntEnum):
 GAP, BELOW, RATE, FORCE, PRESS, SPENT, WATCH = (int(kind) for kind in Kind)
 SPENT_PART = 0.01  # elastic part of lam at which a collision hands over to contact
 GOOD, ILL_POSED, NOT_FINITE = range(3)
+CONSISTENT = 1e-9  # part of its terms by which a row that depends on others may be off its law
+LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 STIFF = 0.3  # step times damped pole beyond which a step counts as bound by stability
 
 DEGREE = 8
@@ -64,7 +66,7 @@ CAUTION = 16.0  # errors along the step in units of those seen at two places
 class Workspace:
     """Everything that `evaluate` reads and writes."""
 
-    size: Index  # n, nc, k, nz, na, terms, guards, nq, and 1 where q' is not v
+    size: Index  # n, nc, k, nz, na, terms, guards, nq, 1 where q' is not v, and 1 where active rows hold others
     count: Index  # evaluations, steps, steps in a row that stability binds, the most of these, guards undecided
     clock: Floats  # last instant, fastest damped pole, end of the last step and its start
     p: Floats
@@ -94,6 +96,9 @@ class Workspace:
     law_if: Floats2  # the same, with every inactive row as it would be
     idx: Index
     trial: Index
+    let_go: Floats  # (nc,) instant at which others lifted a row off that shared a load with them
+    tied: Index  # 1 for open rows that depend on the active ones
+    spread: Floats2  # (nc, nc) multipliers of all rows from those of the active ones, where these hold others
     follows: Index
     watched: Floats  # (guards of the mechanism,)
     kind: Index  # of every term
@@ -258,7 +263,11 @@ def _accelerate(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: 
     code = _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, -1, by_law)
     s.lam[:] = 0.0
     for j in range(s.size[4]):
-        s.lam[s.idx[j]] = s.solution[s.size[0] + j, 0]
+        if s.size[9]:
+            for i in range(s.size[1]):
+                s.lam[i] += s.spread[i, j] * s.solution[s.size[0] + j, 0]
+        else:
+            s.lam[s.idx[j]] = s.solution[s.size[0] + j, 0]
     return int(code)
 
 
@@ -383,9 +392,35 @@ def _residual(
 
 
 @inlined
+def _below_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, i: int) -> float:
+    """By how much row i is below its law under the active rows; one that they hold at its law counts as below."""
+    na, n, law = s.size[4], s.size[0], s.law_if
+    if _solve(dynamics, rows, s, t, q, v, s.idx, na, s.law, -1, True) != GOOD:
+        return -np.inf
+    s.trial[0] = i
+    s.H[:1] = 0.0
+    rows(t, q, v, s.p, s.w, s.trial, 1, s.H, s.h, s.Hdv)
+    push, rate, size, h = 0.0, 0.0, abs(s.Hdv[0]), s.h[0]
+    for c in range(n):
+        push += s.H[0, c] * s.solution[c, 0]
+        size += abs(s.H[0, c] * s.solution[c, 0])
+        rate += s.H[0, c] * v[c]
+    spring = (law[i, 0] + law[i, 2] * h * h) * h
+    size += law[i, 1] * abs(rate) + abs(spring)
+    open_for = (t - s.let_go[i]) * max(np.sqrt(law[i, 0]), law[i, 1])
+    band = CONSISTENT * size if open_for > LIFTED else -CONSISTENT * size
+    return float(band - (push + s.Hdv[0] + law[i, 1] * rate + spring))
+
+
+@inlined
 def _would_press(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, i: int) -> float:
-    """Multiplier of the inactive row i if it were active now; -inf where that is ill posed."""
+    """Multiplier of the inactive row i if it were active now; -inf where that is ill posed.
+
+    Of one that depends on the active rows by how much it is below its law.
+    """
     na = s.size[4]
+    if s.tied[i]:
+        return float(_below_law(dynamics, rows, s, t, q, v, i))
     for j in range(na):
         s.trial[j] = s.idx[j]
     s.trial[na] = i
@@ -684,7 +719,8 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
     n, nq, nc, all_ = system.n, system.nq, system.nc, system.n + system.nc
     ny = nq + n
     shapes: dict[str, tuple[int, ...]] = {
-        "size": (9,), "count": (5,), "clock": (4,), "w": (system.scratch,), "blocks": (n, system.mass_block),
+        "size": (10,), "count": (5,), "clock": (4,), "w": (system.scratch,), "blocks": (n, system.mass_block),
+        "spread": (nc, nc),
         **dict.fromkeys(("q", "qd", "law_q"), (nq,)), **dict.fromkeys(("f", "v", "law_v", "a0", "a1", "curve"), (n,)),
         "H": (nc, n), "two": (2,), "matrix": (all_, all_ + 2), "solution": (all_, 2), "law": (nc, 3),
         "law_if": (nc, 3), "arc": (nc, 3), "trial": (nc + 1,), "slopes": (ny + 2 * nc + nz,),
@@ -700,7 +736,7 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
     }
     arrays["p"], arrays["u"] = p, u
     arrays["follows"][:] = system.follows
-    arrays["arc"][:, 0] = np.nan
+    arrays["arc"][:, 0], arrays["let_go"][:] = np.nan, -np.inf
     arrays["size"][:4] = n, nc, system.mass_block, nz
-    arrays["size"][7:] = nq, system.velocity is not None
+    arrays["size"][7:9] = nq, system.velocity is not None
     return arrays, table([*arrays.values()])

@@ -1,0 +1,86 @@
+"""Multipliers of rows that depend on each other: a box that lies flat on a floor on its four corners.
+
+Their forces and the motion are determined as long as the rows do not contradict each other, their multipliers are not:
+of all that exert the same forces those of least norm are taken, so that no row is preferred by its place in the list.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference._cache import compiled, inlined
+from crossbody.reference._kinds import Array
+from crossbody.reference.core.algebra import ULP, solve_schur
+from crossbody.reference.core.layout import Work
+
+CONSISTENT = 1e-9  # part of its terms by which a row that depends on others may be off its law, and at least rtol
+STATE = 64.0 * ULP  # part of the coordinates that rounding moves a gap by
+
+
+@inlined
+def allow(s: Any, w: Work, q: Array, v: Array) -> None:
+    """Leave in w.allowed by how much each active row may be off its law."""
+    position, speed = 0.0, 0.0
+    for a in range(len(q)):
+        position = max(position, abs(q[a]))
+    for a in range(len(v)):
+        speed = max(speed, abs(v[a]))
+    part = max(CONSISTENT, s.rtol)
+    for j in range(s.na):
+        i = w.idx[j]
+        w.allowed[j] = part * w.scale[j] + STATE * (w.law[i, 0] * position + w.law[i, 1] * speed)
+
+
+@inlined
+def _null_vector(s: Any, w: Work, d: int, z: Array) -> bool:
+    """Z = e_d - c with row d = sum of c_j times row j; whether their right-hand sides agree as much."""
+    G = w.G
+    for j in range(s.na):
+        z[j] = -G[d, j] if w.reach[d] <= j < d else 0.0
+    z[d] = 1.0
+    for j in range(d - 1, -1, -1):
+        z[j] /= G[j, j]
+        for b in range(w.reach[j], j):
+            z[b] -= G[j, b] * z[j]
+    total, most = 0.0, 0.0
+    for j in range(d + 1):
+        total += z[j] * w.r[j]
+        most += abs(z[j]) * w.allowed[j]
+    return bool(abs(total) <= most)
+
+
+@inlined
+def _without(na: int, x: Array, z: Array) -> None:
+    """Take from x its part along the unit vector z."""
+    along = 0.0
+    for j in range(na):
+        along += x[j] * z[j]
+    for j in range(na):
+        x[j] -= along * z[j]
+
+
+@compiled
+def solve_dependent(s: Any, w: Work, q: Array, v: Array) -> bool:
+    """Fill la of least norm from r and the factor of rows that depend on each other; False if these contradict."""
+    na = s.na
+    solve_schur(w.G, na, w.reach, w.r, w.la)
+    allow(s, w, q, v)
+    count = 0
+    for d in range(na):
+        if w.G[d, d] < np.inf:
+            continue
+        z = w.null[count]
+        if not _null_vector(s, w, d, z):
+            return False
+        for known in range(count):
+            _without(na, z, w.null[known])
+        size2 = 0.0
+        for j in range(na):
+            size2 += z[j] * z[j]
+        for j in range(na):
+            z[j] /= np.sqrt(size2)
+        _without(na, w.la, z)
+        count += 1
+    return True

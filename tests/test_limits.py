@@ -1,0 +1,48 @@
+"""A limit that is wider for one engine is needed by what that engine gives, and not much wider than that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import pytest
+
+from crossbody import cases
+from crossbody.cases import Case, Limit
+from crossbody.cases._defaults import limits_of
+from crossbody.reports.judging import stored
+from crossbody.reports.judging.verdict import limit_for
+
+NEEDED = 10.0
+"""A run must come so near to the limit of all engines before one of them has a wider one."""
+WIDE = 100.0
+"""Times what the worst stored run gives: other parameters and horizons are within as well."""
+
+
+def widened(case: Case) -> Iterator[tuple[Limit, float, float]]:
+    """Limits of one engine that are wider than those of all, these, and the largest stored deviation under each."""
+    limits, runs = limits_of(case), stored._table()[case.label]["runs"]
+    for limit in limits:
+        everyone = limit_for([x for x in limits if x.engine == "*"], limit.metric, "", "")
+        if limit.engine == "*" or limit.known or everyone is None or limit.value <= everyone.value:
+            continue
+        gave = [
+            float(run["deviations"].get(limit.metric, math.nan))
+            for who, run in runs.items()
+            if limit_for(limits, limit.metric, *who.split(":")) is limit
+        ]
+        yield limit, everyone.value, max((x for x in gave if math.isfinite(x)), default=0.0)
+
+
+@pytest.mark.parametrize("name", cases.names())
+def test_a_wider_limit_of_one_engine_is_needed(name: str) -> None:
+    worst: dict[tuple[str, str, str], tuple[float, float, float]] = {}
+    for variant in cases.variants(name):
+        for limit, everyone, gave in widened(cases.load(name, variant)):
+            key = limit.metric, limit.engine, limit.profile
+            before = worst.get(key, (0.0, math.inf, 0.0))
+            worst[key] = max(before[0], limit.value), min(before[1], everyone), max(before[2], gave)
+    idle = [(key, numbers) for key, numbers in worst.items() if numbers[2] * NEEDED < numbers[1]]
+    wide = [(key, numbers) for key, numbers in worst.items() if numbers[0] > WIDE * numbers[2]]
+    assert idle == []
+    assert wide == []
