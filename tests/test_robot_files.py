@@ -220,7 +220,7 @@ def tilted(folder: Path, tilt: float, **parameters: Any) -> cases.Case:
     return cases.load(str(path), t_end=0.2, without="contacts", **parameters)
 
 
-@pytest.mark.parametrize("tilt", [1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("tilt", [1e-5, 1e-7])
 def test_a_row_that_is_nearly_dependent_is_named_and_left_out_or_kept(tmp_path: Path, tilt: float) -> None:
     """Without it the four-bar moves, with it it stands: both are told, and in both witnesses `rank` decides."""
     for rank, moves in ((-1, True), (2, True), (3, False)):
@@ -556,11 +556,11 @@ def test_a_string_goes_taut_and_slack_alike_in_three_engines(tmp_path: Path) -> 
     assert np.abs(np.subtract(*touches)).max() < 1e-9
     assert np.abs(runs[1].q[-1] - runs[0].q[-1]).max() <= 1e-8
     case = cases.load(str(path), "thrown", t_end=0.2)
-    run = engines.load("mujoco").prepare(case, "matched", dt=2e-5).run()
+    run = engines.load("mujoco").prepare(case, "matched", dt=1e-4).run()
     first = engines.load("reference").prepare(case, "compiled").run()
     assert run.outcome is Outcome.FINISHED
-    # A step is first order where it meets the end of the string: 2e-5 s of the difference that it makes to speeds.
-    assert np.abs(run.q[-1, :4] - first.q[-1, :4]).max() <= 2e-5
+    # A step is first order where it meets the end of the string: 1e-4 s of the difference that it makes to speeds.
+    assert np.abs(run.q[-1, :4] - first.q[-1, :4]).max() <= 1e-4
 
 
 WINCH = """

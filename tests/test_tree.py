@@ -14,7 +14,7 @@ from random_scenes import random_scene, random_state
 from crossbody.cases import CaseUnsupported, Mode, SceneError
 from crossbody.cases.files.case import case_of, rows_of
 from crossbody.cases.files.mjcf import scene_of
-from crossbody.cases.scene import Actuator, Body, Joint, Scene
+from crossbody.cases.scene import Actuator, Body, Joint, Scene, Tendon
 from crossbody.engines import load
 from crossbody.engines._scene import Forces, Rows
 from crossbody.engines.mujoco import _build as build
@@ -335,3 +335,12 @@ def test_what_turns_and_is_not_done_is_refused(joint: dict[str, Any], actuator: 
     actuators = (Actuator(name="a", joint="j", gear=(1.0, 0.0, 0.0), **actuator),) if actuator else ()
     with pytest.raises(SceneError, match=said):
         tabulate(Scene(bodies=(body,), joints=(Joint(name="j", body="b", **joint),), actuators=actuators))
+
+
+def test_points_of_a_string_may_meet() -> None:
+    """Nothing acts along it there: the energy is known, though the string has no direction."""
+    body = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    string = Tendon(name="s", bodies=("", "b"), positions=((0.0, 0.0, 0.0),) * 2, range=(-np.inf, 0.3))
+    scene = Scene(bodies=(body,), joints=(Joint(name="j", body="b", type="slide"),), tendons=(string,))
+    M, f, e = ours(scene, np.zeros(1), np.ones(1), np.zeros(0))
+    assert np.isfinite([*M.ravel(), *f, *e]).all()

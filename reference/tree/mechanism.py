@@ -208,7 +208,9 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
         kinetic += p[int(p[layout.AT_DOF].real) + layout.DOF * j + layout.ARMATURE] * v[j] * v[j]
     for i in range(int(p[layout.TENDONS].real)):
         o = forces.tendon(p, i)
-        potential += forces.stored(p, o + layout.STIFF, forces.slack(p, o, forces.measured(q, v, p, w, o)[0]))
+        k = o + layout.STIFF
+        if p[k] != 0.0 or p[k + 1] != 0.0 or p[k + 2] != 0.0:  # points of a string may meet, where it has no direction
+            potential += forces.stored(p, k, forces.slack(p, o, forces.measured(q, v, p, w, o)[0]))
     e[0], e[1] = 0.5 * kinetic, potential
 
 
