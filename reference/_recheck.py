@@ -189,7 +189,8 @@ class _Recheck:
         contact = [i for i in self.rows if modes[i] in ACTIVE]
         if len(contact) > 1 and not self.frozen:
             always = [i for i in e.active if i not in contact]
-            found = share(e, run.t[first], run.q[first], run.v[first], contact, always, ())
+            q, v = run.q[first].copy(), run.v[first].copy()  # those of a trajectory may be read alone
+            found = share(e, run.t[first], q, v, contact, always, ())
             if found is not None and not found.lifted:
                 e.activate(modes, {*e.active}.difference(found.basis))
                 e.spread = found.spread
