@@ -12,9 +12,11 @@ import chromium
 import numpy as np
 import pytest
 from ladder import ladder
+from resting import plate
 from study_pages import studies
 
 from crossbody.cases import load
+from crossbody.engines import load as load_engine
 from crossbody.reports import sections
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
@@ -109,6 +111,43 @@ def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browse
     )
     browser.js("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     assert browser.picture(".player canvas") != side
+    assert browser.complaints() == []
+
+
+@pytest.fixture(scope="module")
+def solids(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a scene: a plate that lies on a floor."""
+    case = plate([(x, y, 0.0) for x in (-0.1, 0.1) for y in (-0.1, 0.1)], height=0.02, t_end=0.1)
+    entry = Entry(engine="reference", profile="compiled", run=load_engine("reference").prepare(case, "compiled").run())
+    results = [CaseResult(case=case, truth=truth_of(case), entries=(entry,))]
+    path = tmp_path_factory.mktemp("solids") / "out"
+    with folder(path) as made:
+        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
+        site.write(made)
+    (page,) = path.glob("case-*.html")
+    return page
+
+
+def test_a_scene_is_turned_and_looked_at_from_near(solids: Path, browser: chromium.Browser) -> None:
+    browser.open(solids)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    canvas = "document.querySelector('.player canvas')"
+    browser.js(drawn)
+    first = browser.picture(".player canvas")
+
+    def after(action: str) -> bytes:
+        browser.js(f"{{ const canvas = {canvas}; {action} }}")
+        browser.js(drawn)
+        return browser.picture(".player canvas")
+
+    wheel = "canvas.dispatchEvent(new WheelEvent('wheel', {deltaY: -400, cancelable: true}));"
+    assert after(wheel) == first, "a page is scrolled past a picture that nobody has touched"
+    ways = [f"canvas.dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}'}}));" for key in ("ArrowLeft", "+")]
+    for way in (*ways, f"canvas.focus(); {wheel}", "document.querySelector('[data-axes]').click();"):
+        seen = after(way)
+        assert seen != first, way
+        first = seen
     assert browser.complaints() == []
 
 
