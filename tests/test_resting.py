@@ -177,7 +177,7 @@ def agree(seed: int) -> None:
     assert apart(case, ours, theirs) <= 1e-6
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 41, 67])  # of 41, 67 the load leaves over an edge
 def test_random_plates_move_alike_in_two_solvers(seed: int) -> None:
     agree(seed)
 

@@ -27,6 +27,7 @@ from crossbody.reference.sundials.sharing import CONSISTENT, Sharing, rank, shar
 SLOW, DEEP = 1e-9, 1e-9
 TOUCH = 64.0 * ULP  # of the largest position, at least 1: a gap this small is closed
 SAME_INSTANT = 8.0 * ULP
+CLOSE = 1e-12  # part of the time within which rows of one body let go together
 SIDES = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))  # |x| + |y| <= z: so for each choice of signs
 SAME_CHANGE = 1e-9  # part by which changes of v' may differ and count as equal
 
@@ -110,6 +111,7 @@ class LevelMachine:
         self.guards: list[Guard] = []
         self.sharing: Sharing | None = None
         self.spent: set[int] = set()
+        self._all_spent, self._shared = set[int](), -np.inf
         self.tied: dict[int, float] = {}
         self._lifted: dict[int, float] = {}
         self.redundant = 0
@@ -151,7 +153,11 @@ class LevelMachine:
 
     def _share(self, t: float, q: Floats, v: Floats) -> list[int]:
         """Find how the rows in contact hold each other where some depend on others; those that have to let go."""
-        self.sharing, spent, self.spent = None, self.spent, set()
+        self.sharing = None
+        if abs(t - self._shared) > CLOSE * abs(t):  # rows that are spent one right behind another are so together
+            self._all_spent.clear()
+        self._all_spent |= self.spent
+        self._shared, self.spent, spent = t, set(), self._all_spent
         contact = [i for i in self.rows if self.modes[i] in ACTIVE] if self._may_share else []
         if not contact or self.frozen:
             return []

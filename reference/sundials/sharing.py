@@ -125,11 +125,12 @@ def share(
     carrying = _carrying(at, y, one_sided, every, spent, span)
     if carrying is None:
         return Sharing([], nothing, [i for i in every if i in spent])
-    raw = at.A[carrying] * at.length[carrying, None]
-    lam = np.linalg.lstsq(raw.T, y - at.free, rcond=RANK)[0]
-    pulling = [every[k] for k, x in zip(carrying, lam, strict=True) if one_sided[k] and x < -PULL * np.abs(lam).max()]
+    pulling = _pulling(at, y, one_sided, carrying)
+    if pulling:  # the least multipliers would pull, others that exert the same forces need not
+        carrying = _pushing(at, y, one_sided, np.array([i in spent for i in every])) or carrying
+        pulling = [k for k in carrying if every[k] in spent] or _pulling(at, y, one_sided, carrying)
     if pulling:  # a row that nothing presses, and that the others need to be held
-        return Sharing([], nothing, pulling)
+        return Sharing([], nothing, [every[k] for k in pulling])
     order = qr(at.A[carrying].T, mode="r", pivoting=True)[-1][:span]
     basis = sorted(carrying[k] for k in order)
     lengths = at.length[:, None] / at.length[basis]
@@ -171,10 +172,30 @@ def _carrying(
     lam = np.linalg.lstsq(B, want, rcond=RANK)[0] if found is None else found[0]
     heavy = (lam > NOTHING * np.abs(lam).max()) | ~one_sided
     heavy &= ~np.array([i in spent for i in every])
+    carrying = _completed(at, heavy, np.array([i in spent for i in every]))
+    return None if any(every[k] in spent for k in carrying) else carrying
+
+
+def _completed(at: _Rows, heavy: Flags, spent: Flags) -> list[int]:
+    """Return places of these rows and of others that hold what they leave free, spent ones last."""
     carrying = np.flatnonzero(heavy).tolist()
-    for k in [*(k for k in range(count) if every[k] not in spent), *(k for k in range(count) if every[k] in spent)]:
+    for k in np.argsort(spent, kind="stable").tolist():
         if k not in carrying and rank(at.A[[*carrying, k]]) > rank(at.A[carrying]):
-            if every[k] in spent:
-                return None
             carrying.append(k)
     return sorted(carrying)
+
+
+def _pulling(at: _Rows, y: Floats, one_sided: Flags, carrying: list[int]) -> list[int]:
+    """Return places of the rows whose multipliers, the least of those that carry, pull."""
+    raw = at.A[carrying] * at.length[carrying, None]
+    lam = np.linalg.lstsq(raw.T, y - at.free, rcond=RANK)[0]
+    return [k for k, x in zip(carrying, lam, strict=True) if one_sided[k] and x < -PULL * np.abs(lam).max()]
+
+
+def _pushing(at: _Rows, y: Floats, one_sided: Flags, spent: Flags) -> list[int]:
+    """Return places of few rows that exert the forces without any of them pulling; none if there are none."""
+    force, raw = y - at.free, at.A * at.length[:, None]
+    lam, off = nnls(np.vstack([raw, -raw[~one_sided]]).T, force)
+    if off > NOTHING * float(np.abs(force).max()):
+        return []
+    return _completed(at, (lam[: len(raw)] > NOTHING * lam.max()) | ~one_sided, spent)
