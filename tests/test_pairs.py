@@ -107,6 +107,22 @@ def test_a_sphere_against_a_solid(name: str) -> None:
         check_derivatives(gap)
 
 
+@pytest.mark.parametrize("sine", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_capsules_that_are_nearly_parallel_part_as_their_points_do(sine: float) -> None:
+    """Where the nearest points run along, the distance does not: its rate is that of the points where they meet."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        one, two = Frame(rng), Frame(rng)
+        axis = np.cross(one.R[:, 2], rng.normal(size=3))
+        turn = axis / np.linalg.norm(axis) * sine
+        two.R = one.R + np.cross(turn, one.R.T).T
+        two.R /= np.linalg.norm(two.R, axis=0)
+        (d, n, K), (stepped, _, _) = segments(0.0, one, two), segments(1j * STEP, one, two)
+        met = np.array(K) + d[0] * np.array(n)
+        assert d[1] == pytest.approx(np.dot(n, two.speed(met) - one.speed(K)), rel=1e-10, abs=1e-10)
+        assert stepped[1].imag / STEP == pytest.approx(d[2], rel=1e-6, abs=1e-6)
+
+
 def test_a_capsule_against_a_capsule() -> None:
     for seed in SEEDS:
         rng = np.random.default_rng(seed)

@@ -72,6 +72,16 @@ def dot(x: Vector, y: Vector) -> Jet:
 
 
 @kernels.helper
+def cross(x: Vector, y: Vector) -> Vector:
+    """Return the vector product of two vectors."""
+    return (
+        less(times(x[1], y[2]), times(x[2], y[1])),
+        less(times(x[2], y[0]), times(x[0], y[2])),
+        less(times(x[0], y[1]), times(x[1], y[0])),
+    )
+
+
+@kernels.helper
 def apart(x: Vector, y: Vector) -> Vector:
     """Return the vector x - y."""
     return less(x[0], y[0]), less(x[1], y[1]), less(x[2], y[2])

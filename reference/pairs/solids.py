@@ -19,6 +19,7 @@ from crossbody.reference.pairs.jets import (
     add,
     along,
     apart,
+    cross,
     dot,
     less,
     over,
@@ -29,8 +30,8 @@ from crossbody.reference.pairs.jets import (
     value,
 )
 
-PARALLEL = 1e-8
-"""Square of the sine below which two segments have no nearest points to more than half of the digits."""
+PARALLEL = 1e-20
+"""Square of the sine below which two segments count as parallel: their nearest points are then no better known."""
 Distance = Any
 """A jet, and three numbers."""
 
@@ -131,9 +132,11 @@ def segments(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float)
     """Return the nearest points of segments about M and N along A and B; the middle of the overlap of parallel ones."""
     D, b = apart(N, M), dot(A, B)
     f, g = dot(A, D), dot(B, D)
-    free = shifted(scaled(-1.0, times(b, b)), 1.0)
+    # A.D - (A.B)(B.D) and 1 - (A.B)^2 by vector products: as differences they have no digits left near parallels.
+    across = cross(A, B)
+    free = dot(across, across)
     if free[0].real > PARALLEL:
-        s = _held(over(less(f, times(b, g)), free), -one, one)
+        s = _held(over(dot(across, cross(D, B)), free), -one, one)
     else:
         reach = scaled(two, b) if b[0].real > 0.0 else scaled(-two, b)
         s = scaled(0.5, add(_held(less(f, reach), -one, one), _held(add(f, reach), -one, one)))
