@@ -284,6 +284,22 @@ def test_every_engine_says_the_same_physics(seed: int) -> None:
             assert row.ok, (engine, row)
 
 
+def test_what_is_fixed_to_the_world_has_its_weight_in_every_engine() -> None:
+    inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+    scene = Scene(
+        bodies=(
+            Body(name="base", position=(0.0, 0.0, 0.5), mass=3.0, com=(0.1, 0.2, 0.3), inertia=inertia),
+            Body(name="rod", parent="base", mass=1.0, com=(0.0, 0.0, -0.5), inertia=inertia),
+        ),
+        joints=(Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0)),),
+    )
+    case = case_of(scene, q0=[1.0], t_end=0.01)
+    wanted = 9.81 * (3.0 * 0.8 + 0.5 - 0.5 * np.cos(1.0))
+    for engine, profile in (("reference", "compiled"), ("mujoco", "matched"), ("pinocchio", "law")):
+        run = load(engine).prepare(case, profile).run()
+        assert run.energy[0, 1] == pytest.approx(wanted, rel=1e-12), engine
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rates_of_positions_are_those_of_mujoco(seed: int) -> None:
     """q' against the difference of positions that MuJoCo integrates; quaternions keep their length to first order."""

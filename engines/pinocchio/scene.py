@@ -177,13 +177,16 @@ def _observe(
 ) -> Any:  # fmt: skip
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
+    # Pinocchio leaves out what is fixed to the world.
+    fixed = [(body, placed[body.name][1]) for body in scene.bodies if placed[body.name][0] == 0]
+    held = -sum(body.mass * float(pose.act(np.array(body.com)) @ np.array(scene.gravity)) for body, pose in fixed)
 
     def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
         energy: Floats = np.empty((len(q), 2))
         for i in range(len(q)):
             # Armature is in Pinocchio's M but not in its kinetic energy.
             energy[i, 0] = pin.computeKineticEnergy(model, data, q[i], v[i]) + 0.5 * (model.armature * v[i]) @ v[i]
-            energy[i, 1] = pin.computePotentialEnergy(model, data, q[i])
+            energy[i, 1] = held + pin.computePotentialEnergy(model, data, q[i])
             for body in scene.bodies:
                 if body.weightless:
                     carrier, pose = placed[body.name]

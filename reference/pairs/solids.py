@@ -30,8 +30,8 @@ from crossbody.reference.pairs.jets import (
     value,
 )
 
-PARALLEL = 1e-20
-"""Square of the sine below which two segments count as parallel: their nearest points are then no better known."""
+PARALLEL = 1e-8
+"""Square of the sine below which two segments count as parallel, and meet in the middle of their overlap."""
 Distance = Any
 """A jet, and three numbers."""
 

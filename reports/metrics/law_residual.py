@@ -55,6 +55,12 @@ def multipliers(
     return np.asarray(found, dtype=np.float64)
 
 
+def moving_part(H: Floats, lam: Floats) -> Floats:
+    """Return the part of multipliers (m,) of rows H (m, n) that exerts a force: all, if none depends on others."""
+    part: Floats = H @ (np.linalg.pinv(H) @ lam)
+    return part
+
+
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples; NaN where lam is not known.
 
@@ -76,6 +82,9 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     for i in spread(run, told):
         rows = np.flatnonzero(closed[i])
         lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION, inputs)
-        worst = max(worst, float(np.max(np.abs(run.lam[i, rows] - lam))))
+        worst = max(
+            worst,
+            float(np.max(np.abs(moving_part(system.constraint(run.q[i], run.v[i])[0][rows], run.lam[i, rows] - lam)))),
+        )
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / scale if scale else None
