@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases._arrays import Floats
-from crossbody.cases.scene import Scene, Shape, Vector
+from crossbody.cases._rotations import matrices
+from crossbody.cases.scene import Scene, Shape
 from crossbody.cases.scene_contacts import Contact, contacts
 
 TURN = 1e-3
@@ -55,7 +56,7 @@ class Contacts:
         self.all: Sequence[Contact] = contacts(scene)
         self.rows = [(k, place) for k, contact in enumerate(self.all) for place in range(contact.places)]
         shapes = {shape.name: shape for contact in self.all for shape in (contact.first, contact.second)}
-        self.shapes = {name: (shape, rotation(shape.orientation)) for name, shape in shapes.items()}
+        self.shapes = {name: (shape, matrices(np.array(shape.orientation))) for name, shape in shapes.items()}
 
     @property
     def count(self) -> int:
@@ -77,14 +78,6 @@ class Contacts:
         one, two = placed[first.name], placed[second.name]
         found = _over(one, second, two) if first.type == "plane" else [_between(first, one, second, two)]
         return [Touch(gap - contact.pair.margin, n, point, first.body, second.body) for gap, n, point in found]
-
-
-def rotation(quaternion: Vector) -> Floats:
-    """Return the rotation matrix of a quaternion, w first, of any length above 0."""
-    w, *xyz = np.array(quaternion) / np.linalg.norm(quaternion)
-    K = np.cross(np.eye(3), xyz)
-    R: Floats = np.eye(3) + 2.0 * w * K + 2.0 * K @ K
-    return R
 
 
 def _placed(shape: Shape, turned: Floats, pose: Pose) -> Pose:

@@ -125,6 +125,14 @@ def rows_at(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
     return H, h, Hdv
 
 
+def drift_of(model: Any, row: Any, q: Any, v: Any) -> Any:
+    """H' v by what MuJoCo's rows (h, H) are at two instants of a motion."""
+    step, ends = 1e-6, [np.array(q), np.array(q)]
+    mujoco.mj_integratePos(model, ends[0], v, step)
+    mujoco.mj_integratePos(model, ends[1], v, -step)
+    return (row(ends[0], v)[1] - row(ends[1], v)[1]) @ v / (2.0 * step)
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_loops_are_those_of_mujoco(seed: int) -> None:
     """Gaps and rows; H'v by what MuJoCo's rows are at two instants of a motion."""
@@ -152,10 +160,7 @@ def test_loops_are_those_of_mujoco(seed: int) -> None:
     h, J = look(q, v)
     assert close(mine, h)
     assert close(H, J)
-    step, ends = 1e-6, [np.array(q), np.array(q)]
-    mujoco.mj_integratePos(model, ends[0], v, step)
-    mujoco.mj_integratePos(model, ends[1], v, -step)
-    moved = (look(ends[0], v)[1] - look(ends[1], v)[1]) @ v / (2.0 * step)
+    moved = drift_of(model, look, q, v)
     assert np.abs(moved - Hdv).max() <= 1e-7 * max(1.0, np.abs(Hdv).max())
 
 
@@ -235,10 +240,7 @@ def test_bounds_of_ball_joints_are_those_of_mujoco(seed: int) -> None:
         theirs, J = row(q, v)
         assert close(h, theirs)
         assert close(H, J)
-        step, ends = 1e-6, [np.array(q), np.array(q)]
-        mujoco.mj_integratePos(model, ends[0], v, step)
-        mujoco.mj_integratePos(model, ends[1], v, -step)
-        moved = (row(ends[0], v)[1] - row(ends[1], v)[1]) @ v / (2.0 * step)
+        moved = drift_of(model, row, q, v)
         assert np.abs(moved - Hdv).max() <= 1e-6 * max(1.0, np.abs(Hdv).max())
 
 

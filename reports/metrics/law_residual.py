@@ -41,8 +41,8 @@ def multipliers(
     rows: NDArray[np.intp],
     fast: NDArray[np.bool_],
     inputs: Inputs | None = None,
-) -> Floats:
-    """Lam (len(rows),) that the law asks for at one state with those rows active, `fast` with those of COLLISION."""
+) -> tuple[Floats, Floats]:
+    """H (m, n) of some rows, and lam (m,) that the law asks for with them active, `fast` with those of COLLISION."""
     acting = case.inputs if inputs is None else inputs
     M, f = system.terms(q, v, u=None if acting is None else acting.at(t), t=t)
     H, h, Hdv = (part[rows] for part in system.constraint(q, v))
@@ -52,7 +52,7 @@ def multipliers(
     wanted = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
     inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
     found = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
-    return np.asarray(found, dtype=np.float64)
+    return H, np.asarray(found, dtype=np.float64)
 
 
 def moving_part(H: Floats, lam: Floats) -> Floats:
@@ -81,10 +81,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     worst, scale = 0.0, 0.0
     for i in spread(run, told):
         rows = np.flatnonzero(closed[i])
-        lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION, inputs)
-        worst = max(
-            worst,
-            float(np.max(np.abs(moving_part(system.constraint(run.q[i], run.v[i])[0][rows], run.lam[i, rows] - lam)))),
-        )
+        H, lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION, inputs)
+        worst = max(worst, float(np.max(np.abs(moving_part(H, run.lam[i, rows] - lam)))))
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / scale if scale else None
