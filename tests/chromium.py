@@ -9,6 +9,7 @@ import select
 import shutil
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,11 @@ QUIET = (
     "--disable-background-networking", "--hide-scrollbars", "--remote-debugging-pipe",
 )  # fmt: skip
 LOCAL = ("file:", "data:", "blob:", "about:")
+NAVIGATED = -32000  # DevTools protocol: the page that was asked is gone
+
+
+class NavigatedError(Exception):
+    """The page went to another while it was asked."""
 
 
 def binary() -> str | None:
@@ -76,6 +82,8 @@ class Browser:
         while True:
             answer = self._next(60.0)
             if answer.get("id") == self.number:
+                if answer.get("error", {}).get("code") == NAVIGATED:
+                    raise NavigatedError(answer["error"]["message"])
                 assert "error" not in answer, answer
                 return answer["result"]
             self.events.append(answer)
@@ -87,11 +95,23 @@ class Browser:
         return found["result"].get("value")
 
     def wait(self, expression: str, patience: float = 30.0) -> None:
-        """Until an expression is true."""
+        """Until an expression is true, on whatever page the browser comes to meanwhile."""
         start = time.monotonic()
-        while not self.js(expression):
+        while not self._true_here(expression):
             assert time.monotonic() - start < patience, f"never true: {expression}"
             time.sleep(0.05)
+
+    def _true_here(self, expression: str) -> bool:
+        try:
+            return bool(self.js(expression))
+        except NavigatedError:
+            return False
+
+    def follow(self, expression: str, arrival: str) -> None:
+        """Do what leads to another page; ends where the other is loaded and `arrival` is true."""
+        with suppress(NavigatedError):
+            self.js(expression)
+        self.wait(f"document.readyState === 'complete' && {arrival}")
 
     def open(self, path: Path, width: int = 1400, theme: str = "light", anchor: str = "") -> None:
         """One page, loaded; what was said before is forgotten."""

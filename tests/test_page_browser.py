@@ -177,8 +177,7 @@ def test_engines_are_hidden_everywhere(out: Path, browser: chromium.Browser) -> 
 
 def test_a_cell_leads_to_the_verdicts_of_its_engine(out: Path, browser: chromium.Browser) -> None:
     browser.open(out / INDEX)
-    browser.js("document.querySelectorAll('.cell a')[1].click()")
-    browser.wait("location.pathname.endsWith('linear.html') && document.readyState === 'complete'")
+    browser.follow("document.querySelectorAll('.cell a')[1].click()", "location.pathname.endsWith('linear.html')")
     browser.wait("document.querySelector('[data-filter=engine]').value === 'fake:p1'")
     rows = "[...document.querySelectorAll('.verdicts tbody tr')].filter((row) => !row.hidden)"
     assert browser.js(f"{rows}.length > 0 && {rows}.every((row) => row.dataset.engine === 'fake:p1')")
