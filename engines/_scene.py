@@ -43,6 +43,20 @@ def stored(constants: Vector, x: Floats) -> Floats:
     return total
 
 
+def derivatives(c: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return the coefficients, from the constant on, of a polynomial and of its first two derivatives."""
+    first = tuple(k * c[k] for k in range(1, len(c)))
+    return c, first, tuple(k * first[k] for k in range(1, len(first)))
+
+
+def horner(c: Vector, x: float) -> float:
+    """Return the value of a polynomial."""
+    value = 0.0
+    for one in reversed(c):
+        value = value * x + one
+    return value
+
+
 def places(scene: Scene) -> tuple[dict[str, int], dict[str, int]]:
     """Return joint -> first position, and joint -> first velocity."""
     widths = np.array([WIDTHS[joint.type] for joint in scene.joints]).reshape(-1, 2)
@@ -77,6 +91,7 @@ class Forces:
 
     Attributes:
         scene: whose.
+        nv: number of its velocities.
         at: joint -> its first position.
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
@@ -89,6 +104,7 @@ class Forces:
     """
 
     scene: Scene
+    nv: int = field(init=False)
     at: dict[str, int] = field(init=False)
     place: dict[str, int] = field(init=False)
     single: Any = field(init=False)
@@ -104,6 +120,7 @@ class Forces:
     def __post_init__(self) -> None:
         """Lay out which joint each part moves."""
         scene, n = self.scene, self.scene.nv
+        self.nv = n
         self.at, self.place = places(scene)
         single = [joint.name for joint in scene.joints if joint.type in ("slide", "hinge")]
         self.single = np.array([(self.at[name], self.place[name]) for name in single], dtype=int).reshape(-1, 2).T
@@ -118,7 +135,7 @@ class Forces:
 
     def x(self, q: Floats) -> Floats:
         """Return x (..., nv) of positions (..., nq)."""
-        x: Floats = np.zeros((*np.shape(q)[:-1], self.scene.nv))
+        x: Floats = np.zeros((*np.shape(q)[:-1], self.nv))
         x[..., self.single[1]] = q[..., self.single[0]]
         return x
 
@@ -263,6 +280,7 @@ class Rows:
     scene: Scene
     forces: Forces
     ends: list[tuple[tuple[Floats, float], tuple[Floats, float]]] = field(init=False)
+    curves: list[tuple[Vector, Vector, Vector]] = field(init=False)
 
     def __post_init__(self) -> None:
         """Refuse loops in space, which an engine's own kinematics must give."""
@@ -270,12 +288,13 @@ class Rows:
             if loop.in_space:
                 raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
         self.ends = [(self._end(loop.type, loop.first), self._end(loop.type, loop.second)) for loop in self.scene.loops]
+        self.curves = [derivatives(loop.polynomial) for loop in self.scene.loops]
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""
         x = self.forces.x(q)
         h = [self._loop(i, x)[0] for i in range(len(self.ends))]
-        for part, length, _, _ in self._bounded(q, np.zeros(self.scene.nv)):
+        for part, length, _, _ in self._bounded(q, np.zeros(self.forces.nv)):
             low, high = part.range
             h += [length - low - part.margin] if np.isfinite(low) else []
             h += [high - length - part.margin] if np.isfinite(high) else []
@@ -285,7 +304,7 @@ class Rows:
         """Return H (nc, nv)."""
         x = self.forces.x(q)
         H = [self._loop(i, x)[1] for i in range(len(self.ends))]
-        for part, _, row, _ in self._bounded(q, np.zeros(self.scene.nv)):
+        for part, _, row, _ in self._bounded(q, np.zeros(self.forces.nv)):
             H += [sign * row for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
         return np.array(H).reshape(-1, len(x))
 
@@ -299,7 +318,7 @@ class Rows:
 
     def _bounded(self, q: Floats, v: Floats) -> list[tuple[Joint | Tendon, float, Floats, float]]:
         """What may have bounds, but distances of points: its length, its derivative (nv,), and its drift."""
-        unit, forces, x = np.eye(self.scene.nv), self.forces, self.forces.x(q)
+        unit, forces, x = np.eye(self.forces.nv), self.forces, self.forces.x(q)
         found: list[tuple[Joint | Tendon, float, Floats, float]] = []
         for joint in self.scene.joints:
             first = forces.place[joint.name]
@@ -312,7 +331,7 @@ class Rows:
 
     def _angle(self, joint: Joint, q: Floats, v: Floats) -> tuple[float, Floats, float]:
         """Return the angle of a ball joint, its derivative along v (nv,), and its second along a steady v."""
-        row, moved = np.zeros(self.scene.nv), self.forces.moved(joint)
+        row, moved = np.zeros(self.forces.nv), self.forces.moved(joint)
         vector = angle_of(q[self.forces.at[joint.name] :][:4])
         angle = float(np.linalg.norm(vector))
         row[moved] = vector / angle if angle > 0.0 else 0.0
@@ -323,16 +342,16 @@ class Rows:
     def _end(self, kind: str, name: str) -> tuple[Floats, float]:
         """Return the derivative (nv,) of a coordinate or a length, zero without a name, and what it is at rest."""
         if not name:
-            return np.zeros(self.scene.nv), 0.0
+            return np.zeros(self.forces.nv), 0.0
         if kind == "tendon":
             i = [tendon.name for tendon in self.scene.tendons].index(name)
             return self.forces.T[i], self.scene.rest_length(self.scene.tendons[i])
         reference = next(joint.reference for joint in self.scene.joints if joint.name == name)
-        return np.eye(self.scene.nv)[self.forces.place[name]], reference
+        return np.eye(self.forces.nv)[self.forces.place[name]], reference
 
     def _loop(self, i: int, x: Floats) -> tuple[float, Floats, float]:
         """Return h, H and the second derivative of the polynomial."""
         (first, rest), (second, other) = self.ends[i]
-        P, y = np.polynomial.Polynomial(self.scene.loops[i].polynomial), float(second @ x) - other
-        slope, curve = float(P.deriv()(y)), float(P.deriv(2)(y))
-        return float(first @ x) - rest - float(P(y)), first - slope * second, curve
+        y = float(second @ x) - other
+        value, slope, curve = (horner(one, y) for one in self.curves[i])
+        return float(first @ x) - rest - value, first - slope * second, curve

@@ -86,7 +86,7 @@ class Joined:
 
         def bent(one: End, two: End, scale: float) -> Floats:
             (w1, c1), (w2, c2) = (angular(self.model, self.data, end) for end in (one, two))
-            own: Floats = self._map(one, two) @ (c1 - c2 - np.cross(w2, w1))
+            own: Floats = self._map(one, two) @ (c1 - c2 - cross(w2, w1))
             return scale * (own - 0.25 * (w1 - w2) @ (w1 - w2) * self._between(one, two)[1])
 
         def pulled(end: End) -> Floats:
@@ -116,6 +116,12 @@ class Joined:
         return found
 
 
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return a x b of two vectors (3,): a tenth of the time that NumPy's takes of arrays of any shape."""
+    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
 def at(data: Any, end: End) -> Any:
     """Return the pose of an end in the world."""
     return data.oMi[end.joint] * end.pose
@@ -137,7 +143,7 @@ def moved(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
     turn, spin = angular(model, data, end)
     rate = pin.getVelocity(model, data, end.joint, AXES).linear
     own = pin.getClassicalAcceleration(model, data, end.joint, AXES).linear
-    return rate + np.cross(turn, arm), own + np.cross(spin, arm) + np.cross(turn, np.cross(turn, arm))
+    return rate + cross(turn, arm), own + cross(spin, arm) + cross(turn, cross(turn, arm))
 
 
 class Spans:
@@ -299,15 +305,20 @@ def none_pulling(lam: Floats, J: Floats, one_sided: Sequence[bool]) -> Floats:
     Returns:
         They (na,), or `lam` where there are none: rows have to let go.
     """
-    bounds = np.eye(len(lam))[list(one_sided)]
-    U, s, _ = np.linalg.svd(J.T, full_matrices=False)
-    B = U[:, s > DEPENDENT * s[0]].T @ J.T
-    size = float(np.abs(B @ lam).max()) or 1.0
-    G, h = np.vstack([bounds, B, -B]), np.concatenate([np.zeros(len(bounds)), B @ lam / size, -(B @ lam) / size])
-    E, target = np.vstack([G.T, h]), np.append(np.zeros(len(lam)), 1.0)
+    U, s, Vt = np.linalg.svd(J.T)
+    rank = int((s > DEPENDENT * s[0]).sum())
+    several = np.abs(Vt[rank:]).max(axis=0, initial=0.0) > DEPENDENT
+    # The multiplier of any other row is unique: it may be as small as it likes beside these.
+    lam, own, pushing = lam.copy(), lam[several], np.asarray(one_sided)[several]
+    bounds = np.eye(len(own))[pushing]
+    B = U[:, :rank].T @ J.T[:, several]
+    size = float(np.abs(B @ own).max(initial=0.0)) or 1.0
+    G, h = np.vstack([bounds, B, -B]), np.concatenate([np.zeros(len(bounds)), B @ own / size, -(B @ own) / size])
+    E, target = np.vstack([G.T, h]), np.append(np.zeros(len(own)), 1.0)
     found, off = nnls(E, target)  # the least x with G x >= h: Lawson and Hanson 1974, ch. 23
     if off < NO_SUCH:
         return lam
     rest = E @ found - target
     least: Floats = -rest[:-1] / rest[-1] * size
-    return np.where(one_sided, np.maximum(least, 0.0), least)
+    lam[several] = np.where(pushing, np.maximum(least, 0.0), least)
+    return lam

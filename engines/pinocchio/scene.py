@@ -40,14 +40,15 @@ def build(case: Case, algebra: str) -> Prepared:
     forces = parts.Forces(scene)
     rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space)), forces)
     model, placed = tree(scene)
-    model.armature[:] = forces.armature
+    armature = forces.armature
+    model.armature[:] = armature
     to = Coordinates(scene)
     forces.spans = spans(scene, model, placed, to)
     centres = at_centres(scene, forces, model, model.createData(), placed)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
-        ours = forces(to.ours(q), to.velocities(q, v)) - forces.armature * to.bend(q, v)
+        ours = forces(to.ours(q), to.velocities(q, v)) - armature * to.bend(q, v)
         tau[:] = to.back(q, ours) + centres(q)
 
     loops, strings = [loop for loop in scene.loops if loop.in_space], [one for one in scene.tendons if one.bodies]
@@ -56,10 +57,12 @@ def build(case: Case, algebra: str) -> Prepared:
     ]  # fmt: skip
     touching, order = ContactRows(scene, model, placed), _order(scene)
 
+    @last_asked
     def heights(q: Floats) -> Floats:
         own = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
         return np.concatenate([own[order], touching.heights(q)])
 
+    @last_asked
     def jacobian(q: Floats) -> Floats:
         own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
         return np.concatenate([own[order], touching.jacobian(q)])
@@ -79,11 +82,11 @@ def build(case: Case, algebra: str) -> Prepared:
         drift_of=drift_of,
     )  # fmt: skip
     start = to.theirs(case.q0)
-    if loops or touching.count > 1:  # planar loops have rows that depend on each other, and bodies on many feet
+    if _may_depend(scene, touching.count):
         widths = [loop.width for loop in scene.loops]
         root = np.linalg.cholesky(mass_matrix(model, pinned.data, start))
         A = np.linalg.solve(root, jacobian(start)[: sum(widths)].T).T
-        loose = loose_rows(A, widths, case.rank) if loops else ()
+        loose = loose_rows(A, widths, case.rank) if widths else ()
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
@@ -93,6 +96,32 @@ def build(case: Case, algebra: str) -> Prepared:
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def _may_depend(scene: Scene, touching: int) -> bool:
+    """Return whether rows that act at once may depend on each other; bounds of joints alone do not.
+
+    Planar loops have rows that do, joints that are coupled and both at their bounds, and bodies on many feet.
+    """
+    bounds = [part for part in scene.bounded if np.isfinite(part.range).any()]
+    tendons = any(isinstance(part, Tendon) for part in bounds)
+    return bool(scene.loops) or touching > 1 or (bool(bounds) and (touching > 0 or tendons))
+
+
+def last_asked(function: Heights) -> Heights:
+    """Keep the last answer, which may only be read: a step asks several times at one place."""
+    at: Floats = np.zeros(0)
+    found: Floats = np.zeros(0)
+
+    def kept(q: Floats) -> Floats:
+        nonlocal at, found
+        if not np.array_equal(q, at):
+            found = function(q)
+            found.flags.writeable = False
+            at = np.array(q)
+        return found
+
+    return kept
 
 
 def spans(scene: Scene, model: Any, placed: Placed, to: Coordinates) -> Callable[[Floats, Floats], parts.Stretch]:
