@@ -32,6 +32,12 @@ from crossbody.engines.mujoco._scene import Scene as Prepared
 SLOWEST, OF_RATE = 1e-3, 0.02
 """Largest step of the matched profile, s, and the part of the fastest time constant that it is: Runge-Kutta 4 leaves
 (1/50)^4 a time constant."""
+REMAINING = 1e-4
+"""Factor on R: rows of many joints are solved by Newton's method, which ends where the costs, f^2 R/2, are below 1e-15.
+Of loads of a newton 1e-7 leaves multipliers off by 1e-3 and 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`)."""
+REACH = 1e-12
+"""How far above its surface a row of the matched profile still pushes, m or rad: MuJoCo's are on below it alone, where
+a row at rest, or one that starts at its surface, is off in every other step."""
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 SOFT = "The file's rows are soft: their law varies with depth."
@@ -146,7 +152,9 @@ def matched(scene: Scene) -> Any:
     off = mujoco.mjtDisableBit
     option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE)
     model = compiled(spec, scene)
-    without_regularisation(model)
+    without_regularisation(model, REMAINING)
+    for margin in (model.jnt_margin, model.tendon_margin, model.pair_margin):
+        margin += REACH
     return model
 
 
@@ -271,15 +279,22 @@ class Rows:
         return self.places[kind, part, bool(off[1] < off[0])]
 
     def hook(self) -> Hook | None:
-        """Return what gives contacts, strings and bounds of ball joints their H' v; None without such rows."""
+        """Return what takes `REACH` out of the law and adds H' v of contacts, strings and bounds of ball joints."""
         joints, tendons = self.scene.joints, self.scene.tendons
         bent = {(int(LIMITS[0]), i): i for i, joint in enumerate(joints) if joint.type == "ball" and joint.limited}
         bent |= {(int(LIMITS[1]), i): len(joints) + i for i, tendon in enumerate(tendons) if tendon.bodies}
-        if not bent and not self.touching.count:
+        if self.nc == self.always:
             return None
         drift, first = Drift(self.scene, self.model, self.touching), self.nc - self.touching.count
+        straight = not bent and not self.touching.count
 
         def hook(_model: Any, data: Any) -> None:
+            if data.nefc == data.ne:
+                return
+            gains = data.efc_KBIP[data.ne :]  # a0 is the first times the third
+            data.efc_aref[data.ne :] -= gains[:, 0] * gains[:, 2] * REACH
+            if straight:
+                return
             acting = [(j, int(data.efc_type[j]), int(data.efc_id[j])) for j in range(data.ne, data.nefc)]
             acting = [one for one in acting if one[1] == TOUCH or one[1:] in bent]
             if not acting:
