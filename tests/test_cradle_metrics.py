@@ -101,8 +101,8 @@ def test_pendulums_are_judged_when_the_first_collisions_are_over() -> None:
     speed = row(case).speed / case.number("length")
     v = speed * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.3, 0.2]])
     run = Trajectory(
-        t=np.array([0.0, 0.25, 0.25, 0.5]), q=np.zeros((4, 2)), v=v, gap=np.zeros((4, 1)), lam=np.zeros((4, 1)),
-        energy=np.ones((4, 2)), mode=np.zeros((4, 1), dtype=np.int8),
+        t=np.array([0.0, 0.25, 0.25, 0.5]), q=np.zeros((4, 2)), v=v, gap=np.array([[0.1], [0.0], [0.0], [0.1]]),
+        lam=np.zeros((4, 1)), energy=np.ones((4, 2)), mode=np.zeros((4, 1), dtype=np.int8),
         events=(
             Event(t=0.25, contact=0, before=Mode.FREE, after=Mode.COLLISION),
             Event(t=0.25, contact=0, before=Mode.COLLISION, after=Mode.FREE),

@@ -13,6 +13,7 @@ from crossbody import cases as cases_
 from crossbody import engines
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
 from crossbody.cases._defaults import limits_of
+from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports.judging.audit import AuditRow, audit, difference
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
@@ -329,3 +330,12 @@ def test_every_case_is_limited_in_all_that_it_has() -> None:
             assert wanted <= set(found), each.label
             assert found["position"] <= 1e-3, each.label
             assert found["velocity"] <= 1e-1, each.label
+
+
+@pytest.mark.parametrize(("profile", "word"), [("as_is", Word.INFO), ("matched", Word.OUTSIDE)])
+def test_a_file_as_it_stands_may_count_no_touches(profile: str, word: Word, case: Case, motion: Trajectory) -> None:
+    """Its soft rows need not touch where the law's do: parts of its error tell how far they go."""
+    silent = replace(motion, events=(), mode=np.zeros_like(motion.mode))
+    entry = Entry(engine="mujoco", profile=profile, run=silent)
+    rows = judged(replace(case, limits=AS_IT_STANDS), [entry], truth_of(case), "")
+    assert {row.metric: row.verdict for row in rows}["event_times"] == word

@@ -239,6 +239,8 @@ class _Judge:
             return self.row(metric, math.nan, unit, Word.INFO, self.entry.hidden[needs], expected=expected)
         known = "" if limit is None else limit.known
         word = Word.EXPECTED if known and stored is not None and math.isnan(stored) else Word.OUTSIDE
+        if limit is not None and limit.covers_none and claim is None:
+            return self.row(metric, math.nan, unit, Word.INFO, f"{why} Known: {limit.known}.")
         if claim is not None:
             why += f" {claim.expected:g} claimed: {claim.source}."
         return self.row(

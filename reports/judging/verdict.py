@@ -98,7 +98,7 @@ def limit_for(limits: Sequence[Limit], metric: str, engine: str, profile: str) -
     found, known = precise(metric), precise("*")
     if found is None or known is None or found.known or metric in IDENTITIES:
         return found
-    return replace(found, known=known.known)
+    return replace(found, known=known.known, covers_none=known.covers_none)
 
 
 def deviation(value: float, claim: Claim | None) -> float:

@@ -10,6 +10,10 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._trajectory import Event, Mode, Trajectory
 
 CLOSED = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
+AT_REST = 1e-10
+"""Gap, m or rad (relative to positions above 1), within which a row is at its surface: what errors make of it."""
+LIGHT = 1e-12
+"""Multiplier, N or N m (relative to the largest above 1), that rounding makes of none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,19 +48,71 @@ class Contact:
 def contacts(run: Trajectory) -> tuple[Contact, ...]:
     """Every contact in order of its touch.
 
-    From the run's events; a run without a notion of mode is read by the sign of its gaps instead.
+    From the run's events; a run without a notion of mode is read by the sign of its gaps instead. A row that stays at
+    its surface from the start to the end, or from one contact to the next, is in contact all along: which of two rows
+    pushes that depend on each other, whether one pushes that bears nothing, and what the sign of its gap is, are
+    rounding and no properties of the motion.
     """
     if not run.events and run.mode.size and np.all(run.mode == -1):
         return _by_sign(run)
-    found: list[Contact] = []
-    last: dict[int, int] = {}
+    found: dict[int, list[Contact]] = {row: [] for row in range(run.gap.shape[1])}
     for event in run.events:
+        mine = found[event.contact]
         if event.after in CLOSED and event.before not in CLOSED:
-            last[event.contact] = len(found)
-            found.append(Contact(event.contact, event.t))
-        elif event.contact in last:
-            found[last[event.contact]] = found[last[event.contact]].behind(event)
-    return tuple(found)
+            mine.append(Contact(event.contact, event.t))
+        elif mine:
+            mine[-1] = mine[-1].behind(event)
+    rests = _Rests(run)
+    return tuple(sorted((c for row, own in found.items() for c in rests.joined(row, own)), key=lambda c: c.touch))
+
+
+class _Rests:
+    """Where the rows of a run stay at their surface."""
+
+    def __init__(self, run: Trajectory) -> None:
+        self.t, self.v, self.mode, self.lam = run.t, run.v, run.mode, np.abs(run.lam)
+        self.gap = np.abs(run.gap)
+        self.near = AT_REST * max(1.0, float(np.max(np.abs(run.q), initial=0.0)))
+        self.light = LIGHT * max(1.0, float(np.nanmax(self.lam, initial=0.0)))
+
+    def joined(self, row: int, own: list[Contact]) -> list[Contact]:
+        """Return the contacts of one row less those that bear nothing, and those joined between which no gap opens."""
+        if (own and self._led(row)) or (self.mode[:, row] < 0).any():
+            return own
+        if len(self.t) and self._stays(row, self.t[0], np.inf) and self.mode[0, row] != Mode.BILATERAL:
+            return [Contact(row, float(self.t[0]))]
+        found: list[Contact] = []
+        for c in own:
+            if self._bears_nothing(c):
+                continue
+            if found and self._stays(row, found[-1].release, c.touch):
+                found[-1] = replace(c, touch=found[-1].touch, settled=min(found[-1].settled, c.settled))
+            else:
+                found.append(c)
+        if found and self._stays(row, found[-1].release, np.inf):
+            found[-1] = replace(found[-1], release=np.inf, free=np.inf)
+        return found
+
+    def _led(self, row: int) -> bool:
+        """Whether a row without a gap (slip) has its mode from another."""
+        if self.gap[:, row].any():
+            return False
+        same = (self.mode == self.mode[:, [row]]).all(axis=0)
+        return bool((same & self.gap.any(axis=0)).any())
+
+    def _stays(self, row: int, start: float, end: float) -> bool:
+        """Whether a row is at its surface at all samples from one instant to another."""
+        if not np.isfinite(start):
+            return False
+        first, last = np.searchsorted(self.t, start, side="left"), np.searchsorted(self.t, end, side="right")
+        return bool((self.gap[first:last, row] <= self.near).all())
+
+    def _bears_nothing(self, c: Contact) -> bool:
+        """Whether a row at its surface does not push, and has not struck: no velocity jumps at one instant."""
+        first, last = np.searchsorted(self.t, c.touch, side="left"), np.searchsorted(self.t, c.release, side="right")
+        struck = c.release == c.touch and bool(np.ptp(self.v[first:last], axis=0).any())
+        light = bool((self.lam[first:last, c.row] <= self.light).all())
+        return last > first and light and not struck and self._stays(c.row, c.touch, c.release)
 
 
 def _by_sign(run: Trajectory) -> tuple[Contact, ...]:
