@@ -13,6 +13,8 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Tier, Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.parts import Split, Study, splits
@@ -278,3 +280,17 @@ def test_a_published_biped_is_soft_by_its_file_and_converges_where_it_is_stiff()
     assert start[1e-4] == pytest.approx(4.15e-2, rel=0.02)
     for dt, error in stiff.items():
         assert error == pytest.approx(9.81 * dt * case.t_end / 2.0, rel=0.05)
+
+
+def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    rod = Scene(
+        bodies=(Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0)),),
+        joints=(Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0)),),
+    )
+    pick, swing = jobs.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
+    told = [jobs.run_case(swing, [pick], truth=None).entries[0].study]
+    monkeypatch.setattr(jobs, "STUDIES_S", 0.0)
+    told.append(jobs.run_case(swing, [pick], truth=None).entries[0].study)
+    assert [study is not None and len(study.runs) > 1 for study in told] == [True, False]
+    assert told[1] is not None
+    assert "Runs with other dt that tell it would take about" in told[1].why

@@ -6,19 +6,30 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from time import process_time
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Case, Tier, Trajectory, _arguments
+from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Tier, Trajectory, _arguments
 from crossbody.cases._arrays import Floats
 from crossbody.cases._rotations import differences
 from crossbody.cases._trajectory import Ledger
 from crossbody.reports.judging._between import between
 from crossbody.reports.judging.modes import violated
 
+if TYPE_CHECKING:
+    from crossbody.engines import Run
+
 SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
+WITNESS = 100.0
+"""Tolerance of the witness that shares nothing but the scene, likewise: a run in Python, whose steps cost 1e3 more."""
+WITNESS_S, SHARE = 40.0, 0.05
+"""Time that this witness may take, s, by what it takes for the first part of the horizon, and that part."""
+METHODS = ("Adams", "BDF")
+"""Of CVODE: the second costs less where rows, dampers or servos are stiff."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
 STEPS, GROWTH = 1e4, 10.0
@@ -161,15 +172,47 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
 
     dense = at(sample_times(first, case.t_end))
     tier = Tier.D if other == "compiled" else Tier.C
-    loose = SECOND * case.tight
-    second = reference.prepare(case, other, rtol=loose).run()
+    who, loose, why = other, SECOND * case.tight, ""
+    shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
+    second = _witness(case) if case.scene is not None and tier is Tier.C else None
+    if isinstance(second, Trajectory):
+        who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "the scene alone"
+    else:
+        why = f" ({second})" if second else ""
+        second = reference.prepare(case, other, rtol=loose).run()
     truth = _held_against(Truth(tier=tier, source="", trajectory=dense, at=at, agreement={}), second, case, loose)
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
-    shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
-    source = f"compiled reference at rtol {case.tight:g}, {other} at {loose:g} agrees: {said}; they share {shared}"
+    source = f"compiled reference at rtol {case.tight:g}, {who} at {loose:g} agrees: {said}; they share {shared}{why}"
     if truth.parted < case.t_end:
         source += f"; they part at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
     return _rechecked(replace(truth, source=source), case)
+
+
+def _witness(case: Case) -> Trajectory | str:
+    """A scene's motion in Pinocchio, or the reason why there is none.
+
+    Its model is built from the scene; kinematics, forces, rows, location of events and integrator are others' or
+    written apart.
+    """
+    from crossbody import engines
+
+    try:
+        pinocchio = engines.load("pinocchio")
+        part, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
+        cost, method = min((_seconds(pinocchio.prepare(part, "law", rtol=rtol, method=m)), m) for m in METHODS)
+        if cost > SHARE * WITNESS_S:
+            return f"Pinocchio would share the scene alone, and take about {cost / SHARE:.0f} s"
+        run = pinocchio.prepare(case, "law", rtol=rtol, method=method).run()
+    except (EngineUnavailable, CaseUnsupported) as error:
+        return str(error).removesuffix(".")
+    return run if run.outcome.ok else f"Pinocchio ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
+
+
+def _seconds(run: Run) -> float:
+    """Time that a run takes of one processor, s."""
+    began = process_time()
+    run.run()
+    return process_time() - began
 
 
 def _rechecked(truth: Truth, case: Case) -> Truth:

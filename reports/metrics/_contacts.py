@@ -112,7 +112,7 @@ class _Rests:
         first, last = np.searchsorted(self.t, c.touch, side="left"), np.searchsorted(self.t, c.release, side="right")
         struck = c.release == c.touch and bool(np.ptp(self.v[first:last], axis=0).any())
         light = bool((self.lam[first:last, c.row] <= self.light).all())
-        return last > first and light and not struck and self._stays(c.row, c.touch, c.release)
+        return bool(last > first) and light and not struck and self._stays(c.row, c.touch, c.release)
 
 
 def _by_sign(run: Trajectory) -> tuple[Contact, ...]:

@@ -40,6 +40,9 @@ TRUTHS = 3.0
 """A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
+STUDIES_S, DEARER = 30.0, 3.0
+"""Time that all runs of a study of a scene may take, s, by what its own run took; one at a tight tolerance is taken to
+cost so many times as much."""
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
 
@@ -291,11 +294,21 @@ def _study(case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: T
         return Study(why="It has neither a step nor a tolerance that could be refined.", **told)
     setting = next(iter(size))
     for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
+        cost = _cost(setting, sizes, size[setting], natural.wall_s)
+        if case.scene is not None and cost > STUDIES_S:
+            return Study(why=f"Runs with other {setting} that tell it would take about {cost:.0f} s.", **told)
         known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
         runs = [known.get(one) or run(**of_scene, **{setting: one}, **samples) for one in sizes]
         if not (failed := [one for one in runs if isinstance(one, str)]):
             return Study(setting=setting, sizes=sizes, runs=tuple(runs), **told)  # type: ignore[arg-type]
     return Study(why=failed[0], **told)
+
+
+def _cost(setting: str, sizes: Sequence[float], size: float, once: float) -> float:
+    """About what the runs of a study take, s, but for the one that is known."""
+    if setting == "rtol":
+        return once * DEARER * len(sizes)
+    return once * sum(size / one for one in sizes if one != size)
 
 
 def _sizes(setting: str, size: float, steps: int, tight: float) -> list[tuple[float, ...]]:
