@@ -27,8 +27,8 @@ def law_of(solref: Any) -> tuple[float, float]:
     return -float(solref[0]) / MAX_IMPEDANCE, -float(solref[1]) / MAX_IMPEDANCE
 
 
-def without_regularisation(model: Any, remaining: float = REMAINING) -> None:
+def without_regularisation(model: Any) -> None:
     """Scale what R is made from: inverse weights of bodies (contacts), joints (joint rows) and tendons."""
-    model.body_invweight0[:] *= remaining
-    model.dof_invweight0[:] *= remaining
-    model.tendon_invweight0[:] *= remaining
+    model.body_invweight0[:] *= REMAINING
+    model.dof_invweight0[:] *= REMAINING
+    model.tendon_invweight0[:] *= REMAINING

@@ -32,9 +32,10 @@ from crossbody.engines.mujoco._scene import Scene as Prepared
 SLOWEST, OF_RATE = 1e-3, 0.02
 """Largest step of the matched profile, s, and the part of the fastest time constant that it is: Runge-Kutta 4 leaves
 (1/50)^4 a time constant."""
-REMAINING = 1e-4
-"""Factor on R: rows of many joints are solved by Newton's method, which ends where the costs, f^2 R/2, are below 1e-15.
-Of loads of a newton 1e-7 leaves multipliers off by 1e-3 and 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`)."""
+STIFF = 1e3
+"""Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
+method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
+1e-3, 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`). Loops in space bear many times what moves, and want 1e-7."""
 REACH = 1e-12
 """How far above its surface a row of the matched profile still pushes, m or rad: MuJoCo's are on below it alone, where
 a row at rest, or one that starts at its surface, is off in every other step."""
@@ -152,7 +153,9 @@ def matched(scene: Scene) -> Any:
     off = mujoco.mjtDisableBit
     option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE)
     model = compiled(spec, scene)
-    without_regularisation(model, REMAINING)
+    without_regularisation(model)
+    model.dof_invweight0[:] *= STIFF
+    model.tendon_invweight0[:] *= STIFF
     for margin in (model.jnt_margin, model.tendon_margin, model.pair_margin):
         margin += REACH
     return model
