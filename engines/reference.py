@@ -67,7 +67,7 @@ def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     model = model_of(Path(case.file), str(case.parameters.get("without", "")))
     rows = contacts(case.scene) if case.scene is not None else ()
     known = {frozenset((contact.first.name, contact.second.name)) for contact in rows}
-    found = first_contact(model, run.t, run.q, known) if run.outcome.ok else ""
+    found = first_contact(model, run.t, run.q, run.v, known) if run.outcome.ok else ""
     return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
 

@@ -161,6 +161,7 @@ def run_case(
 
     Raises:
         UnknownName: for a setting that none of them knows.
+        CaseUnsupported: for a file whose motion leaves what its model covers: nothing could be judged.
     """
     asked = dict(settings or {}) | ({} if rtol is None else {"rtol": rtol})
     check_names(case)
@@ -170,6 +171,8 @@ def run_case(
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} cannot be had. {why}")
     truth = truth_of(case) if truth is None else truth
+    if case.file and truth.trajectory.outcome is Outcome.INCONSISTENT:
+        raise CaseUnsupported(f"{case.label}: {truth.trajectory.message}")
     reference = _reference_audit(case)
     entries = []
     for pick in (of_case(one, case) for one in wanted):

@@ -1,0 +1,53 @@
+"""Shapes that meet without a row: found between the steps of a run, located, and told in one sentence."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crossbody import cases, engines
+from crossbody.cases import CaseUnsupported, Outcome
+from crossbody.reports.runs import jobs
+
+GATE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody>
+  <geom name="wall" type="box" pos="{wall} 0 0" size="{half} 1 1"/>
+  <body name="ball" pos="{start} 0 0"><joint type="slide" axis="{axis}"/>
+    <joint type="hinge" axis="0 0 1"/><geom name="ball" size="{radius}" mass="1"/></body>
+  </worldbody><keyframe><key name="thrown" qvel="{speed} 0"/></keyframe></mujoco>"""
+
+
+def gate(folder: Path, **numbers: float | str) -> str:
+    """Return a file of a ball that moves along x towards a wall whose friction no row stands for."""
+    given = {"gravity": 0.0, "wall": 0.0, "half": 1e-3, "start": -1.0, "axis": "1 0 0", "radius": 1e-3, "speed": 0.0}
+    path = folder / "gate.xml"
+    path.write_text(GATE.format(**(given | numbers)), encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("profile", ["compiled", "cvode"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_meeting_between_two_steps_is_found_where_it_is(profile: str, seed: int, tmp_path: Path) -> None:
+    """A steady motion takes a step or two: it passes a thin wall inside one, as fast as it likes."""
+    rng = np.random.default_rng(seed)
+    speed, half, radius = 10.0 ** rng.uniform(0.5, 1.0), rng.uniform(2e-3, 1e-2), rng.uniform(2e-3, 1e-2)
+    case = cases.load(gate(tmp_path, speed=speed, half=half, radius=radius))
+    run = engines.load("reference").prepare(case, profile).run()
+    assert run.outcome is Outcome.INCONSISTENT
+    told = re.search(r"come within reach at t = (\S+) s", run.message)
+    assert told is not None
+    assert float(told[1]) == pytest.approx((1.0 - half - radius) / speed, rel=1e-5)
+    assert "'wall' and 'ball'" in run.message or "'ball' and 'wall'" in run.message
+
+
+def test_nothing_is_judged_behind_it(tmp_path: Path) -> None:
+    case = cases.load(gate(tmp_path, speed=5.0))
+    with pytest.raises(CaseUnsupported, match=r"gate.xml:thrown: Shapes .* come within reach at t = 0\.1996 s"):
+        jobs.run_case(case, [jobs.Pick(engine="reference", profile="compiled")])
+
+
+def test_a_motion_that_passes_beside_it_runs(tmp_path: Path) -> None:
+    case = cases.load(gate(tmp_path, speed=5.0, wall=-3.0))
+    assert engines.load("reference").prepare(case, "compiled").run().outcome is Outcome.FINISHED
