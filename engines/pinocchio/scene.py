@@ -20,6 +20,9 @@ from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matr
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 
+SMALL = 1e-4
+"""Size of coordinates and rates, SI, below which they are known to the absolute tolerance alone:
+a pendulum that is let go upright moves by less for a while, and by all of it later."""
 Heights = Callable[[Floats], Floats]
 Placed = dict[str, tuple[int, Any]]
 """Body -> joint that carries it, and its pose in that joint's frame."""
@@ -91,7 +94,7 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.shared = none_pulling
     return Prepared(
         rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
-        sizes=(np.ones(to.nq), np.ones(to.nv)),
+        sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,

@@ -246,9 +246,10 @@ def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> 
 def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats]:
     """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
     from crossbody.reports.metrics._align import aligned
+    from crossbody.reports.metrics._scale import RESTS
 
     inside, exact = aligned(truth, second)
-    scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0)) or 1.0
+    scale = max(float(np.max(np.abs(truth.trajectory.q), initial=0.0)), RESTS)
     off = differences(second.q[inside], exact.q, case.quaternions)
     return second.t[inside], np.max(off, axis=1, initial=0.0) / scale
 

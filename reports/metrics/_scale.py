@@ -17,12 +17,18 @@ RESTS = 1e-4
 tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hundred of them."""
 
 
+KNOWN = 1e-8
+"""Part of an energy that must move for what it is off by to be measured: rounding of the rest is 1e-7 of that."""
+
+
 def energy(run: Trajectory) -> float:
     """Return what energies are measured by, J: the largest kinetic energy, or the swing of the potential.
 
-    A robot that stands sags by its servos at hardly any speed: its energy turns over in springs and weights.
+    A robot that stands sags by its servos at hardly any speed: its energy turns over in springs and weights. Where next
+    to nothing moves, by what rounding leaves of the largest energy.
     """
-    return max(float(run.energy[:, 0].max()), float(np.ptp(run.energy[:, 1])))
+    known = KNOWN * float(np.max(np.abs(run.energy)))
+    return max(float(run.energy[:, 0].max()), float(np.ptp(run.energy[:, 1])), known)
 
 
 def of_like(largest: Floats, named: Sequence[Coordinate]) -> Floats:
