@@ -12,8 +12,8 @@ import pytest
 from crossbody import cases as cases_
 from crossbody import engines
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
-from crossbody.cases._defaults import limits_of
-from crossbody.cases.files.case import AS_IT_STANDS
+from crossbody.cases._defaults import default_limits, limits_of
+from crossbody.cases.files.case import AS_IT_STANDS, AT_STEPS
 from crossbody.reports.judging.audit import AuditRow, audit, difference
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
@@ -339,3 +339,12 @@ def test_a_file_as_it_stands_may_count_no_touches(profile: str, word: Word, case
     entry = Entry(engine="mujoco", profile=profile, run=silent)
     rows = judged(replace(case, limits=AS_IT_STANDS), [entry], truth_of(case), "")
     assert {row.metric: row.verdict for row in rows}["event_times"] == word
+
+
+def test_limits_of_matched_scenes_are_those_of_all_engines_with_their_own_reason(case: Case) -> None:
+    everyone = {limit.metric: limit.value for limit in default_limits(case)}
+    for limit in AT_STEPS:
+        assert limit.value == everyone[limit.metric]
+        found = limit_for((*default_limits(case), *AT_STEPS), limit.metric, "mujoco", "matched")
+        assert found is not None
+        assert "at the ends of steps" in found.why
