@@ -88,6 +88,7 @@ STATE = np.dtype(
         ("have_laws", "i8"),
         ("longest_flight", "f8"),
         ("stalled", "i8"),
+        ("cautious", "i8"),  # accepted steps until the last one that was rejected is forgotten
         ("hold", "i8"),
         ("trial_steps", "i8"),
         ("trial_rhs", "i8"),

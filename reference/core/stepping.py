@@ -120,6 +120,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.hs = h
             proposal = h * min(choice.grow(s, error), 1.0 if rejected else 6.0)
             s.h = max(s.h, proposal) if clipped and not rejected else proposal
+            s.cautious = max(0, s.cautious - 1)
             return _finish(K, s, m, w, b)
         s.rejected += 1
         rejected = True
@@ -128,6 +129,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         else:
             ill = 1 if error == -1.0 else 2
             s.h = 0.25 * h
+        s.cautious = choice.CAUTIOUS_STEPS
     if ill == 1:
         return ILL_POSED
     return NOT_FINITE if ill == 2 else STEP_TOO_SMALL
