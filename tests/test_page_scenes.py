@@ -147,6 +147,22 @@ def test_a_drawn_force_opens_the_gap_of_its_row(name: str) -> None:
         assert np.allclose(power[alone], lam[row] * gap[alone, row], atol=1e-6)
 
 
+def test_a_drawn_force_of_a_delta_robot_closes_its_loop() -> None:
+    """Drawn at the wrist of another arm is the force on the first: with that arm alone it moves against the gap."""
+    case = cases.load("delta_impulse", "light")
+    scene, q = scenes.load(case.mechanism), states(case, 1)[0]
+    lam = np.random.default_rng(6).normal(size=(1, 6))
+    arrows = scene.arrows(q[None], lam, case.parameters)[0]
+    gap = slopes(partial(gaps, case), q)
+    ends = slopes(lambda x: scene.arrows(x, np.repeat(lam, len(x), axis=0), case.parameters)[:, :, :3], q)
+    points = scene.poses(q[None], case.parameters)[0]
+    for k in range(2):
+        alone, rows = slice(3 * k + 3, 3 * k + 6), slice(3 * k, 3 * k + 3)
+        assert np.abs(points - arrows[k, :3]).sum(axis=1).min() == 0.0
+        assert np.allclose(ends[alone, k] @ arrows[k, 3:], -gap[alone, rows] @ lam[0, rows], atol=1e-6)
+        assert np.abs(gap[alone, rows] @ lam[0, rows]).max() > 0.01
+
+
 def test_every_ball_of_a_cradle_hangs_on_a_thread_of_its_length() -> None:
     case = cases.load("newtons_cradle", "pendulums")
     scene, q = scenes.load(case.mechanism), states(case)
