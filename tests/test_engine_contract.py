@@ -75,6 +75,20 @@ def test_runs_to_its_horizon_and_twice_the_same(name: str, profile: str, variant
     assert (first.events, first.steps, first.outcome) == (second.events, second.steps, second.outcome)
 
 
+@pytest.mark.parametrize("who", ["mujoco:matched", "mujoco:default", "pinocchio:law"])
+@pytest.mark.parametrize("scene", ["newtons_cradle pendulums", "newtons_cradle sliders", "red_body resolved",
+                                   "soft_contact axis", "delta_impulse light", "ball_maze outside"])  # fmt: skip
+def test_a_model_that_has_moved_starts_anew(scene: str, who: str) -> None:
+    """What one run leaves behind (clocks, modes, forces to begin with) is nothing to the next."""
+    engine, profile = who.split(":")
+    run = engines.load(engine).prepare(cases.load(*scene.split(), t_end=0.02), profile)
+    first, second = run.run(), run.run()
+    assert first.outcome.ok, first.message
+    for a, b in zip(columns(first), columns(second), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert (first.events, first.steps) == (second.events, second.steps)
+
+
 @each_variant
 @each_profile
 def test_says_what_the_trajectory_promises(name: str, profile: str, variant: str) -> None:

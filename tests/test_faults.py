@@ -146,6 +146,15 @@ def test_a_truth_that_drifts_is_outside(recorded: Recorded) -> None:
     assert "truth" in _outside(case, entries["pinocchio:law"], wrong)
 
 
+def test_touches_of_a_truth_stand_where_its_own_gaps_close() -> None:
+    """Its events come from one run and its motion from another: both are as exact as a truth has to be."""
+    truth = truth_of(load("red_body", "resolved"))
+    touches = [e for e in truth.trajectory.events if e.before is Mode.FREE and e.after in CLOSED]
+    gaps = truth.at(np.array([e.t for e in touches])).gap[range(len(touches)), [e.contact for e in touches]]
+    assert len(touches) > 1
+    assert np.abs(gaps).max() < 1e-13 * np.abs(truth.trajectory.gap).max()
+
+
 @pytest.mark.parametrize("size", [0.03, 30.0])
 def test_truths_part_at_the_same_instant_in_any_unit_of_length(size: float, recorded: Recorded) -> None:
     case, truth, entries = recorded["bouncing_ball", "listing"]
