@@ -13,6 +13,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES
 from crossbody.engines._contacts import Contacts, Pose, _placed
+from crossbody.reports.scenes._meetings import meeting
 
 TURN, DRAWS, POINTS = 1e-6, 40, 4000
 GRID = 0.03
@@ -105,3 +106,23 @@ def test_no_point_of_a_surface_is_nearer(types: tuple[str, str]) -> None:
         assert (found < 0.0) == deep
         within += deep
     assert within > 3 or two.type in ("sphere", "capsule")
+
+
+@pytest.mark.parametrize("types", PLACES, ids=":".join)
+def test_forces_are_drawn_where_an_engine_finds_the_contact(types: tuple[str, str]) -> None:
+    """At its point, or of a sphere at its own surface; along its normal, unless the sphere's centre is inside."""
+    rng = np.random.default_rng(2)
+    for _ in range(DRAWS):
+        met, poses = drawn(rng, types)
+        contact = met.all[0]
+        pair = (contact.first, contact.second)
+        turned_at = [_placed(shape, met.shapes[shape.name][1], poses[shape.body]) for shape in pair]
+        placed = [(shape, (p[None], R[None])) for shape, (R, p) in zip(pair, turned_at, strict=True)]
+        for k, touch in enumerate(met.touches(poses.__getitem__)):
+            gap = touch.gap + contact.pair.margin
+            if contact.first.type == "sphere" and gap < -contact.first.size[0]:
+                continue
+            at, normal = meeting(placed[0], placed[1], k)
+            assert normal[0] == pytest.approx(touch.normal, abs=1e-9)
+            off = -gap * touch.normal if contact.first.type == "sphere" else np.zeros(3)
+            assert at[0] == pytest.approx(touch.point + off, abs=1e-9)

@@ -142,6 +142,17 @@ def test_a_solid_reaches_as_far_as_its_shape(kind: str) -> None:
         assert (1.0 - exact) * reach(shape, n) - 1e-5 < found < reach(shape, n) + 1e-5
 
 
+@pytest.mark.parametrize("kind", ["cylinder", "box"])
+def test_faces_of_a_solid_are_seen_from_outside(kind: str) -> None:
+    shape = Shape(name="s", body="ball", type=kind, size=(0.3, 0.2, 0.1))
+    (solid,) = picture.stage(told(BALL.replace(shapes=(shape,)))).solids
+    corners = np.array(solid["points"])
+    assert len(solid["faces"]) == {"cylinder": 2, "box": 6}[kind]
+    for face in solid["faces"]:  # against the clock
+        x, y, z = corners[list(face[:3])]
+        assert np.cross(y - x, z - y) @ corners[list(face)].mean(axis=0) > 0.0
+
+
 def test_a_body_without_a_shape_is_the_box_of_its_inertia() -> None:
     """A homogeneous box of sides 2a, 2b, 2c has m (b^2 + c^2)/3 about its first axis."""
     a, b, c, m = 0.1, 0.2, 0.4, 3.0
