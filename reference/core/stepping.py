@@ -49,10 +49,10 @@ def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
 
 @inlined
 def _finite_mass(s: Any, w: Work) -> bool:
-    """Whether M is finite where nothing reads it: above the diagonal of its blocks."""
+    """Whether M is finite where nothing reads it too: above the diagonal, and between branches."""
     total = 0.0
     for i in range(s.n if s.k > 1 else 0):
-        for j in range(i % s.k + 1, s.k):
+        for j in range(s.k):
             total += w.M[i, j] - w.M[i, j]
     return total == 0.0
 
