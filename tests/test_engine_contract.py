@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from random_scenes import random_scene, random_state
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName
+from crossbody.cases.files.case import case_of
 from crossbody.engines import Engine, Run
 
 T_END = 0.8
@@ -87,6 +89,19 @@ def test_a_model_that_has_moved_starts_anew(scene: str, who: str) -> None:
     for a, b in zip(columns(first), columns(second), strict=True):
         np.testing.assert_array_equal(a, b)
     assert (first.events, first.steps) == (second.events, second.steps)
+
+
+@pytest.mark.parametrize("who", ["mujoco:matched", "pinocchio:law"])
+@pytest.mark.parametrize("seed", range(8))
+def test_recorded_energies_are_those_of_the_recorded_states(seed: int, who: str) -> None:
+    """Of joints of every type with armature, springs on joints and tendons, and bodies that are spared their weight."""
+    engine, profile = who.split(":")
+    scene = random_scene(seed).replace(loops=(), pairs=())
+    q, v, _ = random_state(scene, np.random.default_rng(seed))
+    case = case_of(scene, q0=q, v0=v, t_end=1e-4)
+    run = engines.load(engine).prepare(case, profile).run()
+    reference = engines.load("reference").prepare(case, "compiled").run()
+    assert run.energy[0] == pytest.approx(reference.energy[0], rel=1e-12, abs=1e-12 * np.abs(reference.energy).max())
 
 
 @each_variant
