@@ -49,6 +49,11 @@ def model_of(path: Path) -> mujoco.MjModel:
     Raises:
         SceneError: with MuJoCo's own sentence.
     """
+    return _compiled(path)[0]
+
+
+def _compiled(path: Path) -> tuple[mujoco.MjModel, list[str]]:
+    """Return the model, and what MuJoCo warned of, which else goes to the terminal at every reading."""
     import mujoco
 
     root = parsed(path)
@@ -63,10 +68,15 @@ def model_of(path: Path) -> mujoco.MjModel:
         root.remove(own)
     setting = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
+    warned: list[str] = []
+    previous = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warned.append)
     try:
-        return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+        return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode")), warned
     except ValueError as error:
         raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
+    finally:
+        mujoco.set_mju_user_warning(previous)
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:
@@ -81,8 +91,14 @@ def with_inertias(path: Path, scene: Scene) -> Scene:
 
 
 def findings(path: Path) -> list[str]:
-    """Return a sentence for every link whose inertia no rigid body can have."""
-    told = []
+    """Return what MuJoCo warns of, and a sentence for every link whose inertia no rigid body can have.
+
+    One more counts the meshes that would collide.
+    """
+    told = [f"MuJoCo warns: {' '.join(text.split())}." for text in dict.fromkeys(_compiled(path)[1])]
+    meshes = parsed(path).findall("link/collision/geometry/mesh")
+    if meshes:
+        told.append(f"Meshes that collide ({len(meshes)}) are left out of every engine: no hull has a row here.")
     for link in parsed(path).findall("link"):
         if link.find("inertial") is None:
             continue
