@@ -199,20 +199,21 @@ def _witness(case: Case) -> Trajectory | str:
     try:
         pinocchio = engines.load("pinocchio")
         part, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
-        cost, method = min((_seconds(pinocchio.prepare(part, "law", rtol=rtol, method=m)), m) for m in METHODS)
+        cost, steps, method = min((*_seconds(pinocchio.prepare(part, "law", rtol=rtol, method=m)), m) for m in METHODS)
         if cost > SHARE * WITNESS_S:
             return f"Pinocchio would share the scene alone, and take about {cost / SHARE:.0f} s"
-        run = pinocchio.prepare(case, "law", rtol=rtol, method=method).run()
+        most = max(1000, int(WITNESS_S * steps / cost))  # contacts later on may want far more steps than the first part
+        run = pinocchio.prepare(case, "law", rtol=rtol, method=method, max_steps=most).run()
     except (EngineUnavailable, CaseUnsupported) as error:
         return str(error).removesuffix(".")
     return run if run.outcome.ok else f"Pinocchio ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
 
 
-def _seconds(run: Run) -> float:
-    """Time that a run takes of one processor, s."""
+def _seconds(run: Run) -> tuple[float, int]:
+    """Time that a run takes of one processor, s, and its steps."""
     began = process_time()
-    run.run()
-    return process_time() - began
+    steps = run.run().steps
+    return process_time() - began, steps
 
 
 def _rechecked(truth: Truth, case: Case) -> Truth:
