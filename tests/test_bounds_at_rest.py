@@ -73,7 +73,7 @@ def test_what_is_pressed_on_its_bound_stays_there(engine: str, profile: str, cou
     run = engines.load(engine).prepare(case, profile).run()
     assert run.outcome.ok
     assert np.abs(run.q - case.q0).max() < STILL
-    found = contacts(run)
+    found = contacts(run, joined=True)
     assert [c.row for c in found] == at_bounds(case)
     assert all(c.touch == 0.0 and np.isinf(c.release) for c in found)
     borne = np.abs(run.lam[-1][at_bounds(case)])
@@ -88,7 +88,7 @@ def test_what_bears_nothing_is_counted_alike(seed: int) -> None:
     """Whether a row that bears nothing pushes is rounding: it is at its surface in all engines."""
     case, _ = pressed(seed, unloaded=True)
     runs = [engines.load(engine).prepare(case, profile).run() for engine, profile in ENGINES]
-    truth = from_run(runs[0], Tier.D, "the first")
+    truth = replace(from_run(runs[0], Tier.D, "the first"), joined=True)
     for run in runs[1:]:
         for name in ("touch_count", "release_count", "event_times"):
             assert metrics.load(name).measure(truth, run, case) == 0.0, name
@@ -135,4 +135,4 @@ F, C = Mode.FREE, Mode.CONTACT
     ],
 )
 def test_a_contact_ends_where_its_gap_opens(gap: list[float], modes: list[Mode], expected: list[object]) -> None:
-    assert [(c.touch, c.release) for c in contacts(told(gap, modes))] == expected
+    assert [(c.touch, c.release) for c in contacts(told(gap, modes), joined=True)] == expected

@@ -54,6 +54,8 @@ class Truth:
         parted: when the two sources part, s; infinite if they never do.
         allowed: largest disagreement of the two sources, relative; NaN where there is one source alone.
         growth: rate at which the two part, 1/s; NaN unless they do.
+        joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
+            each other and rest unloaded.
     """
 
     tier: Tier
@@ -65,6 +67,7 @@ class Truth:
     parted: float = math.inf
     allowed: float = math.nan
     growth: float = math.nan
+    joined: bool = False
 
 
 def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
@@ -180,7 +183,12 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     else:
         why = f" ({second})" if second else ""
         second = reference.prepare(case, other, rtol=loose).run()
-    truth = _held_against(Truth(tier=tier, source="", trajectory=dense, at=at, agreement={}), second, case, loose)
+    truth = _held_against(
+        Truth(tier=tier, source="", trajectory=dense, at=at, agreement={}, joined=case.scene is not None),
+        second,
+        case,
+        loose,
+    )
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
     source = f"compiled reference at rtol {case.tight:g}, {who} at {loose:g} agrees: {said}; they share {shared}{why}"
     if truth.parted < case.t_end:

@@ -25,7 +25,7 @@ _Pairs = list[tuple[Contact, Contact]]
 def matched(truth: Truth, run: Trajectory) -> _Pairs:
     """Contacts of truth and run, paired in order up to the first that belongs to another row or is not trusted."""
     pairs: _Pairs = []
-    for a, b in zip(contacts(truth.trajectory), contacts(run), strict=False):
+    for a, b in zip(*(contacts(each, truth.joined) for each in (truth.trajectory, run)), strict=False):
         if a.row != b.row or a.touch > truth.trusted:
             break
         pairs.append((a, b))

@@ -45,25 +45,29 @@ class Contact:
         )
 
 
-def contacts(run: Trajectory) -> tuple[Contact, ...]:
-    """Every contact in order of its touch.
+def contacts(run: Trajectory, joined: bool = False) -> tuple[Contact, ...]:
+    """Every contact in order of its touch; joined, those between which no gap opens are one.
 
-    From the run's events; a run without a notion of mode is read by the sign of its gaps instead. A row that stays at
-    its surface from the start to the end, or from one contact to the next, is in contact all along: which of two rows
-    pushes that depend on each other, whether one pushes that bears nothing, and what the sign of its gap is, are
-    rounding and no properties of the motion.
+    From the run's events; a run without a notion of mode is read by the sign of its gaps instead. Joined, a row that
+    stays at its surface from the start to the end, or from one contact to the next, is in contact all along: which of
+    two rows pushes that depend on each other, whether one pushes that bears nothing, and what the sign of its gap is,
+    are rounding and no properties of the motion.
     """
     if not run.events and run.mode.size and np.all(run.mode == -1):
         return _by_sign(run)
-    found: dict[int, list[Contact]] = {row: [] for row in range(run.gap.shape[1])}
+    found: list[Contact] = []
+    last: dict[int, int] = {}
     for event in run.events:
-        mine = found[event.contact]
         if event.after in CLOSED and event.before not in CLOSED:
-            mine.append(Contact(event.contact, event.t))
-        elif mine:
-            mine[-1] = mine[-1].behind(event)
-    rests = _Rests(run)
-    return tuple(sorted((c for row, own in found.items() for c in rests.joined(row, own)), key=lambda c: c.touch))
+            last[event.contact] = len(found)
+            found.append(Contact(event.contact, event.t))
+        elif event.contact in last:
+            found[last[event.contact]] = found[last[event.contact]].behind(event)
+    if not joined:
+        return tuple(found)
+    rests, rows = _Rests(run), range(run.gap.shape[1])
+    kept = [c for row in rows for c in rests.joined(row, [c for c in found if c.row == row])]
+    return tuple(sorted(kept, key=lambda c: c.touch))
 
 
 class _Rests:

@@ -20,5 +20,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Number of contacts of the run that ended minus the truth's; None without a row that can open."""
     if not case.law.unilateral.any():
         return None
-    mine, theirs = (sum(np.isfinite(c.release) for c in contacts(each)) for each in (run, truth.trajectory))
+    mine, theirs = (
+        sum(np.isfinite(c.release) for c in contacts(each, truth.joined)) for each in (run, truth.trajectory)
+    )
     return float(mine - theirs)

@@ -16,4 +16,4 @@ CLAIMED = False
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Number of contacts of the run minus the truth's."""
-    return float(len(contacts(run)) - len(contacts(truth.trajectory)))
+    return float(len(contacts(run, truth.joined)) - len(contacts(truth.trajectory, truth.joined)))
