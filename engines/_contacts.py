@@ -6,7 +6,7 @@ are sought in each shape's own axes, and nothing here knows a second derivative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,15 @@ from crossbody.cases._rotations import matrices
 from crossbody.cases.scene import Scene, Shape
 from crossbody.cases.scene_contacts import Contact, contacts
 
+FAR = 1.0
+"""m: the gap of a row that is none as its shapes lie."""
 TURN = 1e-3
 """Angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it."""
 
 Pose = tuple[Floats, Floats]
 """Rotation (3, 3) and position (3,) in the world."""
+SHARP = 30.0
+"""Part of the squared sine at which capsules cross that H is differenced over: where it is below one."""
 Poses = Callable[[str], Pose]
 """Body -> its pose."""
 
@@ -57,26 +61,58 @@ class Contacts:
         self.rows = [(k, place) for k, contact in enumerate(self.all) for place in range(contact.places)]
         shapes = {shape.name: shape for contact in self.all for shape in (contact.first, contact.second)}
         self.shapes = {name: (shape, matrices(np.array(shape.orientation))) for name, shape in shapes.items()}
+        self.turning = [k for k, contact in enumerate(self.all) if contact.parallel > 0.0]
 
     @property
     def count(self) -> int:
         """Number of rows."""
         return len(self.rows)
 
-    def touches(self, poses: Poses, rows: Sequence[int] | None = None) -> list[Touch]:
-        """Return those of some rows, or of all."""
+    def touches(
+        self, poses: Poses, rows: Sequence[int] | None = None, along: Mapping[int, bool] | None = None
+    ) -> list[Touch]:
+        """Return those of some rows, or of all.
+
+        Args:
+            poses: of the bodies.
+            rows: which; all if not given.
+            along: of contacts in `turning`, whether the capsules lie along each other; as they do, if not given.
+        """
         wanted = self.rows if rows is None else [self.rows[i] for i in rows]
         placed: dict[str, Pose] = {}
-        found = {k: self._touches(self.all[k], poses, placed) for k in dict.fromkeys(k for k, _ in wanted)}
+        found = {
+            k: self._touches(self.all[k], self._poses(self.all[k], poses, placed), (along or {}).get(k))
+            for k in dict.fromkeys(k for k, _ in wanted)
+        }
         return [found[k][place] for k, place in wanted]
 
-    def _touches(self, contact: Contact, poses: Poses, placed: dict[str, Pose]) -> list[Touch]:
-        first, second = contact.first, contact.second
-        for shape in (first, second):
+    def lying(self, poses: Poses, rows: Sequence[int]) -> tuple[dict[int, bool], float]:
+        """Return of the capsules of some rows whether they lie along each other, and over what H may be differenced.
+
+        The nearest points of axes that cross at a small angle a run along them in a turn of the size of a^2.
+        """
+        placed: dict[str, Pose] = {}
+        found, least = {}, 1.0
+        for k in {self.rows[i][0] for i in rows}.intersection(self.turning):
+            at = self._poses(self.all[k], poses, placed)
+            found[k] = _along(self.all[k], *at)
+            least = least if found[k] else min(least, _crossing(*at))
+        return found, TURN * min(1.0, (SHARP * least) ** 2)
+
+    def _poses(self, contact: Contact, poses: Poses, placed: dict[str, Pose]) -> tuple[Pose, Pose]:
+        for shape in (contact.first, contact.second):
             if shape.name not in placed:
                 placed[shape.name] = _placed(shape, self.shapes[shape.name][1], poses(shape.body))
-        one, two = placed[first.name], placed[second.name]
-        found = _over(one, second, two) if first.type == "plane" else [_between(first, one, second, two)]
+        return placed[contact.first.name], placed[contact.second.name]
+
+    def _touches(self, contact: Contact, at: tuple[Pose, Pose], along: bool | None) -> list[Touch]:
+        first, second, (one, two) = contact.first, contact.second, at
+        if first.type == "plane":
+            found = _over(one, second, two)
+        elif first.type == "capsule":
+            found = _capsules(contact, one, two, along)
+        else:
+            found = [_between(first, one, second, two)]
         return [Touch(gap - contact.pair.margin, n, point, first.body, second.body) for gap, n, point in found]
 
 
@@ -112,12 +148,8 @@ def _lowest(shape: Shape, n: Floats) -> Floats:
 
 
 def _between(one: Shape, at: Pose, two: Shape, by: Pose) -> tuple[float, Floats, Floats]:
-    """Gap, normal and point of the second shape: between a sphere or capsule and another shape."""
+    """Gap, normal and point of the second shape: between a sphere and another shape."""
     start, core = at[1], by[1]
-    if one.type == "capsule":
-        start, core = _nearest(at, one.size[1], by, two.size[1])
-        distance, n = _apart(core - start)
-        return distance - one.size[0] - two.size[0], n, core - two.size[0] * n
     if two.type == "capsule":
         core = by[1] + np.clip(by[0][:, 2] @ (start - by[1]), -two.size[1], two.size[1]) * by[0][:, 2]
     if two.type in ("sphere", "capsule"):
@@ -154,6 +186,56 @@ def _nearest_on(shape: Shape, x: Floats) -> tuple[Floats, bool]:
     return np.array([*x[:2], np.copysign(half[1], x[2])]), True
 
 
+def _capsules(contact: Contact, at: Pose, by: Pose, along: bool | None) -> list[tuple[float, Floats, Floats]]:
+    """Gap, normal and point of the second of two capsules: where they end if they lie along each other, else nearest.
+
+    The row that is none then is far.
+    """
+    one, two = contact.first, contact.second
+    lengths = at, one.size[1], by, two.size[1]
+    side_by_side = _along(contact, at, by) if along is None else along
+    pairs = [_end(*lengths, sign) for sign in (-1.0, 1.0)] if side_by_side else [_nearest(*lengths)]
+    found: list[tuple[float, Floats, Floats]] = []
+    for start, core in pairs:
+        distance, n = _apart(core - start)
+        found.append((distance - one.size[0] - two.size[0], n, core - two.size[0] * n))
+    return found if side_by_side else [*found, (FAR + contact.pair.margin, np.zeros(3), at[1])]
+
+
+def _along(contact: Contact, at: Pose, by: Pose) -> bool:
+    """Whether two capsules lie beside each other, and along."""
+    low, high = _overlap(contact, at, by)
+    return low <= high and _crossing(at, by) <= contact.parallel
+
+
+def _crossing(at: Pose, by: Pose) -> float:
+    """Sine of the angle at which the axes of two capsules cross, seen along what is nearest between them."""
+    (M, A), (N, B) = ((pose[1], pose[0][:, 2]) for pose in (at, by))
+    apart = (N - M) - A @ (N - M) * A
+    length = float(np.linalg.norm(apart))
+    return abs(float(np.linalg.det([A, B, apart]))) / length if length > 0.0 else float(np.linalg.norm(np.cross(A, B)))
+
+
+def _overlap(contact: Contact, at: Pose, by: Pose) -> tuple[float, float]:
+    """From where to where along the first of two capsules the second lies beside it."""
+    half, middle = contact.first.size[1], float(at[0][:, 2] @ (by[1] - at[1]))
+    reach = abs(float(at[0][:, 2] @ by[0][:, 2])) * contact.second.size[1]
+    return max(-half, middle - reach), min(half, middle + reach)
+
+
+def end_of(contact: Contact, at: Pose, by: Pose, point: Floats) -> int:
+    """Return at which of two capsules' places a point is where they meet."""
+    return int(_along(contact, at, by) and at[0][:, 2] @ (point - at[1]) > 0.5 * sum(_overlap(contact, at, by)))
+
+
+def _end(one: Pose, half: float, two: Pose, other: float, sign: float) -> tuple[Floats, Floats]:
+    """Return nearest points where two segments that lie side by side end: the nearer of an end and its foot."""
+    (M, A), (N, B) = ((pose[1], pose[0][:, 2]) for pose in (one, two))
+    E, F = M + sign * half * A, N + np.copysign(other, sign * (A @ B)) * B
+    tried = [(E, N + np.clip(B @ (E - N), -other, other) * B), (M + np.clip(A @ (F - M), -half, half) * A, F)]
+    return min(tried, key=lambda pair: float(np.sum((pair[1] - pair[0]) ** 2)))
+
+
 def _nearest(one: Pose, half: float, two: Pose, other: float) -> tuple[Floats, Floats]:
     """Return the nearest points of two segments: the best of the four ends and the common perpendicular."""
     (M, A), (N, B) = ((pose[1], pose[0][:, 2]) for pose in (one, two))
@@ -165,14 +247,15 @@ def _nearest(one: Pose, half: float, two: Pose, other: float) -> tuple[Floats, F
     return min(tried, key=lambda pair: float(np.sum((pair[1] - pair[0]) ** 2)))
 
 
-def drift(rates: Callable[[float], Floats], v: Floats) -> Floats:
+def drift(rates: Callable[[float], Floats], v: Floats, turn: float = TURN) -> Floats:
     """Return H' v by a central difference of fourth order along the motion.
 
     Args:
         rates: time from now along the motion with constant v -> H v there.
         v: velocities (nv,).
+        turn: angle or length over which they are.
     """
-    step = TURN / max(float(np.abs(v).max()), 1e-12)
+    step = turn / max(float(np.abs(v).max()), 1e-12)
     before, left, right, ahead = (rates(k * step) for k in (-2, -1, 1, 2))
     total: Floats = (before - 8.0 * left + 8.0 * right - ahead) / (12.0 * step)
     return total

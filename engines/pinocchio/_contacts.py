@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Scene
-from crossbody.engines._contacts import Contacts, Pose, Touch, drift, gradient
+from crossbody.engines._contacts import Contacts, Pose, Poses, Touch, drift, gradient
 from crossbody.engines.pinocchio._rows import point_jacobian
 
 
@@ -47,10 +47,11 @@ class ContactRows:
     def drift(self, q: Floats, v: Floats, rows: Sequence[int]) -> Floats:
         """Return H' v of some rows."""
         data = self._moved
+        along, turn = self.contacts.lying(self._now(q), rows)
 
         def rates(t: float) -> Floats:
             pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
-            touches = self.contacts.touches(lambda body: self._pose(body, data), rows)
+            touches = self.contacts.touches(lambda body: self._pose(body, data), rows, along)
             points, normals = (np.array([getattr(touch, name) for touch in touches]) for name in ("point", "normal"))
             moving, held = (
                 self._carried([self.placed[body][0] for body in bodies], points)
@@ -59,15 +60,19 @@ class ContactRows:
             total: Floats = np.sum(normals * (moving - held), axis=1)
             return total
 
-        return drift(rates, v) if len(rows) else np.zeros(0)
+        return drift(rates, v, turn) if len(rows) else np.zeros(0)
 
     def _touches(self, q: Floats) -> list[Touch]:
         """Return the contacts at q; those of the last one are kept, for a step asks several times."""
         if not np.array_equal(q, self._at):
-            pin.forwardKinematics(self.model, self.data, q)
-            self._found = self.contacts.touches(lambda body: self._pose(body, self.data))
+            self._found = self.contacts.touches(self._now(q))
             self._at, self._H = q.copy(), None
         return self._found
+
+    def _now(self, q: Floats) -> Poses:
+        """Return what gives the poses of bodies at q."""
+        pin.forwardKinematics(self.model, self.data, q)
+        return lambda body: self._pose(body, self.data)
 
     def _pose(self, body: str, data: Any) -> Pose:
         carrier, pose = self.placed[body]

@@ -11,7 +11,8 @@ from typing import Any
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array
 from crossbody.reference.pairs import layout, planes, solids
-from crossbody.reference.pairs.jets import moved, shifted, value
+from crossbody.reference.pairs.jets import apart, dot, moved, shifted, value
+from crossbody.reference.tree import layout as tree
 from crossbody.reference.tree.points import direction, point, pull
 
 
@@ -70,6 +71,62 @@ def _from_solid(p: Array, w: Array, o: int, C: Any) -> Any:
 
 
 @kernels.helper
+def _crossed(p: Array, w: Array, o: int) -> float:
+    """Return by how much capsules are crossed, or not beside each other, parts of what separates the two ways."""
+    one, two = o + layout.FIRST, o + layout.SECOND
+    M, A, a = _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1].real
+    N, B, b = _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1].real
+    sine, beside = solids.crossing(A, B, apart(N, M)), solids.overlap(M, A, a, N, B, b)
+    return float(max(sine / p[o + layout.SINE].real - 1.0, -beside / a))
+
+
+@kernels.helper
+def chosen(p: Array, w: Array, o: int) -> int:
+    """Return how the capsules of the pair at p[o:] lie to each other as they are."""
+    return int(layout.ALONG if _crossed(p, w, o) <= 0.0 else layout.CROSSED)
+
+
+@kernels.helper
+def lies(p: Array, w: Array, o: int) -> int:
+    """Return how the shapes of the pair at p[o:] lie to each other: as the run has it, or else as they are."""
+    now = int(p[int(p[tree.AT_SIDE].real) + int(p[o + layout.LIES].real)].real)
+    if now != layout.UNDECIDED:
+        return now
+    return int(chosen(p, w, o))
+
+
+@kernels.helper
+def turn(p: Array, w: Array, o: int, now: int) -> float:
+    """Return how far capsules are from lying to each other otherwise than now, below 0 if they do; 1 out of reach."""
+    one, two = o + layout.FIRST, o + layout.SECOND
+    D = apart(_point(p, w, two), _point(p, w, one))
+    reach = 2.0 * (p[one + layout.SIZE] + p[two + layout.SIZE] + p[o + layout.MARGIN]).real
+    reach += (p[one + layout.SIZE + 1] + p[two + layout.SIZE + 1]).real
+    if dot(D, D)[0].real > reach * reach:
+        return 1.0
+    crossed = _crossed(p, w, o)
+    return float(crossed if now == layout.CROSSED else layout.BAND - crossed)
+
+
+@kernels.helper
+def _capsules(p: Array, w: Array, o: int, place: int) -> Any:
+    """Return the same of two capsules: side by side they meet where they end, crossed at one place."""
+    one, two = o + layout.FIRST, o + layout.SECOND
+    M, A, a = _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1]
+    N, B, b = _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1]
+    if lies(p, w, o) == layout.ALONG:
+        K, L = solids.ends(M, A, a, N, B, b, _sign(place, 0))
+    elif place == 0:
+        K, L = solids.segments(M, A, a, N, B, b)
+    else:
+        zero = 0.0 * A[0][0]
+        return (layout.FAR + zero, zero, zero), (zero, zero, zero), value(M)
+    (d, n), c = solids.point(L, K), value(L)
+    r, s = p[one + layout.SIZE], p[two + layout.SIZE]
+    return shifted(d, -r - s - p[o + layout.MARGIN]), n, (c[0] - s * n[0], c[1] - s * n[1], c[2] - s * n[2])
+
+
+@kernels.helper
 def touch(p: Array, w: Array, o: int, place: int) -> Any:
     """Return gap (value, rate, second derivative at v' = 0), normal from first to second, and where they would meet.
 
@@ -91,14 +148,7 @@ def touch(p: Array, w: Array, o: int, place: int) -> Any:
         return shifted(d, -r - p[o + layout.MARGIN]), (-m[0], -m[1], -m[2]), (
             c[0] - r * m[0], c[1] - r * m[1], c[2] - r * m[2],
         )  # fmt: skip
-    r, s = p[one + layout.SIZE], p[two + layout.SIZE]
-    K, L = solids.segments(
-        _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1],
-        _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1],
-    )  # fmt: skip
-    d, n = solids.point(L, K)
-    c = value(L)
-    return shifted(d, -r - s - p[o + layout.MARGIN]), n, (c[0] - s * n[0], c[1] - s * n[1], c[2] - s * n[2])
+    return _capsules(p, w, o, place)
 
 
 @kernels.helper

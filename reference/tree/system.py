@@ -15,7 +15,7 @@ from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._kinds import Floats
 from crossbody.reference._redundant import ranked
-from crossbody.reference.tree import balls
+from crossbody.reference.tree import switches
 from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import tabulate
 
@@ -55,8 +55,8 @@ def system(
         turning = {"velocity": velocity, "quaternions": table.quaternions}
     if table.sides:
         turning |= {
-            "watch": balls.watch,
-            "switch": balls.switch,
+            "watch": switches.watch,
+            "switch": switches.switch,
             "guards": table.sides,
             "discrete": np.zeros(table.sides),
         }

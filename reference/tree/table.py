@@ -210,8 +210,9 @@ class _Builder:
         pushes = [self._push(push) for push in scene.pushes]
         head[layout.PUSHES] = len(pushes)
         head[layout.SPANNED] = sum(scene.acts_along(tendon) for tendon in scene.tendons if tendon.bodies)
-        sides = [np.zeros(self.sides)]
-        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places), pushes, sides]
+        pairs_ = pair_rows(scene, self)
+        head[layout.LYING] = sum(row[pairs.LIES] >= 0.0 for row in pairs_)
+        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pairs_, pushes, [np.zeros(self.sides)]]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[
             layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR,
@@ -326,18 +327,21 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
     return rows
 
 
-def pair_rows(scene: Scene, places: Mapping[str, Place]) -> list[Floats]:
-    """Return the pairs whose rows are contacts: two shapes, and where the rows begin.
+def pair_rows(scene: Scene, builder: _Builder) -> list[Floats]:
+    """Return the pairs whose rows are contacts: two shapes, where the rows begin, and in how many ways they lie.
 
     Raises:
         SceneError: for shapes that do not move against each other.
     """
     rows = []
     for contact in contacts(scene):
-        one, two = (_shape(shape, places) for shape in (contact.first, contact.second))
+        one, two = (_shape(shape, builder.places) for shape in (contact.first, contact.second))
         if one[pairs.NODE] == two[pairs.NODE]:
             raise SceneError(f"Pair {contact.pair.name!r}: its shapes do not move against each other.")
-        rows.append(np.concatenate([one, two, [contact.pair.margin]]))
+        lies = -1.0
+        if contact.parallel > 0.0:
+            lies, builder.sides = builder.sides, builder.sides + 1
+        rows.append(np.concatenate([one, two, [contact.pair.margin, lies, contact.parallel]]))
     return rows
 
 

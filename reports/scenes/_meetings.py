@@ -6,6 +6,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Shape
+from crossbody.cases.scene_contacts import parallel
 from crossbody.reports.scenes._kinematics import Pose
 
 Placed = tuple[Shape, Pose]
@@ -30,6 +31,9 @@ def meeting(first: Placed, second: Placed, place: int) -> tuple[Floats, Floats]:
         normal = _unit(_nearest(second, centre) - centre)
         return centre + radius * normal, normal
     one, two = _segments(first, second)
+    start, end = _ends(first, second, 1.0 if place else -1.0)
+    along = (_crossing(first, second) <= parallel(first[0], second[0]))[:, None]
+    one, two = np.where(along, start, one), np.where(along, end, two)
     normal = _unit(two - one)
     return two - second[0].size[0] * normal, normal
 
@@ -79,6 +83,27 @@ def _segments(first: Placed, second: Placed) -> tuple[Floats, Floats]:
     other = np.clip(c * along - e, -two.size[1], two.size[1])
     along = np.clip(c * other + d, -one.size[1], one.size[1])
     return a + along[:, None] * u, b + other[:, None] * w
+
+
+def _ends(first: Placed, second: Placed, sign: float) -> tuple[Floats, Floats]:
+    """Return where the axes of two capsules that lie along each other end: the nearer of an end and its foot."""
+    (one, (a, R)), (two, (b, S)) = first, second
+    u, w = R[:, :, 2], S[:, :, 2]
+    side = sign * np.where(np.sum(u * w, axis=1, keepdims=True) > 0.0, 1.0, -1.0)
+    end, other = a + sign * one.size[1] * u, b + side * two.size[1] * w
+    foot = b + np.clip(np.sum(w * (end - b), axis=1, keepdims=True), -two.size[1], two.size[1]) * w
+    back = a + np.clip(np.sum(u * (other - a), axis=1, keepdims=True), -one.size[1], one.size[1]) * u
+    further = np.linalg.norm(foot - end, axis=1) <= np.linalg.norm(other - back, axis=1)
+    return np.where(further[:, None], end, back), np.where(further[:, None], foot, other)
+
+
+def _crossing(first: Placed, second: Placed) -> Floats:
+    """Return the sine (n,) of the angle at which the axes of two capsules cross, seen along what is between them."""
+    (_, (a, R)), (_, (b, S)) = first, second
+    u, w = R[:, :, 2], S[:, :, 2]
+    across = b - a - np.sum(u * (b - a), axis=1, keepdims=True) * u
+    found: Floats = np.abs(np.sum(np.cross(u, w) * _unit(across), axis=1))
+    return found
 
 
 def _inside(rotation: Floats, world: Floats) -> Floats:
