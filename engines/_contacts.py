@@ -25,7 +25,7 @@ TURN = 1e-3
 Pose = tuple[Floats, Floats]
 """Rotation (3, 3) and position (3,) in the world."""
 SHARP = 30.0
-"""Part of the squared sine at which capsules cross that H is differenced over: where it is below one."""
+"""Times the tilt of a cap, or the squared sine at which capsules cross: part of TURN that H is differenced over."""
 Poses = Callable[[str], Pose]
 """Body -> its pose."""
 
@@ -89,15 +89,17 @@ class Contacts:
     def lying(self, poses: Poses, rows: Sequence[int]) -> tuple[dict[int, bool], float]:
         """Return of the capsules of some rows whether they lie along each other, and over what H may be differenced.
 
-        The nearest points of axes that cross at a small angle a run along them in a turn of the size of a^2.
+        The nearest points of axes that cross at a small angle a run along them in a turn of the size of a^2, the lowest
+        of a cap round it in one of its tilt.
         """
         placed: dict[str, Pose] = {}
         found, least = {}, 1.0
         for k in {self.rows[i][0] for i in rows}.intersection(self.turning):
             at = self._poses(self.all[k], poses, placed)
             found[k] = _along(self.all[k], *at)
-            least = least if found[k] else min(least, _crossing(*at))
-        return found, TURN * min(1.0, (SHARP * least) ** 2)
+            if not found[k]:
+                least = min(least, _tilt(*at) if self.all[k].first.type == "plane" else _crossing(*at) ** 2)
+        return found, TURN * min(1.0, SHARP * least)
 
     def _poses(self, contact: Contact, poses: Poses, placed: dict[str, Pose]) -> tuple[Pose, Pose]:
         for shape in (contact.first, contact.second):
@@ -108,7 +110,8 @@ class Contacts:
     def _touches(self, contact: Contact, at: tuple[Pose, Pose], along: bool | None) -> list[Touch]:
         first, second, (one, two) = contact.first, contact.second, at
         if first.type == "plane":
-            found = _over(one, second, two)
+            side_by_side = _along(contact, one, two) if along is None and contact.parallel > 0.0 else bool(along)
+            found = _over(one, second, two, side_by_side)
         elif first.type == "capsule":
             found = _capsules(contact, one, two, along)
         else:
@@ -125,10 +128,11 @@ SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in r
 """Of the corners of a box, in the order of their rows."""
 
 
-def _over(floor: Pose, shape: Shape, at: Pose) -> list[tuple[float, Floats, Floats]]:
+def _over(floor: Pose, shape: Shape, at: Pose, stands: bool) -> list[tuple[float, Floats, Floats]]:
     """Gap, normal and lowest point for every place of a shape over a plane."""
     n = floor[0][:, 2]
-    points = _lowest(shape, at[0].T @ n) @ at[0].T + at[1]
+    own = at[0].T @ n
+    points = (_rim(shape, own) if stands else _lowest(shape, own)) @ at[0].T + at[1]
     gaps: list[float] = ((points - floor[1]) @ n).tolist()
     return [(gap, n, point) for gap, point in zip(gaps, points, strict=True)]
 
@@ -143,8 +147,22 @@ def _lowest(shape: Shape, n: Floats) -> Floats:
         return -(shape.size * scaled / np.sqrt(scaled @ scaled))[None]
     if shape.type == "box":
         return SIGNS * shape.size
-    side = n if shape.type == "capsule" else np.array([n[0], n[1], 0.0]) / np.hypot(n[0], n[1])
-    return np.array([[0.0, 0.0, -b], [0.0, 0.0, b]]) - a * side
+    ends = np.array([[0.0, 0.0, -b], [0.0, 0.0, b]])
+    if shape.type == "capsule":
+        return ends - a * n
+    side = a * np.array([n[0], n[1], 0.0]) / np.hypot(n[0], n[1])
+    return np.array([ends[0] - side, ends[0] + side, ends[1] - side, ends[1] + side])
+
+
+def _rim(shape: Shape, n: Floats) -> Floats:
+    """Return four points (4, 3) of the rim on which a cylinder stands along n, in its axes."""
+    r, half, _ = shape.size
+    return np.array([[x, y, -np.copysign(half, n[2])] for x, y in ((r, 0.0), (0.0, r), (-r, 0.0), (0.0, -r))])
+
+
+def _tilt(floor: Pose, at: Pose) -> float:
+    """Sine of the angle between a plane's normal and the axis of a cylinder over it."""
+    return float(np.linalg.norm((at[0].T @ floor[0][:, 2])[:2]))
 
 
 def _between(one: Shape, at: Pose, two: Shape, by: Pose) -> tuple[float, Floats, Floats]:
@@ -203,7 +221,9 @@ def _capsules(contact: Contact, at: Pose, by: Pose, along: bool | None) -> list[
 
 
 def _along(contact: Contact, at: Pose, by: Pose) -> bool:
-    """Whether two capsules lie beside each other, and along."""
+    """Whether two capsules lie beside each other, and along, or a cylinder stands."""
+    if contact.first.type == "plane":
+        return _tilt(at, by) <= contact.parallel
     low, high = _overlap(contact, at, by)
     return low <= high and _crossing(at, by) <= contact.parallel
 
@@ -224,7 +244,12 @@ def _overlap(contact: Contact, at: Pose, by: Pose) -> tuple[float, float]:
 
 
 def end_of(contact: Contact, at: Pose, by: Pose, point: Floats) -> int:
-    """Return at which of two capsules' places a point is where they meet."""
+    """Return at which of two capsules' places, or of a cylinder's over a plane, a point is where they meet."""
+    if contact.first.type == "plane":
+        x, n = by[0].T @ (point - by[1]), by[0].T @ at[0][:, 2]
+        if _along(contact, at, by):
+            return int(np.round(np.arctan2(x[1], x[0]) / (0.5 * np.pi))) % 4
+        return 2 * int(x[2] > 0.0) + int(x[:2] @ n[:2] > 0.0)
     return int(_along(contact, at, by) and at[0][:, 2] @ (point - at[1]) > 0.5 * sum(_overlap(contact, at, by)))
 
 

@@ -193,7 +193,8 @@ LOWEST: dict[str, tuple[Any, Any, Callable[..., Any]]] = {
         planes.sphere(P, N, planes.moved(C, s * SIZE[1], X[2]), SIZE[0]) for s in (-1.0, 1.0)
     ]),
     "cylinder": (GEOM.mjGEOM_CYLINDER, SIZE, lambda P, N, C, X: [
-        planes.rim(P, N, planes.moved(C, s * SIZE[1], X[2]), X[2], SIZE[0]) for s in (-1.0, 1.0)
+        planes.rim(P, N, planes.moved(C, s * SIZE[1], X[2]), X[0], X[1], r)
+        for s in (-1.0, 1.0) for r in (SIZE[0], -SIZE[0])
     ]),
     "box": (GEOM.mjGEOM_BOX, SIZE, lambda P, N, C, X: [
         planes.sphere(P, N, planes.moved(planes.moved(planes.moved(

@@ -5,11 +5,13 @@ Each is a variable that holds from one instant to the next: inside a step the ro
 
 from __future__ import annotations
 
+import numpy as np
+
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Bytes, Floats
 from crossbody.reference.kernels import CHANGED, START, UNCHANGED
 from crossbody.reference.pairs import layout as pairs
-from crossbody.reference.pairs.rows import chosen, touch, turn
+from crossbody.reference.pairs.rows import chosen, lowest, touch, turn, upside_down
 from crossbody.reference.tree import balls, layout, sweeps
 
 FREE, CONTACT = 0, 1  # modes, as in crossbody.cases.Mode
@@ -41,14 +43,44 @@ def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
 
 
 @kernels.helper
+def _stand(p: Floats, w: Floats, o: int, i: int, mode: Bytes, before: int) -> None:
+    """Hand over between lowest and highest points of a cylinder's caps and the points of its rim.
+
+    The points count from the lowest one, so that the opposite one is the highest: what rocks in a plane feels nothing.
+    """
+    k = int(p[layout.AT_SIDE])
+    now = int(p[k + int(p[o + pairs.LIES])])
+    if now != pairs.CROSSED:
+        p[k + int(p[o + pairs.PHASE])] = lowest(p, w, o)
+    if before == pairs.CROSSED:
+        cap = i + (0 if now == pairs.ALONG else 2)
+        low, high = mode[cap], mode[cap + 1]
+        mode[i], mode[i + 1], mode[i + 2], mode[i + 3] = low, FREE, high, FREE
+    elif before != pairs.UNDECIDED:
+        turned = lowest(p, w, o) - p[k + int(p[o + pairs.PHASE])]
+        first = int(np.round(turned / (0.5 * np.pi))) % 4
+        low, high = mode[i + first], mode[i + (first + 2) % 4]
+        cap = i + (0 if before == pairs.ALONG else 2)
+        mode[i], mode[i + 1], mode[i + 2], mode[i + 3] = FREE, FREE, FREE, FREE
+        mode[cap], mode[cap + 1] = low, high
+
+
+@kernels.helper
 def _lie(p: Floats, w: Floats, o: int, i: int, mode: Bytes) -> None:
-    """Let the capsules whose rows begin at i lie otherwise than before; what touched touches where they are nearest."""
-    k = int(p[layout.AT_SIDE]) + int(p[o + pairs.LIES])
-    if p[k] == pairs.UNDECIDED:
+    """Let the shapes whose rows begin at i lie otherwise than before; what touched touches where they are nearest."""
+    k, stands = int(p[layout.AT_SIDE]) + int(p[o + pairs.LIES]), int(p[o]) == pairs.PLANE
+    start, before = p[k] == pairs.UNDECIDED, int(p[k])
+    if start:
         p[k] = chosen(p, w, o)
+    elif before != pairs.CROSSED:
+        p[k] = pairs.CROSSED
+    else:
+        p[k] = pairs.UPSIDE_DOWN if stands and upside_down(p, w, o) else pairs.ALONG
+    if stands:
+        _stand(p, w, o, i, mode, before)
+    elif start:
         return
-    p[k] = pairs.CROSSED if p[k] == pairs.ALONG else pairs.ALONG
-    if p[k] == pairs.CROSSED:
+    elif p[k] == pairs.CROSSED:
         if mode[i] == FREE or mode[i + 1] == CONTACT:
             mode[i] = mode[i + 1]
         mode[i + 1] = FREE

@@ -59,9 +59,10 @@ def system(
             "switch": switches.switch,
             "guards": table.sides,
             "discrete": np.zeros(table.sides),
+            "latched": table.phases,
         }
     fields: dict[str, Any] = dict(
-        n=scene.nv, nq=scene.nq, parameters=table.p[: len(table.p) - table.sides], **turning,
+        n=scene.nv, nq=scene.nq, parameters=table.p[: len(table.p) - table.sides - table.phases], **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS,

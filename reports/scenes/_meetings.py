@@ -6,7 +6,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Shape
-from crossbody.cases.scene_contacts import parallel
+from crossbody.cases.scene_contacts import LEVEL, parallel
 from crossbody.reports.scenes._kinematics import Pose
 
 Placed = tuple[Shape, Pose]
@@ -21,10 +21,12 @@ def meeting(first: Placed, second: Placed, place: int) -> tuple[Floats, Floats]:
     Args:
         first: shape of a contact, from which its normal leads.
         second: the other.
-        place: which of its places: end of a capsule, cap of a cylinder, corner of a box.
+        place: which of its places: end of a capsule, point of a cylinder's caps, corner of a box.
     """
     if first[0].type == "plane":
         normal = first[1][1][:, :, 2]
+        if second[0].type == "cylinder":
+            return _on_rim(second, place, normal), normal
         return _lowest(second, place, normal), normal
     if first[0].type == "sphere":
         centre, radius = first[1][0], first[0].size[0]
@@ -47,13 +49,24 @@ def _lowest(solid: Placed, place: int, normal: Floats) -> Floats:
         local = -size[0] * n
     elif shape.type == "capsule":
         local = signs[0] * size[1] * UP - size[0] * n
-    elif shape.type == "cylinder":
-        local = signs[0] * size[1] * UP - size[0] * _unit(n * (1.0 - UP))
     elif shape.type == "box":
         local = np.tile(signs * size, (len(n), 1))
     else:
         local = -size * _unit(size * n)
     return centre + _outside(rotation, local)
+
+
+def _on_rim(solid: Placed, place: int, normal: Floats) -> Floats:
+    """Return the lowest or highest point of a cylinder's cap, or where it stands one of four points of its rim."""
+    shape, (centre, rotation) = solid
+    (r, half, _), n = shape.size, _inside(rotation, normal)
+    across = n * (1.0 - UP)
+    cap, side = (1.0 if place >> 1 & 1 else -1.0), (1.0 if place & 1 else -1.0)
+    tilted = cap * half * UP + side * r * _unit(across)
+    angle = 0.5 * np.pi * place
+    standing = r * np.array([np.cos(angle), np.sin(angle), 0.0]) - half * np.sign(n) * UP
+    level = np.linalg.norm(across, axis=1, keepdims=True) <= LEVEL
+    return centre + _outside(rotation, np.where(level, standing, tilted))
 
 
 def _nearest(solid: Placed, point: Floats) -> Floats:
