@@ -6,6 +6,7 @@ are sought in each shape's own axes, and nothing here knows a second derivative.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from crossbody.cases._rotations import matrices
 from crossbody.cases.scene import Scene, Shape
 from crossbody.cases.scene_contacts import Contact, contacts
 
+NOWHERE = np.zeros(3)
 FAR = 1.0
 """m: the gap of a row that is none as its shapes lie."""
 TURN = 1e-3
@@ -69,19 +71,22 @@ class Contacts:
         return len(self.rows)
 
     def touches(
-        self, poses: Poses, rows: Sequence[int] | None = None, along: Mapping[int, bool] | None = None
-    ) -> list[Touch]:
+        self, poses: Poses, rows: Sequence[int] | None = None, along: Mapping[int, bool] | None = None,
+        *, clear: float = np.inf,
+    ) -> list[Touch]:  # fmt: skip
         """Return those of some rows, or of all.
 
         Args:
             poses: of the bodies.
             rows: which; all if not given.
             along: of contacts in `turning`, whether the capsules lie along each other; as they do, if not given.
+            clear: of shapes whose bounding spheres are further apart, m, that distance stands for every gap, without
+                a normal.
         """
         wanted = self.rows if rows is None else [self.rows[i] for i in rows]
         placed: dict[str, Pose] = {}
         found = {
-            k: self._touches(self.all[k], self._poses(self.all[k], poses, placed), (along or {}).get(k))
+            k: self._touches(self.all[k], self._poses(self.all[k], poses, placed), (along or {}).get(k), clear)
             for k in dict.fromkeys(k for k, _ in wanted)
         }
         return [found[k][place] for k, place in wanted]
@@ -97,8 +102,10 @@ class Contacts:
         for k in {self.rows[i][0] for i in rows}.intersection(self.turning):
             at = self._poses(self.all[k], poses, placed)
             found[k] = _along(self.all[k], *at)
-            if not found[k]:
-                least = min(least, _tilt(*at) if self.all[k].first.type == "plane" else _crossing(*at) ** 2)
+            if self.all[k].first.type == "plane":
+                least = least if found[k] else min(least, _tilt(*at))
+            elif not found[k] and np.less_equal(*_overlap(self.all[k], *at)):  # else ends are nearest
+                least = min(least, _crossing(*at) ** 2)
         return found, TURN * min(1.0, SHARP * least)
 
     def _poses(self, contact: Contact, poses: Poses, placed: dict[str, Pose]) -> tuple[Pose, Pose]:
@@ -107,8 +114,12 @@ class Contacts:
                 placed[shape.name] = _placed(shape, self.shapes[shape.name][1], poses(shape.body))
         return placed[contact.first.name], placed[contact.second.name]
 
-    def _touches(self, contact: Contact, at: tuple[Pose, Pose], along: bool | None) -> list[Touch]:
+    def _touches(self, contact: Contact, at: tuple[Pose, Pose], along: bool | None, clear: float) -> list[Touch]:
         first, second, (one, two) = contact.first, contact.second, at
+        if clear < np.inf and first.type != "plane":
+            free = math.dist(one[1], two[1]) - _bound(first) - _bound(second) - contact.pair.margin
+            if free > clear:
+                return [Touch(free, NOWHERE, two[1], first.body, second.body)] * contact.places
         if first.type == "plane":
             side_by_side = _along(contact, one, two) if along is None and contact.parallel > 0.0 else bool(along)
             found = _over(one, second, two, side_by_side)
@@ -117,6 +128,13 @@ class Contacts:
         else:
             found = [_between(first, one, second, two)]
         return [Touch(gap - contact.pair.margin, n, point, first.body, second.body) for gap, n, point in found]
+
+
+def _bound(shape: Shape) -> float:
+    """Return the radius of a sphere about a shape's centre that holds it."""
+    a, b, c = shape.size
+    outer = {"sphere": a, "capsule": a + b, "cylinder": math.hypot(a, b)}
+    return outer.get(shape.type, math.sqrt(a * a + b * b + c * c))
 
 
 def _placed(shape: Shape, turned: Floats, pose: Pose) -> Pose:
