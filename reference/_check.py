@@ -1,7 +1,7 @@
 """Whether kernels are what they say: one look at a state, by differences and between guard cells.
 
     gaps      h' = H v, no h of t nor of v;   rows   H = dh/dq N, the same h, H'v = (d/dt H) v
-    dynamics  M symmetric and positive definite, no M of v, as constant and as local as the system declares
+    dynamics  M symmetric and positive definite, no M of v, as constant and as sparse as the system declares
     velocity  q' = N v + r: affine in v, and no gap changes along r
     solve     M v' = f + H^T lam, and the law
 
@@ -71,6 +71,7 @@ def check_kernels(
         _check_rates(state, draw)
     for state in seen:
         _check_symmetric(state)
+        _check_coupled(state)
         if system.nc:
             _check_rows(state, draw)
     _check_velocity(first, draw)
@@ -134,6 +135,17 @@ def _check_symmetric(at: State) -> None:
     if k > 1:
         mirrored = np.swapaxes(at.M.reshape(-1, k, k), 1, 2).reshape(at.M.shape)
         _compare(at, "dynamics", "M", at.M, "its mirror image", mirrored, EXACT * np.abs(at.M).max())
+
+
+def _check_coupled(at: State) -> None:
+    """M is zero between coordinates of which neither is above the other: nothing reads it there."""
+    apart = ~at.system.coupled() & (at.M != 0.0)
+    if np.any(apart):
+        where, value = entry("M", apart), at.M[apart][0]
+        raise SceneError(
+            f"Kernel dynamics gives {where} = {value:.9g}, though by System.above neither coordinate is above the "
+            f"other{at.where()}."
+        )
 
 
 def _check_positive(at: State) -> None:

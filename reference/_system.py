@@ -59,6 +59,8 @@ class System:
         latched: numbers that `switch` alone writes; they follow the discrete variables in p.
         span (nc, 2): first coordinate, and one past the last, that a row's H may touch; all of them if not given.
             With it the cost of a chain grows with its length, not with its square.
+        above (n,): the nearest lower coordinate that M couples each one to, -1 for none: M is zero where neither of two
+            is above the other. The one before it in its block if not given; a tree's parents make M cost its depth.
         constant_mass: M does not depend on q: it is factored once.
         activations: what some inputs follow from the others by, in closed form: the last ones, which no caller gives.
         affine: M and H are constant, f depends on u alone: arcs in closed form are admitted.
@@ -101,6 +103,7 @@ class System:
     discrete: ArrayLike = ()
     latched: int = 0
     span: ArrayLike | None = None
+    above: ArrayLike | None = None
     constant_mass: bool = False
     affine: bool = False
     activations: Activations | None = None
@@ -139,6 +142,7 @@ class System:
         put(self, "mass_block", self.mass_block or self.n)
         self._check_positions()
         put(self, "span", self._spans(nc))
+        put(self, "above", self._parents())
         put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
         put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
         self._check_values()
@@ -184,6 +188,30 @@ class System:
         blocks = np.column_stack([spans[:, 0] // k * k, -(-spans[:, 1] // k) * k])
         whole_blocks: Index = frozen("System", "span", blocks, (nc, 2), np.int64)
         return whole_blocks
+
+    def _parents(self) -> Index:
+        """Coordinates that M couples each one to, the nearest lower one; those before it in its block if not given."""
+        k, own = self.mass_block or self.n, np.arange(self.n)
+        chain = np.where(own % k == 0, -1, own - 1)
+        given: Index = frozen("System", "above", chain if self.above is None else self.above, (self.n,), np.int64)
+        wrong = (given >= own) | ((given < own // k * k) & (given != -1))
+        if np.any(wrong):
+            i = int(np.flatnonzero(wrong)[0])
+            raise SceneError(
+                f"System.above[{i}] is {given[i]}; valid: -1, or a lower coordinate of its block, "
+                f"{i // k * k} to {i - 1}."
+            )
+        return given
+
+    def coupled(self) -> NDArray[np.bool_]:
+        """Whether M, as it is stored (n, k), may have an entry: one coordinate is above the other, or the same."""
+        k, above = self.mass_block, np.asarray(self.above)
+        below = np.eye(k, dtype=bool)[np.arange(self.n) % k]
+        for i, c in enumerate(above):
+            if c >= 0:
+                below[i] |= below[c]
+        blocks = below.reshape(-1, k, k)
+        return (blocks | blocks.swapaxes(1, 2)).reshape(self.n, k)
 
     def _check_sizes(self) -> None:
         counts = (

@@ -174,11 +174,15 @@ def struck(s: Scene) -> tuple[Trajectory, float]:
     return replace(s.run, events=made), float(impulses.sum())
 
 
+FREE_OR_NOT = (Mode.FREE, Mode.CONTACT)
+
+
 def touching(side: int) -> Known:
     def known(s: Scene) -> tuple[Trajectory, float]:
-        made = [Event(t=float(t), contact=side if i == 2 else 1 - side, before=Mode.FREE, after=Mode.CONTACT)
-                for i, t in enumerate(np.sort(s.rng.uniform(0.0, 1.0, 5)))]  # fmt: skip
-        return replace(s.run, events=tuple(made)), made[2].t
+        kinds = [(1 - side, True), (side, True), (1 - side, False), (side, False), (side, True), (1 - side, True)]
+        made = [Event(t=float(t), contact=row, before=FREE_OR_NOT[not shut], after=FREE_OR_NOT[shut])
+                for t, (row, shut) in zip(np.sort(s.rng.uniform(0.0, 1.0, 6)), kinds, strict=True)]  # fmt: skip
+        return replace(s.run, events=tuple(made)), made[1].t
 
     return known
 

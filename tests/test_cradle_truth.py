@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crossbody import engines
-from crossbody.cases import Case, Tier, Value, load
+from crossbody.cases import Case, Outcome, Tier, Value, load
 from crossbody.cases._cradle.impact import delassus, pushes
 from crossbody.cases._cradle.motion import Motion
 from crossbody.cases._cradle.rules import RULES, answer, block, simultaneous
@@ -26,6 +26,14 @@ def heap(n: int, k: int, gap: float = 0.0) -> Motion:
     motion = load("newtons_cradle", n=n, lifted=k, gap=gap).closed_form
     assert isinstance(motion, Motion)
     return motion
+
+
+@pytest.mark.parametrize("most", [1, 1000])
+def test_a_motion_says_whether_it_holds_all_its_impacts(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("crossbody.cases._cradle.motion.MAX_IMPACTS", most)
+    motion = heap(4, 2, 1e-3)
+    assert (motion(np.zeros(1)).outcome is Outcome.FINISHED) == (most > 4)
+    assert (motion(np.zeros(1)).message == "") == (most > 4)
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-3])

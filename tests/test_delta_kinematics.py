@@ -252,6 +252,15 @@ def test_number_outside_its_range_is_refused_by_name(name, value):
         replace(delta.LIGHT, **{name: value})
 
 
+@pytest.mark.parametrize("none", [("m2", "m3"), ("m1", "m2", "jm")])
+def test_a_robot_without_inertia_about_an_angle_is_refused(none: tuple[str, ...]) -> None:
+    """One mass of those that move with an angle is enough; which one does not matter."""
+    for kept in none:
+        replace(delta.LIGHT, **dict.fromkeys(none, 0.0) | {kept: 0.1})
+    with pytest.raises(InvalidValue, match="inertia"):
+        replace(delta.LIGHT, **dict.fromkeys(none, 0.0))
+
+
 @pytest.mark.parametrize("bad", [[0.0, 0.0], [0.0, 0.0, np.nan], [[0.0, 0.0, 0.6]]])
 def test_position_of_another_shape_is_refused(bad):
     with pytest.raises(InvalidValue, match="3 finite numbers"):

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from random_scenes import random_scene, random_state
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName
+from crossbody.cases.files.case import case_of
 from crossbody.engines import Engine, Run
 
 T_END = 0.8
@@ -73,6 +75,33 @@ def test_runs_to_its_horizon_and_twice_the_same(name: str, profile: str, variant
     for a, b in zip(columns(first), columns(second), strict=True):
         np.testing.assert_array_equal(a, b)
     assert (first.events, first.steps, first.outcome) == (second.events, second.steps, second.outcome)
+
+
+@pytest.mark.parametrize("who", ["mujoco:matched", "mujoco:default", "pinocchio:law"])
+@pytest.mark.parametrize("scene", ["newtons_cradle pendulums", "newtons_cradle sliders", "red_body resolved",
+                                   "soft_contact axis", "delta_impulse light", "ball_maze outside"])  # fmt: skip
+def test_a_model_that_has_moved_starts_anew(scene: str, who: str) -> None:
+    """What one run leaves behind (clocks, modes, forces to begin with) is nothing to the next."""
+    engine, profile = who.split(":")
+    run = engines.load(engine).prepare(cases.load(*scene.split(), t_end=0.02), profile)
+    first, second = run.run(), run.run()
+    assert first.outcome.ok, first.message
+    for a, b in zip(columns(first), columns(second), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert (first.events, first.steps) == (second.events, second.steps)
+
+
+@pytest.mark.parametrize("who", ["mujoco:matched", "pinocchio:law"])
+@pytest.mark.parametrize("seed", range(8))
+def test_recorded_energies_are_those_of_the_recorded_states(seed: int, who: str) -> None:
+    """Of joints of every type with armature, springs on joints and tendons, and bodies that are spared their weight."""
+    engine, profile = who.split(":")
+    scene = random_scene(seed).replace(loops=(), pairs=())
+    q, v, _ = random_state(scene, np.random.default_rng(seed))
+    case = case_of(scene, q0=q, v0=v, t_end=1e-4)
+    run = engines.load(engine).prepare(case, profile).run()
+    reference = engines.load("reference").prepare(case, "compiled").run()
+    assert run.energy[0] == pytest.approx(reference.energy[0], rel=1e-12, abs=1e-12 * np.abs(reference.energy).max())
 
 
 @each_variant

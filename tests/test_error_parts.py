@@ -15,7 +15,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Tier, Trajectory
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.reports.judging.comparison import Entry, judged
-from crossbody.reports.judging.parts import Split, Study, splits
+from crossbody.reports.judging.parts import Positions, Split, Study, splits
 from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.runs import jobs
@@ -132,6 +132,27 @@ def test_what_differs_by_rounding_alone_has_no_order_and_is_converged(case: Case
     assert "rounding" in found.says
     assert found.largest["step"] < found.known["step"] < 1e-11
     assert found.largest["model"] == pytest.approx(4e-4, rel=1e-6)
+
+
+def cubic(case: Case, t: Any, made: Any) -> Trajectory:
+    """The truth (cos 3 t, sin 3 t) and an error that is a cubic of t (4, 2), with the rates of both."""
+    powers = np.stack([t**k for k in range(4)], axis=1)
+    rates = np.stack([k * t ** max(k - 1, 0) for k in range(4)], axis=1)
+    exact, turned = np.stack([np.cos(3.0 * t), np.sin(3.0 * t)], axis=1), np.array([-3.0, 3.0])
+    return motion(exact + powers @ made, t, turned * exact[:, ::-1] + rates @ made)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_error_that_is_a_cubic_is_laid_exactly_between_samples(case: Case, seed: int) -> None:
+    """A Hermite cubic of each step is the cubic itself, wherever the samples of either run stand."""
+    rng = np.random.default_rng(seed)
+    own, other = (np.sort([0.0, *rng.uniform(0.0, 2.0, n), 2.0]) for n in (150, 12))
+    made = 1e-3 * rng.normal(size=(4, 2))
+    right = cubic(case, own, 0.0 * made)
+    truth = replace(from_run(right, Tier.A, "made up"), at=lambda t: cubic(case, t, 0.0 * made))
+    whole = Positions(case, truth, right)
+    error = np.stack([whole.t**k for k in range(4)], axis=1) @ made
+    assert whole(cubic(case, other, made)) == pytest.approx(error / whole.scale, abs=1e-12)
 
 
 def test_turns_are_told_by_their_vectors() -> None:

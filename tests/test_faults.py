@@ -146,6 +146,36 @@ def test_a_truth_that_drifts_is_outside(recorded: Recorded) -> None:
     assert "truth" in _outside(case, entries["pinocchio:law"], wrong)
 
 
+def test_touches_of_a_truth_stand_where_its_own_gaps_close() -> None:
+    """Its events come from one run and its motion from another: both are as exact as a truth has to be."""
+    truth = truth_of(load("red_body", "resolved"))
+    touches = [e for e in truth.trajectory.events if e.before is Mode.FREE and e.after in CLOSED]
+    gaps = truth.at(np.array([e.t for e in touches])).gap[range(len(touches)), [e.contact for e in touches]]
+    assert len(touches) > 1
+    assert np.abs(gaps).max() < 1e-13 * np.abs(truth.trajectory.gap).max()
+
+
+@pytest.mark.parametrize("size", [0.03, 30.0])
+def test_truths_part_at_the_same_instant_in_any_unit_of_length(size: float, recorded: Recorded) -> None:
+    case, truth, entries = recorded["bouncing_ball", "listing"]
+    second = entries["reference:compiled"].run
+    assert second is not None
+    second = replace(second, q=second.q + 1e-6 * np.expm1(10.0 * second.t)[:, None])
+
+    def told(by: float) -> Truth:
+        def at(times: Floats) -> Trajectory:
+            return replace(truth.at(times), q=by * truth.at(times).q)
+
+        scaled = replace(truth, trajectory=replace(truth.trajectory, q=by * truth.trajectory.q), at=at)
+        return _held_against(scaled, replace(second, q=by * second.q), case, 1e-12)
+
+    one, other = told(1.0), told(size)
+    assert 0.0 < one.trusted < case.t_end
+    assert (other.trusted, other.parted) == (one.trusted, one.parted)
+    assert other.growth == pytest.approx(one.growth, rel=1e-9)
+    assert other.agreement == pytest.approx(one.agreement, rel=1e-9)
+
+
 def test_what_was_compared_over_a_small_part_is_not_judged(recorded: Recorded) -> None:
     case, truth, entries = recorded["bouncing_ball", "listing"]
     short = replace(truth, trusted=0.1 * case.t_end)

@@ -58,6 +58,21 @@ def test_the_draft_of_a_map_reads_back_and_reads_the_log(case: str, tmp_path: Pa
     np.testing.assert_allclose(np.diff(log.time), 1e-3, rtol=1e-9)
 
 
+@pytest.mark.parametrize("case", log_files.WRITERS)
+def test_a_survey_tells_the_extent_of_what_a_file_holds(case: str, tmp_path: Path) -> None:
+    data = log_files.table(300)
+    data["t"] = 2.0 + data["t"] + 1e-3 * (np.arange(300) >= 200)  # one sample is lost
+    data["angle"][7] = 0.5 if case == "mcap-json" else np.nan  # which JSON cannot say
+    group = max(hw.survey(log_files.write(case, tmp_path, data)).groups, key=lambda each: len(each.columns))
+    assert (group.rows, group.lost) == (300, 1)
+    assert [group.duration, group.step, group.longest] == pytest.approx([0.3, 1e-3, 2e-3], rel=1e-6)
+    before, clock = log_files.WRITERS[case][3:]
+    for name, values in data.items():
+        (told,) = (each for each in group.columns if each.column.name == (clock if name == "t" else before + name))
+        assert [told.low, told.high] == pytest.approx([np.nanmin(values), np.nanmax(values)], rel=1e-6)
+        assert told.missing == np.isnan(values).sum()
+
+
 def test_every_format_has_a_writer_here() -> None:
     assert set(formats.names()) == {case[0] for case in log_files.WRITERS.values()}
 

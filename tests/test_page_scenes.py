@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,6 +92,86 @@ def test_forces_of_a_pair_are_opposite() -> None:
     left, right = np.split(arrows[:, :, 2:], 2, axis=1)
     assert np.allclose(left, -right)
     assert np.allclose(np.linalg.norm(right, axis=2), lam)
+
+
+PUSHED = {
+    "bouncing_ball listing": [(0, 0, 0)],
+    "newtons_cradle sliders": [(0, 0, 0), (1, 0, 1)],
+    "newtons_cradle pendulums": [(k, k % 4, k % 4 + k // 4) for k in range(8)],
+    "red_body resolved": [(0, 0, 1), (1, 1, 1), (2, 2, 0), (3, 3, 0), (4, 4, 0)],
+    "soft_contact axis": [(0, 0, 3), (1, 1, 3)],
+    "ball_maze inside": [(3, 3, 1)],
+}
+"""Arrow, row and body; of the maze the wall that the ball rolls on."""
+
+
+def slopes(of: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndarray:
+    """Central differences of a function of the coordinates (n,), the first index that of the coordinate."""
+    ways = 1e-6 * np.eye(len(q))
+    ahead, behind = np.split(of(np.concatenate([q + ways, q - ways])), 2)
+    return (ahead - behind) / 2e-6
+
+
+def from_outline(shapes: Sequence[Mapping[str, Any]], pose: np.ndarray, at: tuple[float, float]) -> float:
+    """Distance of a point, from a body's origin, to what is drawn of the body."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    x = np.array(at) @ [[c, -s], [s, c]]
+    found = [
+        abs(float(np.hypot(*(x - shape["circle"][:2]))) - shape["circle"][2]) for shape in shapes if "circle" in shape
+    ]
+    for shape in shapes:
+        points = np.array(shape.get("points", []))
+        for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
+            share = np.clip((x - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+            found.append(float(np.linalg.norm(a + share * (b - a) - x)))
+    return min(found)
+
+
+@pytest.mark.parametrize("name", PUSHED)
+def test_a_drawn_force_opens_the_gap_of_its_row(name: str) -> None:
+    """On the outline of its body, and where that moves alone the power is lam times the gap's rate."""
+    case = cases.load(*name.split(), **({"n": 2} if name.endswith("sliders") else {}))
+    scene, rng = scenes.load(case.mechanism), np.random.default_rng(4)
+    q = case.q0 + 0.05 * rng.standard_normal(len(case.q0))
+    lam = rng.uniform(1.0, 2.0, len(case.contacts))
+    arrows, pose = (part[0] for part in (scene.arrows(q[None], lam[None], case.parameters),
+                                         scene.poses(q[None], case.parameters)))  # fmt: skip
+    stage = scene.stage(case.parameters)
+    gap, rates = slopes(partial(gaps, case), q), slopes(lambda x: scene.poses(x, case.parameters), q)
+    for arrow, row, body in PUSHED[name]:
+        (x, y), force = arrows[arrow, :2] - pose[body, :2], arrows[arrow, 2:]
+        assert case.mechanism == "maze" or from_outline(stage.bodies[body], pose[body], (x, y)) < 1e-9
+        power = (rates[:, body, :2] + rates[:, body, 2:] * (-y, x)) @ force
+        alone = np.abs(np.delete(rates, body, axis=1)).max(axis=(1, 2), initial=0.0) < 1e-9
+        assert np.abs(power[alone]).max() > 0.1
+        assert np.allclose(power[alone], lam[row] * gap[alone, row], atol=1e-6)
+
+
+def test_a_drawn_force_of_a_delta_robot_closes_its_loop() -> None:
+    """Drawn at the wrist of another arm is the force on the first: with that arm alone it moves against the gap."""
+    case = cases.load("delta_impulse", "light")
+    scene, q = scenes.load(case.mechanism), states(case, 1)[0]
+    lam = np.random.default_rng(6).normal(size=(1, 6))
+    arrows = scene.arrows(q[None], lam, case.parameters)[0]
+    gap = slopes(partial(gaps, case), q)
+    ends = slopes(lambda x: scene.arrows(x, np.repeat(lam, len(x), axis=0), case.parameters)[:, :, :3], q)
+    points = scene.poses(q[None], case.parameters)[0]
+    for k in range(2):
+        alone, rows = slice(3 * k + 3, 3 * k + 6), slice(3 * k, 3 * k + 3)
+        assert np.abs(points - arrows[k, :3]).sum(axis=1).min() == 0.0
+        assert np.allclose(ends[alone, k] @ arrows[k, 3:], -gap[alone, rows] @ lam[0, rows], atol=1e-6)
+        assert np.abs(gap[alone, rows] @ lam[0, rows]).max() > 0.01
+
+
+def test_every_ball_of_a_cradle_hangs_on_a_thread_of_its_length() -> None:
+    case = cases.load("newtons_cradle", "pendulums")
+    scene, q = scenes.load(case.mechanism), states(case)
+    threads = scene.stage(case.parameters).threads
+    assert [body for *_, body in threads] == list(range(len(case.q0)))
+    poses = scene.poses(q, case.parameters)
+    spans = poses[:, :, :2] - np.array([thread[:2] for thread in threads])
+    assert np.allclose(np.linalg.norm(spans, axis=2), case.number("length"), atol=1e-13)
+    assert np.allclose(np.arctan2(spans[:, :, 0], -spans[:, :, 1]), poses[:, :, 2], atol=1e-13)
 
 
 def test_the_red_body_touches_where_its_gaps_say() -> None:

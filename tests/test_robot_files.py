@@ -447,8 +447,10 @@ def test_controls_come_from_a_table(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("t,m1\n0,1\n", "m2"), ("t,m1,m2\n1,0,0\n0,0,0\n", "increasing"), ("t,m1,m2\n0,x,0\n", "x"), ("", "columns")],
-)
+    [("t,m1\n0,1\n", "m2"), ("t,m1,m2\n1,0,0\n0,0,0\n", "increasing"),
+     ("t,m1,m2\n-1,0,0\n1,0,0\n", "at least 0"), ("t,m1,m2\n0,0,0\n0,1,0\n", "increasing"),
+     ("t,m1,m2\n0,nan,0\n", "finite"), ("t,m1,m2\n0,x,0\n", "x"), ("", "columns")],
+)  # fmt: skip
 def test_wrong_controls_are_refused(tmp_path: Path, text: str, said: str) -> None:
     table = tmp_path / "u.csv"
     table.write_text(text, encoding="utf-8")

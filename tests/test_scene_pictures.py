@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from random_scenes import random_scene, random_state
+from scipy.spatial.transform import Rotation
 from test_tree import compiled, rows_at
 
 from crossbody.cases._rotations import rates
@@ -111,6 +112,47 @@ BALL = Scene(
     bodies=(Body(name="ball", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)),),
     shapes=(Shape(name="floor", type="plane"), Shape(name="ball", body="ball", size=(0.1, 0.1, 0.1))),
 )
+
+
+def reach(shape: Shape, n: Any) -> float:
+    """How far a shape about its origin extends along n, in its own axes (its support function)."""
+    a, b, _ = shape.size
+    across = float(np.hypot(n[0], n[1]))
+    return {
+        "sphere": a, "capsule": a + b * abs(n[2]), "cylinder": a * across + b * abs(n[2]),
+        "box": float(np.abs(n) @ shape.size), "ellipsoid": float(np.linalg.norm(n * shape.size)),
+    }[shape.type]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["sphere", "capsule", "cylinder", "box", "ellipsoid"])
+def test_a_solid_reaches_as_far_as_its_shape(kind: str) -> None:
+    """Along the axes of the shape to the last digit that is drawn, along others but for the corners of a circle."""
+    rng = np.random.default_rng(5)
+    turn = Rotation.random(rng=rng)
+    x, y, z, w = turn.as_quat()
+    place = rng.normal(size=3)
+    shape = Shape(
+        name="s", body="ball", type=kind, size=(0.3, 0.2, 0.1), position=tuple(place), orientation=(w, x, y, z)
+    )
+    (solid,) = picture.stage(told(BALL.replace(shapes=(shape,)))).solids
+    for n, exact in [
+        *((way, 1e-3) for way in (*np.eye(3), *-np.eye(3))),
+        *((way, 2e-2) for way in rng.normal(size=(20, 3))),
+    ]:
+        n = n / np.linalg.norm(n)
+        found = ((np.array(solid["points"]) - place) @ turn.apply(n)).max() + solid["radius"]
+        assert (1.0 - exact) * reach(shape, n) - 1e-5 < found < reach(shape, n) + 1e-5
+
+
+@pytest.mark.parametrize("kind", ["cylinder", "box"])
+def test_faces_of_a_solid_are_seen_from_outside(kind: str) -> None:
+    shape = Shape(name="s", body="ball", type=kind, size=(0.3, 0.2, 0.1))
+    (solid,) = picture.stage(told(BALL.replace(shapes=(shape,)))).solids
+    corners = np.array(solid["points"])
+    assert len(solid["faces"]) == {"cylinder": 2, "box": 6}[kind]
+    for face in solid["faces"]:  # against the clock
+        x, y, z = corners[list(face[:3])]
+        assert np.cross(y - x, z - y) @ corners[list(face)].mean(axis=0) > 0.0
 
 
 def test_a_body_without_a_shape_is_the_box_of_its_inertia() -> None:

@@ -381,14 +381,16 @@ def test_a_scene_that_cannot_be_built_is_refused_with_its_sentence() -> None:
     assert together([replace(spec, ends=True)])[0]["outcome"] == "refused"
 
 
-def test_what_a_library_writes_to_the_process_is_heard(capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("stream", [1, 2])
+def test_what_a_library_writes_to_the_process_is_heard(stream: int, capfd: pytest.CaptureFixture[str]) -> None:
     import os
 
     heard: list[str] = []
     with overheard(heard):
-        os.write(2, b"from below\n")
+        os.write(stream, b"from below\n")
+    os.write(stream, b"behind\n")
     assert heard == ["from below"]
-    assert capfd.readouterr().err == ""
+    assert list(capfd.readouterr()) == ["behind\n" if each == stream else "" for each in (1, 2)]
 
 
 TRACED = """

@@ -187,6 +187,13 @@ def test_a_size_that_a_case_names_is_the_bound_where_none_is_stored(size: float,
     assert judge(0.9, replace(KNOWN, known_size=size), None)[0] == word
 
 
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize("limit", [True, False])
+def test_what_is_nine_times_as_large_is_kept_and_what_is_eleven_times_is_lost(exact: bool, limit: bool) -> None:
+    found = band(0.3, replace(LIMIT, value=0.0 if exact else 1.0) if limit else None)
+    assert 9.0 * 0.3 < found < 11.0 * 0.3
+
+
 def test_a_band_is_ten_times_what_was_stored() -> None:
     assert band(1.0, LIMIT) == 10.0
     assert band(0.0, LIMIT) == 1e-12

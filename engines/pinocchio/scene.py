@@ -190,8 +190,8 @@ def _observe(
     def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
         energy: Floats = np.empty((len(q), 2))
         for i in range(len(q)):
-            # Armature is in Pinocchio's M but not in its kinetic energy.
-            energy[i, 0] = pin.computeKineticEnergy(model, data, q[i], v[i]) + 0.5 * (model.armature * v[i]) @ v[i]
+            # Pinocchio's own kinetic energy has the armature of some types of joints and not of others.
+            energy[i, 0] = 0.5 * v[i] @ mass_matrix(model, data, q[i]) @ v[i]
             energy[i, 1] = held + pin.computePotentialEnergy(model, data, q[i])
             for body in scene.bodies:
                 if body.weightless:

@@ -105,19 +105,19 @@ def scatter(s: Any, w: Work, lam: Array) -> None:
 
 
 @inlined
-def free(dynamics: Any, s: Any, p: Floats, w: Work, t: float, q: Array, v: Array) -> int:
+def free(dynamics: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array) -> int:
     """Vd = M^-1 f; leaves the factor of M. In an affine scene it is worked out once for every set of inputs."""
     if s.have_free:
         copy(w.free, w.vd)
         return 0
-    dynamics(t, q, v, w.u, p, w.M, w.f, w.w)
+    dynamics(t, q, v, w.u, m.p, w.M, w.f, w.w)
     if not (s.constant_mass and s.have_mass):
-        if factor_mass(w.M, w.L, s.n, s.k) != 0:
+        if factor_mass(w.M, w.L, m.above, s.n, s.k) != 0:
             return 1
         s.have_mass = 1
     for i in range(s.n):
         w.vd[i] = w.f[i]
-    solve_mass(w.L, w.vd, s.k, 0, s.n)
+    solve_mass(w.L, w.vd, m.above, s.k, 0, s.n)
     if s.affine:
         s.have_free = 1
         copy(w.vd, w.free)
@@ -145,7 +145,7 @@ def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
     first, last = m.span[w.idx[j], 0], m.span[w.idx[j], 1]
     for c in range(first, last):
         w.X[j, c] = w.H[j, c]
-    solve_mass(w.L, w.X[j], s.k, first, last)
+    solve_mass(w.L, w.X[j], m.above, s.k, first, last)
     for b in range(w.reach[j], j + 1):
         total = 0.0
         for c in range(max(first, m.span[w.idx[b], 0]), min(last, m.span[w.idx[b], 1])):
@@ -221,7 +221,7 @@ def accelerate(
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
     if s.n == 1 and na <= 1:
         return _scalar(dynamics, rows, s, m.p, w, on, t, q, v)
-    if free(dynamics, s, m.p, w, t, q, v) != 0:
+    if free(dynamics, s, m, w, t, q, v) != 0:
         return 1
     if na == 0:
         return 0

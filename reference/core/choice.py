@@ -12,6 +12,8 @@ from crossbody.reference.core.dop853_table import STABILITY_LIMIT
 from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work
 
 SAFETY = 0.9
+CAUTION = 0.75  # instead, of explicit steps soon after one that was rejected: others follow where the error varies
+CAUTIOUS_STEPS = 10
 EXPLICIT_COST = 12.0  # right-hand sides of an explicit step
 STALLED_STEPS = 5  # explicit steps at the stability limit before the implicit method is tried
 STALLED_PART = 0.35  # of the limit, where a stiff row that every step excites keeps an explicit step at rtol 1e-6
@@ -91,8 +93,10 @@ def choose_method(s: Any, w: Work) -> None:
 @inlined
 def grow(s: Any, error: float) -> float:
     """Factor for the next step from the error of this one, by the order of the method that took it."""
-    order = 8.0 if s.method == EXPLICIT else 4.0
-    most = 6.0 if s.method == EXPLICIT else 4.0
+    if s.method == EXPLICIT:
+        order, most, safety = 8.0, 6.0, CAUTION if s.cautious > 0 else SAFETY
+    else:
+        order, most, safety = 4.0, 4.0, SAFETY
     if error == 0.0:
         return most
-    return float(min(most, max(0.25, SAFETY * error ** (-1.0 / order))))
+    return float(min(most, max(0.25, safety * error ** (-1.0 / order))))

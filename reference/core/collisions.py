@@ -174,7 +174,7 @@ def _factor(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) != 0:
         return 1
     if s.n == 1:
-        w.L[0, 0] = np.sqrt(w.M[0, 0])
+        w.L[0, 0] = 1.0 / w.M[0, 0]
     return 0
 
 

@@ -36,7 +36,7 @@ def _evaluate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Evaluate all rows in contact: w.gram, w.r, w.allowed; False if in this order they are ill posed."""
     q, v = w.y[: s.nq], w.y[s.nq :]
     activate(s, m, w, b.mode)
-    if free(K.dynamics, s, m.p, w, s.t, q, v) != 0:
+    if free(K.dynamics, s, m, w, s.t, q, v) != 0:
         return False
     code = assemble(K.rows, s, m, w, 1.0, s.t, q, v)
     allow(s, w, q, v)

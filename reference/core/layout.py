@@ -88,6 +88,7 @@ STATE = np.dtype(
         ("have_laws", "i8"),
         ("longest_flight", "f8"),
         ("stalled", "i8"),
+        ("cautious", "i8"),  # accepted steps until the last one that was rejected is forgotten
         ("hold", "i8"),
         ("trial_steps", "i8"),
         ("trial_rhs", "i8"),
@@ -140,6 +141,7 @@ class Model:
     unilateral: Bytes
     follows: Index  # the row whose activity this row shares; -1 for none
     span: Index2  # (nc, 2) first column, and one past the last, of each row of H
+    above: Index  # nearest lower coordinate that M couples each one to; -1 for none
 
 
 class Buffers:
@@ -176,7 +178,7 @@ class Work:
     u: Floats
     s: Floats  # controller state
     M: Floats2  # (n, k)
-    L: Floats2  # (n, k) Cholesky factor of M
+    L: Floats2  # (n, k) factors of M, 1/D on the diagonal
     f: Floats
     w: Floats
     H: Floats2  # (nc, n) active rows, compact

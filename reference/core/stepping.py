@@ -49,10 +49,10 @@ def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
 
 @inlined
 def _finite_mass(s: Any, w: Work) -> bool:
-    """Whether M is finite where nothing reads it: above the diagonal of its blocks."""
+    """Whether M is finite where nothing reads it too: above the diagonal, and between branches."""
     total = 0.0
     for i in range(s.n if s.k > 1 else 0):
-        for j in range(i % s.k + 1, s.k):
+        for j in range(s.k):
             total += w.M[i, j] - w.M[i, j]
     return total == 0.0
 
@@ -120,6 +120,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.hs = h
             proposal = h * min(choice.grow(s, error), 1.0 if rejected else 6.0)
             s.h = max(s.h, proposal) if clipped and not rejected else proposal
+            s.cautious = max(0, s.cautious - 1)
             return _finish(K, s, m, w, b)
         s.rejected += 1
         rejected = True
@@ -128,6 +129,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         else:
             ill = 1 if error == -1.0 else 2
             s.h = 0.25 * h
+        s.cautious = choice.CAUTIOUS_STEPS
     if ill == 1:
         return ILL_POSED
     return NOT_FINITE if ill == 2 else STEP_TOO_SMALL

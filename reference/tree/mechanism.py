@@ -183,7 +183,7 @@ def energy(q: Array, v: Array, p: Array, e: Array) -> None:
     for i in range(nodes):
         o, x = int(p[layout.AT_NODE].real) + layout.NODE * i, layout.NODE_SCRATCH * i
         root = layout.NODE_SCRATCH * int(p[o + layout.ROOT].real) + layout.ORIGIN_AT
-        sweeps.inertia(p, o, w, x)
+        sweeps.inertia(p, p[o:], w[x:])
         y, at = x + layout.V_AT, x + layout.I_AT
         n, f = sweeps.times(w, at, w[y], w[y + 1], w[y + 2], w[y + 3], w[y + 4], w[y + 5])
         kinetic += w[y] * n[0] + w[y + 1] * n[1] + w[y + 2] * n[2] + w[y + 3] * f[0] + w[y + 4] * f[1] + w[y + 5] * f[2]

@@ -17,7 +17,7 @@ from crossbody.reference._kinds import Floats
 from crossbody.reference._redundant import ranked
 from crossbody.reference.tree import switches
 from crossbody.reference.tree.mechanism import KERNELS, velocity
-from crossbody.reference.tree.table import tabulate
+from crossbody.reference.tree.table import dof_parents, tabulate
 
 
 def activations(scene: Scene, act0: Floats | None) -> Activations:
@@ -62,7 +62,8 @@ def system(
             "latched": table.phases,
         }
     fields: dict[str, Any] = dict(
-        n=scene.nv, nq=scene.nq, parameters=table.p[: len(table.p) - table.sides - table.phases], **turning,
+        n=scene.nv, nq=scene.nq, above=dof_parents(table),
+        parameters=table.p[: len(table.p) - table.sides - table.phases], **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS,
