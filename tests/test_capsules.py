@@ -111,3 +111,11 @@ def test_rows_of_capsules_are_what_they_say_at_any_angle(sine: float) -> None:
         q = np.array([0.1 * rng.normal() if seed or sine else 0.0, 0.0, 0.05,
                       *quaternion((0.0, 0.3 * sine, sine))])  # fmt: skip
         check_kernels(system, q, rng.normal(size=6), seed=seed)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3], ids=["within reach", "out of reach"])
+@pytest.mark.parametrize("half", [HALF, 0.1])
+def test_capsules_that_start_parallel_are_admitted(height: float, half: float) -> None:
+    """Legs of a robot that stands are: which of their places is nearest is no function of their pose."""
+    found = run(rods(height=height, half=half, t_end=0.01))
+    assert found.switches[0].after == 2
