@@ -15,6 +15,7 @@ from crossbody.cases._arrays import is_number
 from crossbody.engines import _settings
 from crossbody.engines._equations import known, module, system_of
 from crossbody.engines._reference_audit import audit, listed
+from crossbody.engines._rolling import determined
 from crossbody.reference import Options, System, prepare
 from crossbody.reference._options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
 
@@ -47,6 +48,8 @@ class ReferenceRun:
     def run(self) -> Trajectory:
         """Integrate from the start."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
+        if self.case.scene is not None:
+            trajectory = determined(self.case.scene, trajectory)
         return within_the_model(self.case, trajectory) if self.case.file else trajectory
 
     def audit(self) -> Mapping[str, Any]:

@@ -123,6 +123,51 @@ def test_capsules_that_are_nearly_parallel_part_as_their_points_do(sine: float) 
         assert stepped[1].imag / STEP == pytest.approx(d[2], rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.parametrize("sine", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_capsules_side_by_side_part_where_they_end(sine: float) -> None:
+    """Their rates are those of the points, at any angle, also where ends are abreast; their least is the distance."""
+    for seed in SEEDS[:24]:
+        rng = np.random.default_rng(seed)
+        one, two = Frame(rng), Frame(rng)
+        normal = np.cross(one.R[:, 2], rng.normal(size=3))
+        normal /= np.linalg.norm(normal)
+        two.R = one.R + sine * np.cross(normal, one.R.T).T
+        two.R /= np.linalg.norm(two.R, axis=0)
+        half = SIZE[1] if seed % 2 else LONG
+        two.p = one.p + 0.5 * normal + (0.0 if seed % 4 == 0 else rng.uniform(-0.3, 0.3)) * one.R[:, 2]
+        distances = []
+        for sign in (-1.0, 1.0):
+
+            def gap(t: Any, one: Frame = one, two: Frame = two, half: float = half, sign: float = sign) -> Any:
+                (M, (_, _, A)), (N, (_, _, B)) = one.at(t), two.at(t)
+                K, L = solids.ends(M, A, half, N, B, LONG, sign)
+                return *solids.point(L, K), solids.value(K)
+
+            d, n, K = gap(0.0)
+            met = np.array(K) + d[0] * np.array(n)
+            assert d[1] == pytest.approx(np.dot(n, two.speed(met) - one.speed(K)), rel=1e-12, abs=1e-12)
+            if seed % 4:  # abreast, a complex step does not say which way the motion takes
+                check_derivatives(gap)
+            distances.append(d[0])
+        nearest = min(distances) - between(one, half, two, LONG)
+        assert -1e-12 <= nearest <= (2.0 * min(half, LONG)) ** 2 * sine**2 / (8.0 * 0.5) + 1e-12
+
+
+def between(one: Frame, half: float, two: Frame, other: float) -> float:
+    """Distance of two segments: what is nearest to points of the first, by golden section of a convex function."""
+
+    def off(s: float) -> float:
+        x = one.p + s * one.R[:, 2]
+        t = np.clip(two.R[:, 2] @ (x - two.p), -other, other)
+        return float(np.linalg.norm(x - two.p - t * two.R[:, 2]))
+
+    low, high = -half, half
+    for _ in range(80):
+        a, b = high - 0.618 * (high - low), low + 0.618 * (high - low)
+        low, high = (low, b) if off(a) <= off(b) else (a, high)
+    return min(off(0.5 * (low + high)), off(-half), off(half))
+
+
 def test_a_capsule_against_a_capsule() -> None:
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
@@ -148,7 +193,8 @@ LOWEST: dict[str, tuple[Any, Any, Callable[..., Any]]] = {
         planes.sphere(P, N, planes.moved(C, s * SIZE[1], X[2]), SIZE[0]) for s in (-1.0, 1.0)
     ]),
     "cylinder": (GEOM.mjGEOM_CYLINDER, SIZE, lambda P, N, C, X: [
-        planes.rim(P, N, planes.moved(C, s * SIZE[1], X[2]), X[2], SIZE[0]) for s in (-1.0, 1.0)
+        planes.rim(P, N, planes.moved(C, s * SIZE[1], X[2]), X[0], X[1], r)
+        for s in (-1.0, 1.0) for r in (SIZE[0], -SIZE[0])
     ]),
     "box": (GEOM.mjGEOM_BOX, SIZE, lambda P, N, C, X: [
         planes.sphere(P, N, planes.moved(planes.moved(planes.moved(

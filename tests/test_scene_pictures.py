@@ -91,6 +91,8 @@ def test_forces_act_where_the_rows_push(seed: int) -> None:
     drawn = picture.arrows(q[None], np.ones((1, rows)), told(scene))[0]
     owners = [contact for contact in met for _ in range(contact.places)]
     for row, arrow, contact in zip(H, drawn, owners, strict=True):
+        if not row.any():  # none, as its shapes lie
+            continue
         J = jacobians(model, data, scene, contact, arrow[:3])
         assert abs(np.linalg.norm(arrow[3:]) - 1.0) < 1e-12
         assert np.abs(arrow[3:] @ J - row).max() <= 1e-9 * max(1.0, np.abs(J).max())

@@ -15,7 +15,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Joint, Scene, Tendon
-from crossbody.engines._contacts import Contacts, drift
+from crossbody.engines._contacts import TURN, Contacts, drift
 from crossbody.engines._scene import angle_of, places
 from crossbody.engines.mujoco._observe import numbers, pose_of
 
@@ -37,7 +37,12 @@ class Drift:
 
     def __call__(self, q: Floats, v: Floats, parts: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
         """Return that of some of what may have bounds, 0 of a sum of joints, and of some rows of the contacts."""
-        self.data.qvel[:] = v
+        self.data.qvel[:], self.data.qpos[:] = v, q
+        along: dict[int, bool] = {}
+        turn = TURN
+        if len(rows) and self.contacts.turning:
+            mujoco.mj_kinematics(self.model, self.data)
+            along, turn = self.contacts.lying(self.pose, rows)
 
         def rates(t: float) -> Floats:
             self.data.qpos[:] = q
@@ -45,11 +50,11 @@ class Drift:
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
             mujoco.mj_comVel(self.model, self.data)
-            touches = self.contacts.touches(self.pose, rows)
+            touches = self.contacts.touches(self.pose, rows, along)
             closing = [t.normal @ (self._carried(t.second, t.point) - self._carried(t.first, t.point)) for t in touches]
             return np.array([*(self._rate(self.bounded[i], v) for i in parts), *closing])
 
-        lengths, touches = np.split(drift(rates, v), [len(parts)])
+        lengths, touches = np.split(drift(rates, v, turn), [len(parts)])
         return lengths, touches
 
     def _rate(self, part: Joint | Tendon, v: Floats) -> float:

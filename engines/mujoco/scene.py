@@ -18,7 +18,7 @@ from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
 from crossbody.cases.scene_contacts import Contact
 from crossbody.engines._acting import Acting
-from crossbody.engines._contacts import Contacts
+from crossbody.engines._contacts import Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces, angle_of
 from crossbody.engines.mujoco._build import compiled, spec_of
@@ -265,8 +265,13 @@ class Rows:
         """Return which row a contact is: its place is told by the signs of its point in the second shape's axes."""
         found = self.data.contact[part]
         contact, row = self.touches[frozenset(int(i) for i in found.geom)]
-        i = self.geoms[contact.second.name]
-        x = self.data.geom_xmat[i].reshape(3, 3).T @ (found.pos - self.data.geom_xpos[i])
+        one, two = (
+            (self.data.geom_xmat[i].reshape(3, 3), self.data.geom_xpos[i])
+            for i in (self.geoms[contact.first.name], self.geoms[contact.second.name])
+        )
+        if contact.parallel > 0.0:
+            return row + end_of(contact, one, two, found.pos)
+        x = two[0].T @ (found.pos - two[1])
         bits = {1: (), 2: (x[2] > 0.0,), 8: tuple(x > 0.0)}[contact.places]
         return row + sum(int(bit) << k for k, bit in enumerate(bits))
 

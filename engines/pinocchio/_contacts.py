@@ -10,8 +10,11 @@ import pinocchio as pin
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Scene
-from crossbody.engines._contacts import Contacts, Pose, Touch, drift, gradient
+from crossbody.engines._contacts import Contacts, Pose, Poses, Touch, drift, gradient
 from crossbody.engines.pinocchio._rows import point_jacobian
+
+CLEAR = 0.02
+"""m: shapes whose bounding spheres are further apart are not looked at closely while a motion is computed."""
 
 
 class ContactRows:
@@ -31,8 +34,12 @@ class ContactRows:
         self._H: Floats | None = None
 
     def heights(self, q: Floats) -> Floats:
-        """Return h (n,)."""
+        """Return h (n,), of what is far apart no more than that it is."""
         return np.array([touch.gap for touch in self._touches(q)])
+
+    def gaps(self, q: Floats) -> Floats:
+        """Return h (n,)."""
+        return np.array([touch.gap for touch in self.contacts.touches(self._now(q))])
 
     def jacobian(self, q: Floats) -> Floats:
         """Return H (n, nv)."""
@@ -41,16 +48,20 @@ class ContactRows:
         touches = self._touches(q)
         if self._H is None:
             pin.computeJointJacobians(self.model, self.data, q)
-            self._H = np.array([gradient(touch, self._velocity) for touch in touches])
+            none = np.zeros(self.model.nv)
+            self._H = np.array([gradient(touch, self._velocity) if touch.normal.any() else none for touch in touches])
         return self._H
 
     def drift(self, q: Floats, v: Floats, rows: Sequence[int]) -> Floats:
         """Return H' v of some rows."""
+        if not len(rows):
+            return np.zeros(0)
         data = self._moved
+        along, turn = self.contacts.lying(self._now(q), rows)
 
         def rates(t: float) -> Floats:
             pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
-            touches = self.contacts.touches(lambda body: self._pose(body, data), rows)
+            touches = self.contacts.touches(lambda body: self._pose(body, data), rows, along)
             points, normals = (np.array([getattr(touch, name) for touch in touches]) for name in ("point", "normal"))
             moving, held = (
                 self._carried([self.placed[body][0] for body in bodies], points)
@@ -59,15 +70,19 @@ class ContactRows:
             total: Floats = np.sum(normals * (moving - held), axis=1)
             return total
 
-        return drift(rates, v) if len(rows) else np.zeros(0)
+        return drift(rates, v, turn)
 
     def _touches(self, q: Floats) -> list[Touch]:
         """Return the contacts at q; those of the last one are kept, for a step asks several times."""
         if not np.array_equal(q, self._at):
-            pin.forwardKinematics(self.model, self.data, q)
-            self._found = self.contacts.touches(lambda body: self._pose(body, self.data))
+            self._found = self.contacts.touches(self._now(q), clear=CLEAR)
             self._at, self._H = q.copy(), None
         return self._found
+
+    def _now(self, q: Floats) -> Poses:
+        """Return what gives the poses of bodies at q."""
+        pin.forwardKinematics(self.model, self.data, q)
+        return lambda body: self._pose(body, self.data)
 
     def _pose(self, body: str, data: Any) -> Pose:
         carrier, pose = self.placed[body]

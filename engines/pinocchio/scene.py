@@ -60,10 +60,16 @@ def build(case: Case, algebra: str) -> Prepared:
     ]  # fmt: skip
     touching, order = ContactRows(scene, model, placed), _order(scene)
 
+    def others(q: Floats) -> Floats:
+        own: Floats = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
+        return own[order]
+
     @last_asked
     def heights(q: Floats) -> Floats:
-        own = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
-        return np.concatenate([own[order], touching.heights(q)])
+        return np.concatenate([others(q), touching.heights(q)])
+
+    def seen(q: Floats) -> Floats:
+        return np.concatenate([others(q), touching.gaps(q)])
 
     @last_asked
     def jacobian(q: Floats) -> Floats:
@@ -93,7 +99,7 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
+        rows=pinned, observe=_observe(scene, model, placed, forces, seen, to),
         sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),

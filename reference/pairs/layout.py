@@ -6,6 +6,13 @@ PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(6)
 # A shape: what it is, the node that carries it (-1: the world), its pose there (rotation by rows, position), its size.
 TYPE, NODE, POSE, SIZE, SHAPE = 0, 1, 2, 14, 17
 # A pair: two shapes, and the distance at which its rows begin.
-FIRST, SECOND, MARGIN, PAIR = 0, SHAPE, 2 * SHAPE, 2 * SHAPE + 1
+# Then the variable that says how its shapes lie to each other (-1: it is always the same), the sine of the angle at
+# which that changes, and where among the variables the angle stands from which points of a cap count.
+FIRST, SECOND, MARGIN, LIES, SINE, PHASE, PAIR = (0, SHAPE, *range(2 * SHAPE, 2 * SHAPE + 5))
 # A contact row, in the columns behind its kind: which pair, and which of its places.
 WHICH, PLACE = 1, 2
+# How two shapes lie to each other: not yet decided, at an angle, or along each other; a cylinder on the one cap or the
+# other.
+UNDECIDED, CROSSED, ALONG, UPSIDE_DOWN = range(4)
+BAND = 1e-6  # of the sine and of the overlap: what has just changed does not change back by rounding
+FAR = 1.0  # m: the gap of a row that is none as the shapes lie

@@ -37,14 +37,15 @@ def sphere(P: Vector, N: Vector, C: Vector, r: float) -> Gap:
 
 
 @kernels.helper
-def rim(P: Vector, N: Vector, E: Vector, Z: Vector, r: float) -> Gap:
-    """Return the gap of a disc of radius r about E with normal Z; it has no second derivative where Z is along N."""
-    c = dot(N, Z)
-    s = root(shifted(scaled(-1.0, times(c, c)), 1.0))
+def rim(P: Vector, N: Vector, E: Vector, X: Vector, Y: Vector, r: float) -> Gap:
+    """Return the gap of a disc of radius r about E across X and Y; for -r that of its highest point.
+
+    It has no second derivative where the disc lies flat.
+    """
+    x, y = dot(N, X), dot(N, Y)
+    s = root(add(times(x, x), times(y, y)))
     h = less(dot(N, apart(E, P)), scaled(r, s))
-    n, z, e = value(N), value(Z), value(E)
-    f = r / s[0]
-    return h, n, (e[0] - f * (n[0] - c[0] * z[0]), e[1] - f * (n[1] - c[0] * z[1]), e[2] - f * (n[2] - c[0] * z[2]))
+    return h, value(N), value(moved(moved(E, -r * x[0] / s[0], X), -r * y[0] / s[0], Y))
 
 
 @kernels.helper

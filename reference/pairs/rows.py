@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Array
 from crossbody.reference.pairs import layout, planes, solids
-from crossbody.reference.pairs.jets import moved, shifted, value
+from crossbody.reference.pairs.jets import apart, dot, moved, shifted, value
+from crossbody.reference.tree import layout as tree
 from crossbody.reference.tree.points import direction, point, pull
 
 
@@ -44,8 +47,6 @@ def _over_plane(p: Array, w: Array, o: int, kind: int, place: int, P: Any, N: An
     Z = _axis(p, w, o, 2)
     if kind == layout.CAPSULE:
         return planes.sphere(P, N, moved(C, _sign(place, 0) * p[s + 1], Z), p[s])
-    if kind == layout.CYLINDER:
-        return planes.rim(P, N, moved(C, _sign(place, 0) * p[s + 1], Z), Z, p[s])
     X, Y = _axis(p, w, o, 0), _axis(p, w, o, 1)
     if kind == layout.BOX:
         corner = moved(moved(C, _sign(place, 0) * p[s], X), _sign(place, 1) * p[s + 1], Y)
@@ -70,6 +71,111 @@ def _from_solid(p: Array, w: Array, o: int, C: Any) -> Any:
 
 
 @kernels.helper
+def _tilt(p: Array, w: Array, o: int) -> Any:
+    """Return a plane's normal in the axes of the cylinder over it."""
+    N, two = _axis(p, w, o + layout.FIRST, 2), o + layout.SECOND
+    x, y, z = dot(N, _axis(p, w, two, 0)), dot(N, _axis(p, w, two, 1)), dot(N, _axis(p, w, two, 2))
+    return x[0].real, y[0].real, z[0].real
+
+
+@kernels.helper
+def upside_down(p: Array, w: Array, o: int) -> bool:
+    """Return whether the second cap of a cylinder over a plane is the lower one."""
+    return bool(_tilt(p, w, o)[2] < 0.0)
+
+
+@kernels.helper
+def _crossed(p: Array, w: Array, o: int) -> float:
+    """Return by how much shapes are at an angle, or not beside each other, parts of what separates the two ways."""
+    one, two = o + layout.FIRST, o + layout.SECOND
+    if int(p[one].real) == layout.PLANE:
+        x, y, _ = _tilt(p, w, o)
+        return float(np.sqrt(x * x + y * y) / p[o + layout.SINE].real - 1.0)
+    M, A, a = _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1].real
+    N, B, b = _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1].real
+    sine, beside = solids.crossing(A, B, apart(N, M)), solids.overlap(M, A, a, N, B, b)
+    return float(max(sine / p[o + layout.SINE].real - 1.0, -beside / a))
+
+
+@kernels.helper
+def lowest(p: Array, w: Array, o: int) -> float:
+    """Return the angle about a cylinder's axis at which its caps are lowest over a plane; 0 if they are level."""
+    x, y, _ = _tilt(p, w, o)
+    return float(np.arctan2(-y, -x)) if x != 0.0 or y != 0.0 else 0.0
+
+
+@kernels.helper
+def chosen(p: Array, w: Array, o: int) -> int:
+    """Return how the shapes of the pair at p[o:] lie to each other as they are."""
+    if _crossed(p, w, o) > 0.0:
+        return int(layout.CROSSED)
+    stands = int(p[o + layout.FIRST].real) == layout.PLANE
+    return int(layout.UPSIDE_DOWN if stands and upside_down(p, w, o) else layout.ALONG)
+
+
+@kernels.helper
+def lies(p: Array, w: Array, o: int) -> int:
+    """Return how the shapes of the pair at p[o:] lie to each other: as the run has it, or else as they are."""
+    now = int(p[int(p[tree.AT_SIDE].real) + int(p[o + layout.LIES].real)].real)
+    if now != layout.UNDECIDED:
+        return now
+    return int(chosen(p, w, o))
+
+
+@kernels.helper
+def turn(p: Array, w: Array, o: int, now: int) -> float:
+    """Return how far shapes are from lying to each other otherwise than now, below 0 if they do; 1 out of reach."""
+    one, two = o + layout.FIRST, o + layout.SECOND
+    D, plane = apart(_point(p, w, two), _point(p, w, one)), int(p[one].real) == layout.PLANE
+    reach = 2.0 * (p[two + layout.SIZE] + p[o + layout.MARGIN]).real + p[two + layout.SIZE + 1].real
+    if plane and dot(D, _axis(p, w, one, 2))[0].real > reach:
+        return 1.0
+    reach += 2.0 * p[one + layout.SIZE].real + p[one + layout.SIZE + 1].real
+    if not plane and dot(D, D)[0].real > reach * reach:
+        return 1.0
+    crossed = _crossed(p, w, o)
+    return float(crossed if now == layout.CROSSED else layout.BAND - crossed)
+
+
+@kernels.helper
+def _cylinder(p: Array, w: Array, o: int, place: int) -> Any:
+    """Return the same of a cylinder over a plane: of each cap the lowest and the highest point.
+
+    On a cap it stands on four points of its rim, which the body carries along: which one is lowest there changes with
+    the least tilt.
+    """
+    one, two = o + layout.FIRST, o + layout.SECOND
+    P, N, r, now = _point(p, w, one), _axis(p, w, one, 2), p[two + layout.SIZE], lies(p, w, o)
+    C, X, Y, Z = _point(p, w, two), _axis(p, w, two, 0), _axis(p, w, two, 1), _axis(p, w, two, 2)
+    if now == layout.CROSSED:
+        E = moved(C, _sign(place, 1) * p[two + layout.SIZE + 1], Z)
+        h, n, at = planes.rim(P, N, E, X, Y, -_sign(place, 0) * r)
+    else:
+        E = moved(C, (-1.0 if now == layout.ALONG else 1.0) * p[two + layout.SIZE + 1], Z)
+        angle = p[int(p[tree.AT_SIDE].real) + int(p[o + layout.PHASE].real)] + 0.5 * np.pi * place
+        h, n, at = planes.sphere(P, N, moved(moved(E, r * np.cos(angle), X), r * np.sin(angle), Y), 0.0 * r)
+    return shifted(h, -p[o + layout.MARGIN]), n, at
+
+
+@kernels.helper
+def _capsules(p: Array, w: Array, o: int, place: int) -> Any:
+    """Return the same of two capsules: side by side they meet where they end, crossed at one place."""
+    one, two = o + layout.FIRST, o + layout.SECOND
+    M, A, a = _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1]
+    N, B, b = _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1]
+    if lies(p, w, o) == layout.ALONG:
+        K, L = solids.ends(M, A, a, N, B, b, _sign(place, 0))
+    elif place == 0:
+        K, L = solids.segments(M, A, a, N, B, b)
+    else:
+        zero = 0.0 * A[0][0]
+        return (layout.FAR + zero, zero, zero), (zero, zero, zero), value(M)
+    (d, n), c = solids.point(L, K), value(L)
+    r, s = p[one + layout.SIZE], p[two + layout.SIZE]
+    return shifted(d, -r - s - p[o + layout.MARGIN]), n, (c[0] - s * n[0], c[1] - s * n[1], c[2] - s * n[2])
+
+
+@kernels.helper
 def touch(p: Array, w: Array, o: int, place: int) -> Any:
     """Return gap (value, rate, second derivative at v' = 0), normal from first to second, and where they would meet.
 
@@ -81,6 +187,8 @@ def touch(p: Array, w: Array, o: int, place: int) -> Any:
     """
     one, two = o + layout.FIRST, o + layout.SECOND
     first, second = int(p[one].real), int(p[two].real)
+    if first == layout.PLANE and second == layout.CYLINDER:
+        return _cylinder(p, w, o, place)
     if first == layout.PLANE:
         h, n, at = _over_plane(p, w, two, second, place, _point(p, w, one), _axis(p, w, one, 2))
         return shifted(h, -p[o + layout.MARGIN]), n, at
@@ -91,14 +199,7 @@ def touch(p: Array, w: Array, o: int, place: int) -> Any:
         return shifted(d, -r - p[o + layout.MARGIN]), (-m[0], -m[1], -m[2]), (
             c[0] - r * m[0], c[1] - r * m[1], c[2] - r * m[2],
         )  # fmt: skip
-    r, s = p[one + layout.SIZE], p[two + layout.SIZE]
-    K, L = solids.segments(
-        _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1],
-        _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1],
-    )  # fmt: skip
-    d, n = solids.point(L, K)
-    c = value(L)
-    return shifted(d, -r - s - p[o + layout.MARGIN]), n, (c[0] - s * n[0], c[1] - s * n[1], c[2] - s * n[2])
+    return _capsules(p, w, o, place)
 
 
 @kernels.helper

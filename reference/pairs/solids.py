@@ -22,6 +22,7 @@ from crossbody.reference.pairs.jets import (
     cross,
     dot,
     less,
+    moved,
     over,
     root,
     scaled,
@@ -30,8 +31,11 @@ from crossbody.reference.pairs.jets import (
     value,
 )
 
-PARALLEL = 1e-8
-"""Square of the sine below which two segments count as parallel, and meet in the middle of their overlap."""
+PARALLEL = 1e-24
+"""Square of the sine below which the nearest points of two lines are lost in rounding: those of segments that do not
+lie side by side are ends, whichever way that rounds."""
+INSTANT = 1e-12
+"""s, by which ways that are equal now are told apart."""
 Distance = Any
 """A jet, and three numbers."""
 
@@ -129,7 +133,10 @@ def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float) -> Dis
 
 @kernels.helper
 def segments(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float) -> Any:
-    """Return the nearest points of segments about M and N along A and B; the middle of the overlap of parallel ones."""
+    """Return the nearest points of segments about M and N along A and B.
+
+    Of parallel ones side by side, which have no nearest points, the middle of their overlap.
+    """
     D, b = apart(N, M), dot(A, B)
     f, g = dot(A, D), dot(B, D)
     # A.D - (A.B)(B.D) and 1 - (A.B)^2 by vector products: as differences they have no digits left near parallels.
@@ -145,3 +152,45 @@ def segments(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float)
         t = _held(t, -two, two)
         s = _held(add(f, times(t, b)), -one, one)
     return along(M, s, A), along(N, t, B)
+
+
+@kernels.helper
+def overlap(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float) -> float:
+    """Return over which length of the first of two segments the second lies beside it; below 0 over none."""
+    f, reach = dot(A, apart(N, M))[0].real, abs(dot(A, B)[0].real) * two.real
+    return float(min(one.real, f + reach) - max(-one.real, f - reach))
+
+
+@kernels.helper
+def _ahead(s: Jet) -> float:
+    """Return s an instant later: where two ways are equal now, it says which one the motion takes."""
+    return float(s[0].real + INSTANT * s[1].real)
+
+
+@kernels.helper
+def ends(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float, sign: float) -> Any:
+    """Return nearest points where segments that lie side by side end: an end of the one, and its foot on the other.
+
+    Of two ends abreast of each other the one counts that is further in; where none is, both do.
+
+    The segments are given as to `segments`, and the end by the sign that it has along the first.
+    """
+    other = sign if dot(A, B)[0].real > 0.0 else -sign
+    E, F = moved(M, sign * one, A), moved(N, other * two, B)
+    D = apart(F, E)
+    by, beyond = other * _ahead(dot(B, D)), -sign * _ahead(dot(A, D))  # how far E, and F, is in
+    if max(by, beyond) < 0.0:
+        return E, F
+    if by >= beyond:
+        return E, along(N, dot(B, apart(E, N)), B)
+    return along(M, dot(A, apart(F, M)), A), F
+
+
+@kernels.helper
+def crossing(A: Vector, B: Vector, D: Vector) -> float:
+    """Return the sine of the angle at which axes that are D apart cross, seen along what is nearest between them."""
+    across, f = cross(A, B), dot(A, D)[0].real
+    square = dot(D, D)[0].real - f * f
+    if square <= 0.0:
+        return float(np.sqrt(dot(across, across)[0].real))
+    return float(abs(dot(across, D)[0].real) / np.sqrt(square))

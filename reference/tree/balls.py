@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array, Bytes, Floats
-from crossbody.reference.kernels import CHANGED, START, UNCHANGED
+from crossbody.reference._kinds import Array
 from crossbody.reference.tree import layout
 
 AT_Q, AT_V, BOUND, WHICH = 1, 2, 3, 4  # in a row: where q and v begin, the largest angle, and which side is its own
@@ -59,27 +58,8 @@ def bound_columns(q: Array, p: Array, o: int, H: Array) -> None:
     H[j], H[j + 1], H[j + 2] = -n[0], -n[1], -n[2]
 
 
-@kernels.watch
-def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
-    """Of every bound how far its angle is from half a turn, as the cosine of half of it."""
-    for i in range(int(p[layout.ROWS])):
-        o = int(p[layout.AT_ROW]) + layout.ROW * i
-        if int(p[o]) == layout.BALL_LIMIT:
-            k, w = int(p[o + WHICH]), q[int(p[o + AT_Q])]
-            side = p[int(p[layout.AT_SIDE]) + k]
-            g[k] = side * w + BAND if side != 0.0 else 1.0
-
-
-@kernels.switch
-def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> int:
-    """Choose the sides at the start, and change the one whose angle has come to half a turn."""
-    if fired >= 0:
-        p[int(p[layout.AT_SIDE]) + fired] *= -1.0
-        return int(CHANGED)
-    if fired != START:
-        return int(UNCHANGED)
-    for i in range(int(p[layout.ROWS])):
-        o = int(p[layout.AT_ROW]) + layout.ROW * i
-        if int(p[o]) == layout.BALL_LIMIT:
-            p[int(p[layout.AT_SIDE]) + int(p[o + WHICH])] = -1.0 if q[int(p[o + AT_Q])] < 0.0 else 1.0
-    return int(UNCHANGED)
+@kernels.helper
+def to_half_a_turn(q: Array, p: Array, o: int) -> float:
+    """Return how far the angle of the row at p[o:] is from half a turn, as the cosine of half of it."""
+    side = p[int(p[layout.AT_SIDE].real) + int(p[o + WHICH].real)].real
+    return float(side * q[int(p[o + AT_Q].real)].real + BAND if side != 0.0 else 1.0)

@@ -9,7 +9,8 @@ FREE, BALL, SLIDE, HINGE = range(4)
 NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, AT_PAIR = (
     0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13,
 )  # fmt: skip
-RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, HEAD = 14, 15, 16, 17, 18, 19, 20
+# Last, how many pairs of shapes lie to each other in more than one way.
+RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, LYING, HEAD = 14, 15, 16, 17, 18, 19, 20, 21
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (

@@ -18,14 +18,6 @@ PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cos
 
 
 @kernels.helper
-def _posed(q: Array, v: Array, p: Array) -> Array:
-    """Return the scratch of the outward sweep, filled."""
-    w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
-    sweeps.outwards(q, v, p, w)
-    return w
-
-
-@kernels.helper
 def _pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
     """Return which node push i acts on, the motion of the point there, and the force."""
     o, k = int(p[layout.AT_PUSH].real) + layout.PUSH * i, int(p[layout.ACTUATORS].real) + 3 * i
@@ -130,7 +122,7 @@ def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
     """Of every row; where points or shapes of bodies are to meet their poses are computed first."""
-    w = _posed(q, v, p) if p[layout.POSED].real > 0.0 else np.empty(0, dtype=q.dtype)
+    w = sweeps.posed(q, v, p) if p[layout.POSED].real > 0.0 else np.empty(0, dtype=q.dtype)
     for i in range(len(h)):
         kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real)
         if kind == layout.CONNECT:
@@ -186,7 +178,7 @@ def _stored(q: Array, p: Array, o: int) -> Any:
 def energy(q: Array, v: Array, p: Array, e: Array) -> None:
     """T = sum of V.IV/2 over the nodes and of armatures; V of weight, of what is spared of it, and of springs."""
     nodes = int(p[layout.NODES].real)
-    w = _posed(q, v, p)
+    w = sweeps.posed(q, v, p)
     kinetic, potential = 0.0 * q[0], p[layout.RESTING] + 0.0 * q[0]
     for i in range(nodes):
         o, x = int(p[layout.AT_NODE].real) + layout.NODE * i, layout.NODE_SCRATCH * i
@@ -220,7 +212,7 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
     n, at_dof = len(v), int(p[layout.AT_DOF].real)
     given, taken = 0.0 * v[0], 0.0 * v[0]
     posed = p[layout.PUSHES].real > 0.0 or p[layout.SPANNED].real > 0.0
-    w = _posed(q, v, p) if posed else np.empty(0, dtype=q.dtype)
+    w = sweeps.posed(q, v, p) if posed else np.empty(0, dtype=q.dtype)
     if len(u) > 0:
         sums = np.zeros(n, dtype=q.dtype)
         forces.actuated(t, q, v, u, p, w, sums)

@@ -15,7 +15,7 @@ from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._kinds import Floats
 from crossbody.reference._redundant import ranked
-from crossbody.reference.tree import balls
+from crossbody.reference.tree import switches
 from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import dof_parents, tabulate
 
@@ -55,13 +55,15 @@ def system(
         turning = {"velocity": velocity, "quaternions": table.quaternions}
     if table.sides:
         turning |= {
-            "watch": balls.watch,
-            "switch": balls.switch,
+            "watch": switches.watch,
+            "switch": switches.switch,
             "guards": table.sides,
             "discrete": np.zeros(table.sides),
+            "latched": table.phases,
         }
     fields: dict[str, Any] = dict(
-        n=scene.nv, nq=scene.nq, above=dof_parents(table), parameters=table.p[: len(table.p) - table.sides], **turning,
+        n=scene.nv, nq=scene.nq, above=dof_parents(table),
+        parameters=table.p[: len(table.p) - table.sides - table.phases], **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS,

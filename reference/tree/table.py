@@ -69,7 +69,7 @@ class Table:
     """A scene for the kernels.
 
     Attributes:
-        p: the parameters of the kernels, `sides` discrete variables at their end.
+        p: the parameters of the kernels, `sides` discrete variables and `phases` angles at their end.
         places: body -> where it stands.
         nodes: number of nodes.
         dofs: joint -> its first velocity.
@@ -82,6 +82,7 @@ class Table:
     dofs: dict[str, int]
     coordinates: dict[str, int]
     sides: int
+    phases: int
 
     @property
     def quaternions(self) -> list[int]:
@@ -137,7 +138,7 @@ class _Builder:
         self.dofs: dict[str, int] = {}
         self.nq = 0
         self.resting = 0.0
-        self.sides = 0
+        self.sides = self.phases = 0
 
     def table(self) -> Table:
         for body in self.scene.bodies:
@@ -146,7 +147,7 @@ class _Builder:
             row[layout.MASS : layout.STIFFNESS] = inertia.row()
         return Table(
             p=self._packed(), places=self.places, nodes=len(self.rows), dofs=self.dofs, coordinates=self.coordinates,
-            sides=self.sides,
+            sides=self.sides, phases=self.phases,
         )  # fmt: skip
 
     def _place(self, body: Body) -> None:
@@ -210,8 +211,20 @@ class _Builder:
         pushes = [self._push(push) for push in scene.pushes]
         head[layout.PUSHES] = len(pushes)
         head[layout.SPANNED] = sum(scene.acts_along(tendon) for tendon in scene.tendons if tendon.bodies)
-        sides = [np.zeros(self.sides)]
-        parts = [self.rows, self.dof_rows, actuators, tendons, rows, pair_rows(scene, self.places), pushes, sides]
+        pairs_ = pair_rows(scene, self)
+        for row in pairs_:
+            row[pairs.PHASE] += self.sides  # behind all that says how shapes lie
+        head[layout.LYING] = sum(row[pairs.LIES] >= 0.0 for row in pairs_)
+        parts = [
+            self.rows,
+            self.dof_rows,
+            actuators,
+            tendons,
+            rows,
+            pairs_,
+            pushes,
+            [np.zeros(self.sides + self.phases)],
+        ]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[
             layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR,
@@ -326,18 +339,23 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
     return rows
 
 
-def pair_rows(scene: Scene, places: Mapping[str, Place]) -> list[Floats]:
-    """Return the pairs whose rows are contacts: two shapes, and where the rows begin.
+def pair_rows(scene: Scene, builder: _Builder) -> list[Floats]:
+    """Return the pairs whose rows are contacts: two shapes, where the rows begin, and in how many ways they lie.
 
     Raises:
         SceneError: for shapes that do not move against each other.
     """
     rows = []
     for contact in contacts(scene):
-        one, two = (_shape(shape, places) for shape in (contact.first, contact.second))
+        one, two = (_shape(shape, builder.places) for shape in (contact.first, contact.second))
         if one[pairs.NODE] == two[pairs.NODE]:
             raise SceneError(f"Pair {contact.pair.name!r}: its shapes do not move against each other.")
-        rows.append(np.concatenate([one, two, [contact.pair.margin]]))
+        lies = phase = -1.0
+        if contact.parallel > 0.0:
+            lies, builder.sides = builder.sides, builder.sides + 1
+        if contact.first.type == "plane" and contact.parallel > 0.0:
+            phase, builder.phases = builder.phases, builder.phases + 1
+        rows.append(np.concatenate([one, two, [contact.pair.margin, lies, contact.parallel, phase]]))
     return rows
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Shape
+from crossbody.cases.scene_contacts import LEVEL, parallel
 from crossbody.reports.scenes._kinematics import Pose
 
 Placed = tuple[Shape, Pose]
@@ -20,16 +21,21 @@ def meeting(first: Placed, second: Placed, place: int) -> tuple[Floats, Floats]:
     Args:
         first: shape of a contact, from which its normal leads.
         second: the other.
-        place: which of its places: end of a capsule, cap of a cylinder, corner of a box.
+        place: which of its places: end of a capsule, point of a cylinder's caps, corner of a box.
     """
     if first[0].type == "plane":
         normal = first[1][1][:, :, 2]
+        if second[0].type == "cylinder":
+            return _on_rim(second, place, normal), normal
         return _lowest(second, place, normal), normal
     if first[0].type == "sphere":
         centre, radius = first[1][0], first[0].size[0]
         normal = _unit(_nearest(second, centre) - centre)
         return centre + radius * normal, normal
     one, two = _segments(first, second)
+    start, end = _ends(first, second, 1.0 if place else -1.0)
+    along = (_crossing(first, second) <= parallel(first[0], second[0]))[:, None]
+    one, two = np.where(along, start, one), np.where(along, end, two)
     normal = _unit(two - one)
     return two - second[0].size[0] * normal, normal
 
@@ -43,13 +49,24 @@ def _lowest(solid: Placed, place: int, normal: Floats) -> Floats:
         local = -size[0] * n
     elif shape.type == "capsule":
         local = signs[0] * size[1] * UP - size[0] * n
-    elif shape.type == "cylinder":
-        local = signs[0] * size[1] * UP - size[0] * _unit(n * (1.0 - UP))
     elif shape.type == "box":
         local = np.tile(signs * size, (len(n), 1))
     else:
         local = -size * _unit(size * n)
     return centre + _outside(rotation, local)
+
+
+def _on_rim(solid: Placed, place: int, normal: Floats) -> Floats:
+    """Return the lowest or highest point of a cylinder's cap, or where it stands one of four points of its rim."""
+    shape, (centre, rotation) = solid
+    (r, half, _), n = shape.size, _inside(rotation, normal)
+    across = n * (1.0 - UP)
+    cap, side = (1.0 if place >> 1 & 1 else -1.0), (1.0 if place & 1 else -1.0)
+    tilted = cap * half * UP + side * r * _unit(across)
+    angle = 0.5 * np.pi * place
+    standing = r * np.array([np.cos(angle), np.sin(angle), 0.0]) - half * np.sign(n) * UP
+    level = np.linalg.norm(across, axis=1, keepdims=True) <= LEVEL
+    return centre + _outside(rotation, np.where(level, standing, tilted))
 
 
 def _nearest(solid: Placed, point: Floats) -> Floats:
@@ -79,6 +96,27 @@ def _segments(first: Placed, second: Placed) -> tuple[Floats, Floats]:
     other = np.clip(c * along - e, -two.size[1], two.size[1])
     along = np.clip(c * other + d, -one.size[1], one.size[1])
     return a + along[:, None] * u, b + other[:, None] * w
+
+
+def _ends(first: Placed, second: Placed, sign: float) -> tuple[Floats, Floats]:
+    """Return where the axes of two capsules that lie along each other end: the nearer of an end and its foot."""
+    (one, (a, R)), (two, (b, S)) = first, second
+    u, w = R[:, :, 2], S[:, :, 2]
+    side = sign * np.where(np.sum(u * w, axis=1, keepdims=True) > 0.0, 1.0, -1.0)
+    end, other = a + sign * one.size[1] * u, b + side * two.size[1] * w
+    foot = b + np.clip(np.sum(w * (end - b), axis=1, keepdims=True), -two.size[1], two.size[1]) * w
+    back = a + np.clip(np.sum(u * (other - a), axis=1, keepdims=True), -one.size[1], one.size[1]) * u
+    further = np.linalg.norm(foot - end, axis=1) <= np.linalg.norm(other - back, axis=1)
+    return np.where(further[:, None], end, back), np.where(further[:, None], foot, other)
+
+
+def _crossing(first: Placed, second: Placed) -> Floats:
+    """Return the sine (n,) of the angle at which the axes of two capsules cross, seen along what is between them."""
+    (_, (a, R)), (_, (b, S)) = first, second
+    u, w = R[:, :, 2], S[:, :, 2]
+    across = b - a - np.sum(u * (b - a), axis=1, keepdims=True) * u
+    found: Floats = np.abs(np.sum(np.cross(u, w) * _unit(across), axis=1))
+    return found
 
 
 def _inside(rotation: Floats, world: Floats) -> Floats:

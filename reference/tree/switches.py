@@ -1,0 +1,108 @@
+"""What a scene's rows are branched on: which side a ball joint's angle counts from, how two shapes lie to each other.
+
+Each is a variable that holds from one instant to the next: inside a step the rows go on as smooth as the motion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crossbody.reference import kernels
+from crossbody.reference._kinds import Bytes, Floats
+from crossbody.reference.kernels import CHANGED, START, UNCHANGED
+from crossbody.reference.pairs import layout as pairs
+from crossbody.reference.pairs.rows import chosen, lowest, touch, turn, upside_down
+from crossbody.reference.tree import balls, layout, sweeps
+
+FREE, CONTACT = 0, 1  # modes, as in crossbody.cases.Mode
+
+
+@kernels.helper
+def _pair(p: Floats, i: int) -> int:
+    """Return where the pair of row i stands, if that is its first row and it lies in more than one way; else -1."""
+    row = int(p[layout.AT_ROW]) + layout.ROW * i
+    if int(p[row]) != layout.CONTACT or int(p[row + pairs.PLACE]) != 0:
+        return -1
+    o = int(p[layout.AT_PAIR]) + pairs.PAIR * int(p[row + pairs.WHICH])
+    return o if p[o + pairs.LIES] >= 0.0 else -1
+
+
+@kernels.watch
+def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
+    """Of every bound of a ball joint how far it is from half a turn, of every pair from lying otherwise."""
+    w = sweeps.posed(q, v, p) if p[layout.LYING] > 0.0 else q
+    for i in range(int(p[layout.ROWS])):
+        o = int(p[layout.AT_ROW]) + layout.ROW * i
+        if int(p[o]) == layout.BALL_LIMIT:
+            g[int(p[o + balls.WHICH])] = balls.to_half_a_turn(q, p, o)
+            continue
+        o = _pair(p, i)
+        if o >= 0:
+            k = int(p[o + pairs.LIES])
+            g[k] = turn(p, w, o, int(p[int(p[layout.AT_SIDE]) + k]))
+
+
+@kernels.helper
+def _stand(p: Floats, w: Floats, o: int, i: int, mode: Bytes, before: int) -> None:
+    """Hand over between lowest and highest points of a cylinder's caps and the points of its rim.
+
+    The points count from the lowest one, so that the opposite one is the highest: what rocks in a plane feels nothing.
+    """
+    k = int(p[layout.AT_SIDE])
+    now = int(p[k + int(p[o + pairs.LIES])])
+    if now != pairs.CROSSED:
+        p[k + int(p[o + pairs.PHASE])] = lowest(p, w, o)
+    if before == pairs.CROSSED:
+        cap = i + (0 if now == pairs.ALONG else 2)
+        low, high = mode[cap], mode[cap + 1]
+        mode[i], mode[i + 1], mode[i + 2], mode[i + 3] = low, FREE, high, FREE
+    elif before != pairs.UNDECIDED:
+        turned = lowest(p, w, o) - p[k + int(p[o + pairs.PHASE])]
+        first = int(np.round(turned / (0.5 * np.pi))) % 4
+        low, high = mode[i + first], mode[i + (first + 2) % 4]
+        cap = i + (0 if before == pairs.ALONG else 2)
+        mode[i], mode[i + 1], mode[i + 2], mode[i + 3] = FREE, FREE, FREE, FREE
+        mode[cap], mode[cap + 1] = low, high
+
+
+@kernels.helper
+def _lie(p: Floats, w: Floats, o: int, i: int, mode: Bytes) -> None:
+    """Let the shapes whose rows begin at i lie otherwise than before; what touched touches where they are nearest."""
+    k, stands = int(p[layout.AT_SIDE]) + int(p[o + pairs.LIES]), int(p[o]) == pairs.PLANE
+    start, before = p[k] == pairs.UNDECIDED, int(p[k])
+    if start:
+        p[k] = chosen(p, w, o)
+    elif before != pairs.CROSSED:
+        p[k] = pairs.CROSSED
+    else:
+        p[k] = pairs.UPSIDE_DOWN if stands and upside_down(p, w, o) else pairs.ALONG
+    if stands:
+        _stand(p, w, o, i, mode, before)
+    elif start:
+        return
+    elif p[k] == pairs.CROSSED:
+        if mode[i] == FREE or mode[i + 1] == CONTACT:
+            mode[i] = mode[i + 1]
+        mode[i + 1] = FREE
+    elif touch(p, w, o, 1)[0][0] < touch(p, w, o, 0)[0][0]:
+        mode[i], mode[i + 1] = mode[i + 1], mode[i]
+
+
+@kernels.switch
+def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> int:
+    """Choose sides and ways at the start, and change the one that has come to its end."""
+    if fired < 0 and fired != START:
+        return int(UNCHANGED)
+    w = sweeps.posed(q, v, p) if p[layout.LYING] > 0.0 else q
+    first = int(p[layout.AT_SIDE])
+    for i in range(int(p[layout.ROWS])):
+        o, pair = int(p[layout.AT_ROW]) + layout.ROW * i, _pair(p, i)
+        if int(p[o]) == layout.BALL_LIMIT:
+            k = int(p[o + balls.WHICH])
+            if fired == START:
+                p[first + k] = -1.0 if q[int(p[o + balls.AT_Q])] < 0.0 else 1.0
+            elif fired == k:
+                p[first + k] *= -1.0
+        elif pair >= 0 and fired in (START, int(p[pair + pairs.LIES])):
+            _lie(p, w, pair, i, mode)
+    return int(CHANGED if fired >= 0 else UNCHANGED)

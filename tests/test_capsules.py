@@ -1,0 +1,121 @@
+"""Capsules that lie along each other: two rows where they end, one where they cross, and what changes between."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from resting import LAW, quaternion
+
+from crossbody import cases, engines
+from crossbody.cases import Case, Outcome, Trajectory
+from crossbody.cases._rotations import differences
+from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
+from crossbody.cases.scene_contacts import SAG
+
+ALONG_X = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
+RADIUS, HALF, WEIGHT = 0.02, 0.2, 9.81
+
+
+def rods(
+    turn: Any = (0.0, 0.0, 0.0), *, height: float = 0.0, com: float = 0.0, half: float = HALF, v: Any = None,
+    t_end: float = 0.2,
+) -> Case:  # fmt: skip
+    """Return a capsule of 1 kg over a fixed one, both along x.
+
+    Args:
+        turn: rotation vector of the upper one.
+        height: of its axis above where it lies, m.
+        com: place of its centre of mass along its axis, m.
+        half: its half length, m.
+        v: its velocities at the start.
+        t_end: horizon, s.
+    """
+    low = Shape(name="low", type="capsule", size=(RADIUS, HALF, 0.0), orientation=ALONG_X)
+    top = Shape(name="top", body="rod", type="capsule", size=(RADIUS, half, 0.0), orientation=ALONG_X)
+    body = Body(name="rod", mass=1.0, com=(com, 0.0, 0.0), inertia=(0.0004, 0.0133, 0.0133, 0.0, 0.0, 0.0))
+    scene = Scene(
+        bodies=(body,), joints=(Joint(name="free", body="rod", type="free"),), shapes=(low, top),
+        pairs=(Pair(name="rods", first="low", second="top", law=LAW),),
+    )  # fmt: skip
+    return cases.from_scene(scene, q0=[0.0, 0.0, 2.0 * RADIUS + height, *quaternion(turn)], v0=v, t_end=t_end)
+
+
+def run(case: Case, profile: str = "compiled", engine: str = "reference", **settings: Any) -> Trajectory:
+    found = engines.load(engine).prepare(case, profile, **settings).run()
+    assert found.outcome is Outcome.FINISHED, found.message
+    return found
+
+
+def apart(case: Case, one: Trajectory, other: Trajectory) -> float:
+    """Return by how much two motions of a case differ at their ends."""
+    return float(differences(one.q[-1:], other.q[-1:], case.quaternions).max())
+
+
+def test_a_capsule_rests_on_another_at_both_ends() -> None:
+    case = rods(com=0.05)
+    for profile in ("compiled", "cvode", "ida"):
+        rest = run(case, profile, rtol=1e-10)
+        assert rest.lam[-1] == pytest.approx([WEIGHT * (0.5 - 0.125), WEIGHT * (0.5 + 0.125)], rel=1e-6)
+        assert np.abs(rest.q - rest.q[0]).max() <= 1e-12
+
+
+MOTIONS: dict[str, dict[str, Any]] = {
+    "lands along": dict(height=5e-3, com=0.03, t_end=0.1),
+    "lands tilted": dict(turn=(0.0, 0.01, 0.0), height=5e-3, half=0.15, t_end=0.08),
+    "lands almost along": dict(turn=(0.0, 0.0, 1e-3), height=1e-3, com=0.03, t_end=0.018),
+    "lands crossed": dict(turn=(0.0, 0.0, 0.3), height=5e-3, com=0.01, t_end=0.08),
+    "turns through along": dict(turn=(0.0, 0.0, -0.01), com=0.02, v=[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], t_end=0.04),
+}
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_capsules_move_alike_in_two_solvers(motion: str) -> None:
+    case = rods(**MOTIONS[motion])
+    assert apart(case, run(case, rtol=1e-10), run(case, "cvode", rtol=1e-10)) <= 1e-7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("motion", [name for name in MOTIONS if name != "turns through along"])
+def test_pinocchio_moves_capsules_alike(motion: str) -> None:
+    case = rods(**MOTIONS[motion])
+    theirs = run(case, "law", "pinocchio", rtol=1e-10)
+    assert apart(case, run(case, rtol=1e-10), theirs) <= 1e-6
+
+
+def test_mujoco_lays_a_capsule_along_another_alike() -> None:
+    """Where two lie along each other it has a contact at either end; where they touch it is of first order."""
+    case = rods(height=1e-3, com=0.03, t_end=0.04)
+    theirs = run(case, "matched", "mujoco", dt=1e-4)
+    assert apart(case, run(case, rtol=1e-10), theirs) <= 1e-4
+    assert (theirs.lam.max(axis=0) > 0.0).all()
+
+
+def test_turning_through_along_makes_no_energy() -> None:
+    """Less than the weight does over what the gap is too large by where rows change."""
+    found = run(rods((0.0, 0.0, -0.05), com=0.02, v=[0.0, 0.0, 0.0, 0.0, 0.0, 0.5]), rtol=1e-11)
+    assert [switch.after for switch in found.switches if switch.t > 0.0] == [2, 1]
+    energy = found.total_energy
+    assert np.abs(energy - energy[0]).max() <= WEIGHT * SAG * 2.0 * RADIUS
+
+
+@pytest.mark.parametrize("sine", [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2])
+def test_rows_of_capsules_are_what_they_say_at_any_angle(sine: float) -> None:
+    """Gaps, H and H' v by differences, exactly abreast of each other and at random states."""
+    from crossbody.reference._check import check_kernels
+
+    system = engines.load("reference").prepare(rods(), "compiled").system
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        q = np.array([0.1 * rng.normal() if seed or sine else 0.0, 0.0, 0.05,
+                      *quaternion((0.0, 0.3 * sine, sine))])  # fmt: skip
+        check_kernels(system, q, rng.normal(size=6), seed=seed)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3], ids=["within reach", "out of reach"])
+@pytest.mark.parametrize("half", [HALF, 0.1])
+def test_capsules_that_start_parallel_are_admitted(height: float, half: float) -> None:
+    """Legs of a robot that stands are: which of their places is nearest is no function of their pose."""
+    found = run(rods(height=height, half=half, t_end=0.01))
+    assert found.switches[0].after == 2
