@@ -64,6 +64,7 @@ class Contacts:
         shapes = {shape.name: shape for contact in self.all for shape in (contact.first, contact.second)}
         self.shapes = {name: (shape, matrices(np.array(shape.orientation))) for name, shape in shapes.items()}
         self.turning = [k for k, contact in enumerate(self.all) if contact.parallel > 0.0]
+        self.capsules = {k for k in self.turning if self.all[k].first.type == "capsule"}
 
     @property
     def count(self) -> int:
@@ -80,15 +81,16 @@ class Contacts:
             poses: of the bodies.
             rows: which; all if not given.
             along: of contacts in `turning`, whether the capsules lie along each other; as they do, if not given.
-            clear: of shapes whose bounding spheres are further apart, m, that distance stands for every gap, without
-                a normal.
+            clear: of shapes that are further apart, m, no normal is sought; of other shapes than capsules the distance
+                of their bounding spheres stands for every gap then.
         """
         wanted = self.rows if rows is None else [self.rows[i] for i in rows]
         placed: dict[str, Pose] = {}
-        found = {
-            k: self._touches(self.all[k], self._poses(self.all[k], poses, placed), (along or {}).get(k), clear)
-            for k in dict.fromkeys(k for k, _ in wanted)
-        }
+        at = {k: self._poses(self.all[k], poses, placed) for k in dict.fromkeys(k for k, _ in wanted)}
+        lie = along or {}
+        together = [k for k in at if k in self.capsules]
+        found = dict(zip(together, self._all_capsules(together, at, lie, clear), strict=True))
+        found |= {k: self._touches(self.all[k], at[k], lie.get(k), clear) for k in at if k not in self.capsules}
         return [found[k][place] for k, place in wanted]
 
     def lying(self, poses: Poses, rows: Sequence[int]) -> tuple[dict[int, bool], float]:
@@ -104,9 +106,12 @@ class Contacts:
             found[k] = _along(self.all[k], *at)
             if self.all[k].first.type == "plane":
                 least = least if found[k] else min(least, _tilt(*at))
-            elif not found[k] and np.less_equal(*_overlap(self.all[k], *at)):  # else ends are nearest
-                least = min(least, _crossing(*at) ** 2)
+            elif not found[k] and self._beside(self.all[k], *at):  # else ends are nearest
+                least = min(least, float(_crossing(*at)) ** 2)
         return found, TURN * min(1.0, SHARP * least)
+
+    def _beside(self, contact: Contact, at: Pose, by: Pose) -> bool:
+        return bool(np.less_equal(*_overlap(at, contact.first.size[1], by, contact.second.size[1])))
 
     def _poses(self, contact: Contact, poses: Poses, placed: dict[str, Pose]) -> tuple[Pose, Pose]:
         for shape in (contact.first, contact.second):
@@ -123,11 +128,29 @@ class Contacts:
         if first.type == "plane":
             side_by_side = _along(contact, one, two) if along is None and contact.parallel > 0.0 else bool(along)
             found = _over(one, second, two, side_by_side)
-        elif first.type == "capsule":
-            found = _capsules(contact, one, two, along)
         else:
             found = [_between(first, one, second, two)]
         return [Touch(gap - contact.pair.margin, n, point, first.body, second.body) for gap, n, point in found]
+
+    def _all_capsules(
+        self, which: Sequence[int], at: Mapping[int, tuple[Pose, Pose]], along: Mapping[int, bool], clear: float
+    ) -> list[list[Touch]]:
+        """Return the two touches of every pair of capsules, of all pairs at once: most of a robot's shapes are some."""
+        if not which:
+            return []
+        pairs = [self.all[k] for k in which]
+        one, two = (
+            (np.array([at[k][side][0] for k in which]), np.array([at[k][side][1] for k in which])) for side in (0, 1)
+        )
+        gaps, normals, points = _capsules(pairs, one, two, [along.get(k) for k in which])
+        normals[gaps > clear] = 0.0
+        return [
+            [
+                Touch(float(gap) - pair.pair.margin, n, point, pair.first.body, pair.second.body)
+                for gap, n, point in zip(*places, strict=True)
+            ]
+            for pair, *places in zip(pairs, gaps, normals, points, strict=True)
+        ]
 
 
 def _bound(shape: Shape) -> float:
@@ -222,43 +245,72 @@ def _nearest_on(shape: Shape, x: Floats) -> tuple[Floats, bool]:
     return np.array([*x[:2], np.copysign(half[1], x[2])]), True
 
 
-def _capsules(contact: Contact, at: Pose, by: Pose, along: bool | None) -> list[tuple[float, Floats, Floats]]:
-    """Gap, normal and point of the second of two capsules: where they end if they lie along each other, else nearest.
+def _capsules(
+    pairs: Sequence[Contact], at: Pose, by: Pose, along: Sequence[bool | None]
+) -> tuple[Floats, Floats, Floats]:
+    """Return gaps (n, 2), normals and points of the second (n, 2, 3) of pairs of capsules.
 
-    The row that is none then is far.
+    They are where the two end if they lie along each other; else where they are nearest, and a row that is none is far.
+
+    Args:
+        pairs: n pairs.
+        at: poses of the first capsules, (n, 3, 3) and (n, 3).
+        by: those of the second.
+        along: whether each pair lies along; as it does, if None.
     """
-    one, two = contact.first, contact.second
-    lengths = at, one.size[1], by, two.size[1]
-    side_by_side = _along(contact, at, by) if along is None else along
-    pairs = [_end(*lengths, sign) for sign in (-1.0, 1.0)] if side_by_side else [_nearest(*lengths)]
-    found: list[tuple[float, Floats, Floats]] = []
-    for start, core in pairs:
-        distance, n = _apart(core - start)
-        found.append((distance - one.size[0] - two.size[0], n, core - two.size[0] * n))
-    return found if side_by_side else [*found, (FAR + contact.pair.margin, np.zeros(3), at[1])]
+    radius, half = np.array([pair.first.size[:2] for pair in pairs]).T
+    width, other = np.array([pair.second.size[:2] for pair in pairs]).T
+    low, high = _overlap(at, half, by, other)
+    lie = (low <= high) & (_crossing(at, by) <= [pair.parallel for pair in pairs])
+    lie = np.array([seen if given is None else given for seen, given in zip(lie.tolist(), along, strict=True)])
+    segments, none = (at, half, by, other), ~lie
+    starts, ends = (np.repeat(pose[1][:, None], 2, axis=1) for pose in (at, by))
+    if none.any():
+        starts[none, 0], ends[none, 0] = (points[none] for points in _nearest(*segments))
+    for place, sign in enumerate((-1.0, 1.0) if lie.any() else ()):
+        starts[lie, place], ends[lie, place] = (points[lie] for points in _end(*segments, sign))
+    apart = ends - starts
+    distance = np.sqrt(_dot(apart, apart))
+    with np.errstate(invalid="ignore"):  # axes that meet have no normal
+        normals = apart / distance[..., None]
+    gaps = distance - (radius + width)[:, None]
+    margins = np.array([pair.pair.margin for pair in pairs])
+    gaps[none, 1], normals[none, 1] = FAR + margins[none], 0.0
+    return gaps, normals, ends - width[:, None, None] * normals
 
 
 def _along(contact: Contact, at: Pose, by: Pose) -> bool:
     """Whether two capsules lie beside each other, and along, or a cylinder stands."""
     if contact.first.type == "plane":
         return _tilt(at, by) <= contact.parallel
-    low, high = _overlap(contact, at, by)
-    return low <= high and _crossing(at, by) <= contact.parallel
+    low, high = _overlap(at, contact.first.size[1], by, contact.second.size[1])
+    return bool(low <= high and _crossing(at, by) <= contact.parallel)
 
 
-def _crossing(at: Pose, by: Pose) -> float:
+def _axes(one: Pose, two: Pose) -> tuple[Floats, Floats, Floats]:
+    """Return the axes of two capsules and the way between their centres, each (..., 3)."""
+    return one[0][..., 2], two[0][..., 2], two[1] - one[1]
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    total: Floats = np.sum(a * b, axis=-1)
+    return total
+
+
+def _crossing(at: Pose, by: Pose) -> Floats:
     """Sine of the angle at which the axes of two capsules cross, seen along what is nearest between them."""
-    (M, A), (N, B) = ((pose[1], pose[0][:, 2]) for pose in (at, by))
-    apart = (N - M) - A @ (N - M) * A
-    length = float(np.linalg.norm(apart))
-    return abs(float(np.linalg.det([A, B, apart]))) / length if length > 0.0 else float(np.linalg.norm(np.cross(A, B)))
+    A, B, way = _axes(at, by)
+    apart = way - _dot(A, way)[..., None] * A
+    across, length = np.cross(A, B), np.sqrt(_dot(apart, apart))
+    seen = np.abs(_dot(across, apart)) / np.where(length > 0.0, length, 1.0)
+    return np.where(length > 0.0, seen, np.sqrt(_dot(across, across)))
 
 
-def _overlap(contact: Contact, at: Pose, by: Pose) -> tuple[float, float]:
+def _overlap(at: Pose, half: Any, by: Pose, other: Any) -> tuple[Floats, Floats]:
     """From where to where along the first of two capsules the second lies beside it."""
-    half, middle = contact.first.size[1], float(at[0][:, 2] @ (by[1] - at[1]))
-    reach = abs(float(at[0][:, 2] @ by[0][:, 2])) * contact.second.size[1]
-    return max(-half, middle - reach), min(half, middle + reach)
+    A, B, way = _axes(at, by)
+    middle, reach = _dot(A, way), np.abs(_dot(A, B)) * other
+    return np.maximum(-half, middle - reach), np.minimum(half, middle + reach)
 
 
 def end_of(contact: Contact, at: Pose, by: Pose, point: Floats) -> int:
@@ -268,26 +320,42 @@ def end_of(contact: Contact, at: Pose, by: Pose, point: Floats) -> int:
         if _along(contact, at, by):
             return int(np.round(np.arctan2(x[1], x[0]) / (0.5 * np.pi))) % 4
         return 2 * int(x[2] > 0.0) + int(x[:2] @ n[:2] > 0.0)
-    return int(_along(contact, at, by) and at[0][:, 2] @ (point - at[1]) > 0.5 * sum(_overlap(contact, at, by)))
+    low, high = _overlap(at, contact.first.size[1], by, contact.second.size[1])
+    return int(_along(contact, at, by) and at[0][:, 2] @ (point - at[1]) > 0.5 * (low + high))
 
 
-def _end(one: Pose, half: float, two: Pose, other: float, sign: float) -> tuple[Floats, Floats]:
-    """Return nearest points where two segments that lie side by side end: the nearer of an end and its foot."""
-    (M, A), (N, B) = ((pose[1], pose[0][:, 2]) for pose in (one, two))
-    E, F = M + sign * half * A, N + np.copysign(other, sign * (A @ B)) * B
-    tried = [(E, N + np.clip(B @ (E - N), -other, other) * B), (M + np.clip(A @ (F - M), -half, half) * A, F)]
-    return min(tried, key=lambda pair: float(np.sum((pair[1] - pair[0]) ** 2)))
+def _end(one: Pose, half: Floats, two: Pose, other: Floats, sign: float) -> tuple[Floats, Floats]:
+    """Return nearest points (n, 3) where segments that lie side by side end: the nearer of an end and its foot."""
+    A, B, _ = _axes(one, two)
+    toward = np.copysign(other, sign * _dot(A, B))
+    return _closest([_foot(one, sign * half, two, other), _foot(two, toward, one, half)[::-1]])
 
 
-def _nearest(one: Pose, half: float, two: Pose, other: float) -> tuple[Floats, Floats]:
-    """Return the nearest points of two segments: the best of the four ends and the common perpendicular."""
-    (M, A), (N, B) = ((pose[1], pose[0][:, 2]) for pose in (one, two))
-    tried = [(M + s * A, N + np.clip(B @ (M + s * A - N), -other, other) * B) for s in (-half, half)]
-    tried += [(M + np.clip(A @ (N + t * B - M), -half, half) * A, N + t * B) for t in (-other, other)]
-    s, t = np.linalg.lstsq(np.column_stack([A, -B]), N - M, rcond=None)[0]
-    if abs(s) <= half and abs(t) <= other:
-        tried.append((M + s * A, N + t * B))
-    return min(tried, key=lambda pair: float(np.sum((pair[1] - pair[0]) ** 2)))
+def _nearest(one: Pose, half: Floats, two: Pose, other: Floats) -> tuple[Floats, Floats]:
+    """Return the nearest points (n, 3) of segments: the best of the four ends and the common perpendicular."""
+    tried = [_foot(one, sign * half, two, other) for sign in (-1.0, 1.0)]
+    tried += [_foot(two, sign * other, one, half)[::-1] for sign in (-1.0, 1.0)]
+    A, B, way = _axes(one, two)
+    across = np.cross(A, B)
+    square = _dot(across, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s, t = (_dot(np.cross(way, axis), across) / square for axis in (B, A))
+    inside = (square > 0.0) & (np.abs(s) <= half) & (np.abs(t) <= other)
+    s, t = np.where(inside, s, half), np.where(inside, t, other)
+    return _closest([*tried, (one[1] + s[:, None] * A, two[1] + t[:, None] * B)])
+
+
+def _foot(one: Pose, along: Floats, two: Pose, half: Floats) -> tuple[Floats, Floats]:
+    """Return points (n, 3) of segments, and what is nearest to them on others."""
+    E, B = one[1] + along[:, None] * one[0][..., 2], two[0][..., 2]
+    return E, two[1] + np.clip(_dot(B, E - two[1]), -half, half)[:, None] * B
+
+
+def _closest(tried: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    """Return of pairs of points (n, 3) for each place the pair that is nearest."""
+    best = np.argmin([_dot(b - a, b - a) for a, b in tried], axis=0)
+    starts, ends = (np.array([pair[side] for pair in tried])[best, np.arange(len(best))] for side in (0, 1))
+    return starts, ends
 
 
 def drift(rates: Callable[[float], Floats], v: Floats, turn: float = TURN) -> Floats:

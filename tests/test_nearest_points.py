@@ -56,6 +56,9 @@ def test_a_gap_changes_along_its_normal_and_by_no_turn_about_its_point(types: tu
     for _ in range(DRAWS):
         met, poses = drawn(rng, types)
         for k, touch in enumerate(met.touches(poses.__getitem__)):
+            if not touch.normal.any():  # capsules that cross have one row, and one that is none
+                assert types == ("capsule", "capsule") and k == 1
+                continue
             assert abs(np.linalg.norm(touch.normal) - 1.0) < 1e-12
             for body, sign in ((touch.first, -1.0), (touch.second, 1.0)):
                 along = rng.normal(size=3)
@@ -94,7 +97,7 @@ def test_no_point_of_a_surface_is_nearer(types: tuple[str, str]) -> None:
     rng, within = np.random.default_rng(1), 0
     for _ in range(DRAWS):
         met, poses = drawn(rng, types)
-        (touch,), (contact,) = met.touches(poses.__getitem__), met.all
+        contact, touch = met.all[0], min(met.touches(poses.__getitem__), key=lambda touch: touch.gap)
         one, two = contact.first, contact.second
         (ours, x), (theirs, y) = (_placed(shape, met.shapes[shape.name][1], poses[shape.body]) for shape in (one, two))
         mine, other = surface(rng, one) @ ours.T + x, surface(rng, two) @ theirs.T + y
@@ -120,7 +123,7 @@ def test_forces_are_drawn_where_an_engine_finds_the_contact(types: tuple[str, st
         placed = [(shape, (p[None], R[None])) for shape, (R, p) in zip(pair, turned_at, strict=True)]
         for k, touch in enumerate(met.touches(poses.__getitem__)):
             gap = touch.gap + contact.pair.margin
-            if contact.first.type == "sphere" and gap < -contact.first.size[0]:
+            if (contact.first.type == "sphere" and gap < -contact.first.size[0]) or not touch.normal.any():
                 continue
             at, normal = meeting(placed[0], placed[1], k)
             assert normal[0] == pytest.approx(touch.normal, abs=1e-9)
