@@ -217,9 +217,10 @@ class Arc:
 
         end, found, at = self.t1, [], 0
         precision = max(64.0 * ULP, SHARE * self.options.rtol)
+        above = roots.stay_above(terms, self.t0, self.t1)
         for guard, open_ in zip(self.guards, self.scene.work["undecided"].tolist(), strict=False):
             mine, at = slice(at, at + len(guard.terms)), at + len(guard.terms)
-            if not open_:
+            if not open_ or above[mine].any():
                 continue
 
             def its_own(t: float, mine: slice = mine) -> Floats:

@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from crossbody.reference._kinds import Floats
@@ -36,6 +37,12 @@ LARGEST = 1e290
 """Of a term: sums of it are finite."""
 
 
+def stay_above(terms: Terms, a: float, b: float) -> NDArray[np.bool_]:
+    """Return which of the terms (k,) have series on [a, b] that stay above zero; all guards are screened at once."""
+    series, tail = _series(terms, a, b, COARSE)[1:]
+    return _least(series) > CAUTION * tail
+
+
 def first(
     terms: Terms, a: float, b: float, relative: float, absolute: Floats, armed: bool = True, halvings: int = HALVINGS
 ) -> float | None:
@@ -52,12 +59,8 @@ def first(
     """
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     for degree in (COARSE, FINE):
-        times = [a, *(middle + half * PLACES[degree][1:-1]).tolist(), b]
-        values = np.clip([terms(t) for t in times], -LARGEST, LARGEST)  # infinite where nothing fires
-        series = SERIES[degree] @ values
-        tail = np.abs(series[-TAIL:]).sum(axis=0)
-        least = series[0] - np.abs(series[1:]).sum(axis=0)
-        if (least > CAUTION * tail).any():
+        (times, values), series, tail = _series(terms, a, b, degree)
+        if (_least(series) > CAUTION * tail).any():
             return None
         if (tail <= relative * np.abs(values).max(axis=0) + absolute).all():
             return _inspect(terms, [a, b, *_turns(series, middle, half)], armed)
@@ -65,6 +68,21 @@ def first(
         return _inspect(terms, [*times, *_turns(series, middle, half)], armed)
     found = first(terms, a, middle, relative, absolute, armed, halvings - 1)
     return first(terms, middle, b, relative, absolute, armed, halvings - 1) if found is None else found
+
+
+def _series(terms: Terms, a: float, b: float, degree: int) -> tuple[tuple[list[float], Floats], Floats, Floats]:
+    """Return instants with the terms there (degree + 1, k), their series, and what it leaves out (k,)."""
+    middle, half = 0.5 * (a + b), 0.5 * (b - a)
+    times = [a, *(middle + half * PLACES[degree][1:-1]).tolist(), b]
+    values = np.clip([terms(t) for t in times], -LARGEST, LARGEST)  # infinite where nothing fires
+    series = SERIES[degree] @ values
+    return (times, values), series, np.abs(series[-TAIL:]).sum(axis=0)
+
+
+def _least(series: Floats) -> Floats:
+    """Return a lower bound (k,) of what the series take."""
+    bound: Floats = series[0] - np.abs(series[1:]).sum(axis=0)
+    return bound
 
 
 def _turns(series: Floats, middle: float, half: float) -> list[float]:
