@@ -6,19 +6,18 @@ are sought in each shape's own axes, and nothing here knows a second derivative.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases._rotations import matrices
 from crossbody.cases.scene import Scene, Shape
 from crossbody.cases.scene_contacts import Contact, contacts
 
-NOWHERE = np.zeros(3)
 FAR = 1.0
 """m: the gap of a row that is none as its shapes lie."""
 TURN = 1e-3
@@ -64,7 +63,7 @@ class Contacts:
         shapes = {shape.name: shape for contact in self.all for shape in (contact.first, contact.second)}
         self.shapes = {name: (shape, matrices(np.array(shape.orientation))) for name, shape in shapes.items()}
         self.turning = [k for k, contact in enumerate(self.all) if contact.parallel > 0.0]
-        self.capsules = {k for k in self.turning if self.all[k].first.type == "capsule"}
+        self.kinds = [(contact.first.type, contact.second.type) for contact in self.all]
 
     @property
     def count(self) -> int:
@@ -81,16 +80,19 @@ class Contacts:
             poses: of the bodies.
             rows: which; all if not given.
             along: of contacts in `turning`, whether the capsules lie along each other; as they do, if not given.
-            clear: of shapes that are further apart, m, no normal is sought; of other shapes than capsules the distance
-                of their bounding spheres stands for every gap then.
+            clear: of shapes that are further apart, m, no normal is given.
         """
         wanted = self.rows if rows is None else [self.rows[i] for i in rows]
         placed: dict[str, Pose] = {}
         at = {k: self._poses(self.all[k], poses, placed) for k in dict.fromkeys(k for k, _ in wanted)}
         lie = along or {}
-        together = [k for k in at if k in self.capsules]
-        found = dict(zip(together, self._all_capsules(together, at, lie, clear), strict=True))
-        found |= {k: self._touches(self.all[k], at[k], lie.get(k), clear) for k in at if k not in self.capsules}
+        found: dict[int, list[Touch]] = {}
+        for kind in dict.fromkeys(self.kinds[k] for k in at):
+            together = [k for k in at if self.kinds[k] == kind]
+            if kind[0] == "plane":
+                found |= {k: self._on_plane(self.all[k], *at[k], lie.get(k)) for k in together}
+            else:
+                found |= zip(together, self._between(together, at, lie, clear), strict=True)
         return [found[k][place] for k, place in wanted]
 
     def lying(self, poses: Poses, rows: Sequence[int]) -> tuple[dict[int, bool], float]:
@@ -119,45 +121,30 @@ class Contacts:
                 placed[shape.name] = _placed(shape, self.shapes[shape.name][1], poses(shape.body))
         return placed[contact.first.name], placed[contact.second.name]
 
-    def _touches(self, contact: Contact, at: tuple[Pose, Pose], along: bool | None, clear: float) -> list[Touch]:
-        first, second, (one, two) = contact.first, contact.second, at
-        if clear < np.inf and first.type != "plane":
-            free = math.dist(one[1], two[1]) - _bound(first) - _bound(second) - contact.pair.margin
-            if free > clear:
-                return [Touch(free, NOWHERE, two[1], first.body, second.body)] * contact.places
-        if first.type == "plane":
-            side_by_side = _along(contact, one, two) if along is None and contact.parallel > 0.0 else bool(along)
-            found = _over(one, second, two, side_by_side)
-        else:
-            found = [_between(first, one, second, two)]
-        return [Touch(gap - contact.pair.margin, n, point, first.body, second.body) for gap, n, point in found]
+    def _on_plane(self, contact: Contact, floor: Pose, at: Pose, along: bool | None) -> list[Touch]:
+        first, second = contact.first, contact.second
+        stands = _along(contact, floor, at) if along is None and contact.parallel > 0.0 else bool(along)
+        return [
+            Touch(gap - contact.pair.margin, n, point, first.body, second.body)
+            for gap, n, point in _over(floor, second, at, stands)
+        ]
 
-    def _all_capsules(
+    def _between(
         self, which: Sequence[int], at: Mapping[int, tuple[Pose, Pose]], along: Mapping[int, bool], clear: float
-    ) -> list[list[Touch]]:
-        """Return the two touches of every pair of capsules, of all pairs at once: most of a robot's shapes are some."""
-        if not which:
-            return []
+    ) -> Iterator[list[Touch]]:
+        """Yield the touches of pairs of one kind, all computed at once: a robot has hundreds."""
         pairs = [self.all[k] for k in which]
         one, two = (
             (np.array([at[k][side][0] for k in which]), np.array([at[k][side][1] for k in which])) for side in (0, 1)
         )
-        gaps, normals, points = _capsules(pairs, one, two, [along.get(k) for k in which])
+        if pairs[0].first.type == "capsule":
+            gaps, normals, points = _capsules(pairs, one, two, [along.get(k) for k in which])
+        else:
+            gaps, normals, points = _spheres(pairs, one, two)
         normals[gaps > clear] = 0.0
-        return [
-            [
-                Touch(float(gap) - pair.pair.margin, n, point, pair.first.body, pair.second.body)
-                for gap, n, point in zip(*places, strict=True)
-            ]
-            for pair, *places in zip(pairs, gaps, normals, points, strict=True)
-        ]
-
-
-def _bound(shape: Shape) -> float:
-    """Return the radius of a sphere about a shape's centre that holds it."""
-    a, b, c = shape.size
-    outer = {"sphere": a, "capsule": a + b, "cylinder": math.hypot(a, b)}
-    return outer.get(shape.type, math.sqrt(a * a + b * b + c * c))
+        for pair, *places in zip(pairs, gaps.tolist(), normals, points, strict=True):
+            margin, bodies = pair.pair.margin, (pair.first.body, pair.second.body)
+            yield [Touch(gap - margin, n, point, *bodies) for gap, n, point in zip(*places, strict=True)]
 
 
 def _placed(shape: Shape, turned: Floats, pose: Pose) -> Pose:
@@ -206,43 +193,53 @@ def _tilt(floor: Pose, at: Pose) -> float:
     return float(np.linalg.norm((at[0].T @ floor[0][:, 2])[:2]))
 
 
-def _between(one: Shape, at: Pose, two: Shape, by: Pose) -> tuple[float, Floats, Floats]:
-    """Gap, normal and point of the second shape: between a sphere and another shape."""
-    start, core = at[1], by[1]
-    if two.type == "capsule":
-        core = by[1] + np.clip(by[0][:, 2] @ (start - by[1]), -two.size[1], two.size[1]) * by[0][:, 2]
-    if two.type in ("sphere", "capsule"):
-        distance, n = _apart(core - start)
-        return distance - one.size[0] - two.size[0], n, core - two.size[0] * n
-    x = by[0].T @ (start - by[1])
-    surface, inside = _nearest_on(two, x)
-    depth, out = _apart(x - surface)
-    n = -by[0] @ (-out if inside else out)
-    return (-depth if inside else depth) - one.size[0], n, by[0] @ surface + by[1]
+def _spheres(pairs: Sequence[Contact], at: Pose, by: Pose) -> tuple[Floats, Floats, Floats]:
+    """Return gaps (n, 1), normals and points of the second (n, 1, 3) of spheres beside n shapes of one type.
+
+    Args:
+        pairs: n pairs.
+        at: poses of the spheres, (n, 3, 3) and (n, 3).
+        by: those of the others.
+    """
+    radius, kind = np.array([pair.first.size[0] for pair in pairs]), pairs[0].second.type
+    size = np.array([pair.second.size for pair in pairs])
+    x, inside = np.einsum("nji,nj->ni", by[0], at[1] - by[1]), np.zeros(len(pairs), dtype=bool)
+    nearest = np.zeros_like(x)
+    if kind == "capsule":
+        nearest[:, 2] = np.clip(x[:, 2], -size[:, 1], size[:, 1])
+    elif kind != "sphere":
+        nearest, inside = _on_box(size, x) if kind == "box" else _on_cylinder(size, x)
+    core = size[:, 0] if kind in ("sphere", "capsule") else np.zeros(len(pairs))
+    way = np.where(inside[:, None], x - nearest, nearest - x)
+    distance = np.sqrt(_dot(way, way))
+    with np.errstate(invalid="ignore"):  # a centre on a surface or an axis has no normal
+        n = way / distance[:, None]
+    gaps = np.where(inside, -distance, distance) - radius - core
+    normals, points = (np.einsum("nij,nj->ni", by[0], own) for own in (n, nearest - core[:, None] * n))
+    return gaps[:, None], normals[:, None], (points + by[1])[:, None]
 
 
-def _apart(d: Floats) -> tuple[float, Floats]:
-    length = float(np.linalg.norm(d))
-    return length, d / length
+def _on_box(half: Floats, x: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the nearest points (n, 3) of boxes' surfaces in their axes, and whether x is inside."""
+    held = np.clip(x, -half, half)
+    inside = (held == x).all(axis=1)
+    rows, side = np.flatnonzero(inside), np.argmin(half - np.abs(x), axis=1)[inside]
+    held[rows, side] = np.copysign(half, x)[rows, side]
+    return held, inside
 
 
-def _nearest_on(shape: Shape, x: Floats) -> tuple[Floats, bool]:
-    """Return the nearest point of the surface of a box or cylinder in its axes, and whether x is inside."""
-    half = np.array(shape.size)
-    if shape.type == "box":
-        held = np.clip(x, -half, half)
-        if np.any(held != x):
-            return held, False
-        side = int(np.argmin(half - np.abs(x)))
-        held[side] = np.copysign(half[side], x[side])
-        return held, True
-    radius, rho = half[0], float(np.hypot(x[0], x[1]))
-    held = np.array([*(x[:2] * min(1.0, radius / rho if rho > 0.0 else 1.0)), np.clip(x[2], -half[1], half[1])])
-    if np.any(held != x):
-        return held, False
-    if radius - rho < half[1] - abs(x[2]):
-        return np.array([*(x[:2] * radius / rho), x[2]]), True
-    return np.array([*x[:2], np.copysign(half[1], x[2])]), True
+def _on_cylinder(size: Floats, x: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the nearest points (n, 3) of cylinders' surfaces in their axes, and whether x is inside."""
+    radius, half, rho = size[:, 0], size[:, 1], np.hypot(x[:, 0], x[:, 1])
+    with np.errstate(divide="ignore"):
+        out = radius / rho
+    held = np.column_stack([x[:, :2] * np.minimum(1.0, out)[:, None], np.clip(x[:, 2], -half, half)])
+    inside = (held == x).all(axis=1)
+    side = inside & (radius - rho < half - np.abs(x[:, 2]))
+    held[side, :2] *= out[side, None]
+    cap = inside & ~side
+    held[cap, 2] = np.copysign(half, x[:, 2])[cap]
+    return held, inside
 
 
 def _capsules(
