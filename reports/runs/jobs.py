@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -232,7 +233,9 @@ def _ran(
     shown = prepared.audit()
     hidden = {**engines.hidden(engines.load(pick.engine), prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
+    began = process_time()
     natural: Trajectory = prepared.run()
+    took = process_time() - began  # with what is observed, which may cost more than the steps
     run = _dense(case, pick, prepared, natural, asked)
     return Entry(
         engine=pick.engine,
@@ -242,7 +245,7 @@ def _ran(
         run=run,
         stepped=natural.t,
         audit=rows,
-        study=_study(case, pick, prepared, natural, run) if refine and natural.outcome.ok else None,
+        study=_study(case, pick, prepared, natural, run, took) if refine and natural.outcome.ok else None,
         hidden=hidden,
         own=law_of(followed) if refine and (followed := getattr(prepared, "follows", None)) is not None else None,
     )
@@ -269,7 +272,9 @@ def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Ma
     return replace(with_both_sides(dense, natural), **told)  # type: ignore[arg-type]
 
 
-def _study(case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: Trajectory) -> Study:
+def _study(
+    case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: Trajectory, took: float
+) -> Study:  # fmt: skip
     """The other runs of an engine that tell the parts of its error; those of its model where its equations are known.
 
     Where it reads the file by itself they are of the model that is built from the scene.
@@ -297,7 +302,7 @@ def _study(case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: T
         return Study(why="It has neither a step nor a tolerance that could be refined.", **told)
     setting = next(iter(size))
     for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
-        cost = _cost(setting, sizes, size[setting], natural.wall_s)
+        cost = _cost(setting, sizes, size[setting], took)
         if case.scene is not None and cost > STUDIES_S:
             return Study(why=f"Runs with other {setting} that tell it would take about {cost:.0f} s.", **told)
         known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
