@@ -57,7 +57,8 @@ def test_a_gap_changes_along_its_normal_and_by_no_turn_about_its_point(types: tu
         met, poses = drawn(rng, types)
         for k, touch in enumerate(met.touches(poses.__getitem__)):
             if not touch.normal.any():  # capsules that cross have one row, and one that is none
-                assert types == ("capsule", "capsule") and k == 1
+                assert types == ("capsule", "capsule")
+                assert k == 1
                 continue
             assert abs(np.linalg.norm(touch.normal) - 1.0) < 1e-12
             for body, sign in ((touch.first, -1.0), (touch.second, 1.0)):
