@@ -14,7 +14,7 @@ from crossbody.engines._contacts import Contacts, Pose, Poses, Touch, drift, gra
 from crossbody.engines.pinocchio._rows import point_jacobian
 
 CLEAR = 0.02
-"""m: shapes whose bounding spheres are further apart are not looked at closely while a motion is computed."""
+"""m: H of shapes that are further apart is left zero while a motion is computed, which does not ask for it."""
 
 
 class ContactRows:
@@ -22,6 +22,7 @@ class ContactRows:
 
     Attributes:
         count: number of rows.
+        clear: of shapes further apart, m, rows of H are left zero.
     """
 
     def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
@@ -29,17 +30,18 @@ class ContactRows:
         self.count = self.contacts.count
         self.model, self.data, self.placed = model, model.createData(), placed
         self._moved = model.createData()
+        self.clear = CLEAR
         self._at: Floats = np.full(model.nq, np.nan)
         self._found: list[Touch] = []
         self._H: Floats | None = None
 
     def heights(self, q: Floats) -> Floats:
-        """Return h (n,), of what is far apart no more than that it is."""
+        """Return h (n,)."""
         return np.array([touch.gap for touch in self._touches(q)])
 
-    def gaps(self, q: Floats) -> Floats:
-        """Return h (n,)."""
-        return np.array([touch.gap for touch in self.contacts.touches(self._now(q))])
+    def forget(self) -> None:
+        """Compute anew at the next call, wherever it is."""
+        self._at = np.full(self.model.nq, np.nan)
 
     def jacobian(self, q: Floats) -> Floats:
         """Return H (n, nv)."""
@@ -75,7 +77,7 @@ class ContactRows:
     def _touches(self, q: Floats) -> list[Touch]:
         """Return the contacts at q; those of the last one are kept, for a step asks several times."""
         if not np.array_equal(q, self._at):
-            self._found = self.contacts.touches(self._now(q), clear=CLEAR)
+            self._found = self.contacts.touches(self._now(q), clear=self.clear)
             self._at, self._H = q.copy(), None
         return self._found
 

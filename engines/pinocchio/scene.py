@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
-from crossbody.engines.pinocchio._contacts import ContactRows
+from crossbody.engines.pinocchio._contacts import CLEAR, ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
@@ -24,6 +25,8 @@ SMALL = 1e-4
 """Size of coordinates and rates, SI, below which they are known to the absolute tolerance alone:
 a pendulum that is let go upright moves by less for a while, and by all of it later."""
 Heights = Callable[[Floats], Floats]
+Whole = Callable[[], AbstractContextManager[None]]
+"""Within it H has all its rows, those of shapes far apart too."""
 Placed = dict[str, tuple[int, Any]]
 """Body -> joint that carries it, and its pose in that joint's frame."""
 
@@ -60,18 +63,12 @@ def build(case: Case, algebra: str) -> Prepared:
     ]  # fmt: skip
     touching, order = ContactRows(scene, model, placed), _order(scene)
 
-    def others(q: Floats) -> Floats:
-        own: Floats = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
-        return own[order]
-
-    @last_asked
+    @LastAsked
     def heights(q: Floats) -> Floats:
-        return np.concatenate([others(q), touching.heights(q)])
+        own = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
+        return np.concatenate([own[order], touching.heights(q)])
 
-    def seen(q: Floats) -> Floats:
-        return np.concatenate([others(q), touching.gaps(q)])
-
-    @last_asked
+    @LastAsked
     def jacobian(q: Floats) -> Floats:
         own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
         return np.concatenate([own[order], touching.jacobian(q)])
@@ -86,6 +83,19 @@ def build(case: Case, algebra: str) -> Prepared:
         total[~before] = touching.drift(q, v, list(wanted[~before] - len(order)))
         return total
 
+    @contextmanager
+    def whole() -> Iterator[None]:
+        def look(clear: float) -> None:
+            touching.clear = clear
+            touching.forget()
+            jacobian.forget()
+
+        look(np.inf)
+        try:
+            yield
+        finally:
+            look(CLEAR)
+
     pinned = PinRows(
         model, jacobian, heights, lambda q, v: drift_of(q, v, slice(None)), law=case.law, algebra=algebra, forces=apply,
         drift_of=drift_of,
@@ -99,10 +109,10 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, placed, forces, seen, to),
+        rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
         sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
-        world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
+        world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to, whole),
         coordinates=to if to.turns else None,
     )  # fmt: skip
 
@@ -117,20 +127,24 @@ def _may_depend(scene: Scene, touching: int) -> bool:
     return bool(scene.loops) or touching > 1 or (bool(bounds) and (touching > 0 or tendons))
 
 
-def last_asked(function: Heights) -> Heights:
-    """Keep the last answer, which may only be read: a step asks several times at one place."""
-    at: Floats = np.zeros(0)
-    found: Floats = np.zeros(0)
+class LastAsked:
+    """The last answer of a function of q, which may only be read: a step asks several times at one place."""
 
-    def kept(q: Floats) -> Floats:
-        nonlocal at, found
-        if not np.array_equal(q, at):
-            found = function(q)
-            found.flags.writeable = False
-            at = np.array(q)
-        return found
+    def __init__(self, function: Heights) -> None:
+        self.function = function
+        self.forget()
 
-    return kept
+    def forget(self) -> None:
+        """Compute anew at the next call, wherever it is."""
+        self.at: Floats = np.zeros(0)
+
+    def __call__(self, q: Floats) -> Floats:
+        """Return the answer."""
+        if not np.array_equal(q, self.at):
+            self.found = self.function(q)
+            self.found.flags.writeable = False
+            self.at = np.array(q)
+        return self.found
 
 
 def spans(scene: Scene, model: Any, placed: Placed, to: Coordinates) -> Callable[[Floats, Floats], parts.Stretch]:
@@ -257,7 +271,9 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
     )  # fmt: skip
 
 
-def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates) -> dict[str, Any]:
+def _audit(
+    scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates, whole: Whole
+) -> dict[str, Any]:  # fmt: skip
     """What differs from the rows' own audit: masses body by body, forces at zero input, and the scene's coordinates."""
     model, data = rows.model, rows.data
     on = rows_on(rows)
@@ -279,13 +295,19 @@ def _audit(scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to:
     def lam(q: Floats, v: Floats) -> Floats:
         forces.still()
         r = to.theirs(q)
-        return rows.accelerate(r, to.back(r, v), on)[1]
+        with whole():
+            return rows.accelerate(r, to.back(r, v), on)[1]
+
+    def H(q: Floats) -> Floats:
+        r = to.theirs(q)
+        with whole():
+            return to.velocities(r, rows.jacobian(r))
 
     return {
         "masses": np.array([body.mass for body in scene.bodies]),
         "M": M,
         "bias": bias,
-        "H": lambda q: to.velocities(to.theirs(q), rows.jacobian(to.theirs(q))),
+        "H": H,
         "lam": lam,
     }
 
