@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from resting import LAW, quaternion
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome, Trajectory
-from crossbody.cases._rotations import differences
+from crossbody.cases._rotations import differences, matrices
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import SAG
 
@@ -51,6 +52,23 @@ def run(case: Case, profile: str = "compiled", engine: str = "reference", **sett
 def apart(case: Case, one: Trajectory, other: Trajectory) -> float:
     """Return by how much two motions of a case differ at their ends."""
     return float(differences(one.q[-1:], other.q[-1:], case.quaternions).max())
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_axes_that_meet_outside_have_the_gap_of_their_segments(seed: int) -> None:
+    """In one plane but at an angle: they cross nowhere, and a foot may lie beyond the other segment's end."""
+    draw, s = np.random.default_rng(seed), np.linspace(-1.0, 1.0, 401)
+    case = rods((0.0, draw.uniform(-1.3, 1.3), 0.0), height=0.5, half=draw.uniform(0.05, 0.3), t_end=1e-4)
+    case = replace(case, q0=[draw.uniform(-0.5, 0.5), *case.q0[1:]])
+    seen = [run(case), run(case, "law", "pinocchio")]
+    assert case.scene is not None
+    turned = matrices(np.array(case.q0[3:])) @ [1.0, 0.0, 0.0]
+    low = HALF * s[:, None] * [1.0, 0.0, 0.0]
+    top = np.array(case.q0[:3]) + case.scene.shapes[1].size[1] * s[:, None] * turned
+    distance = np.linalg.norm(low[:, None] - top, axis=2).min() - 2.0 * RADIUS
+    for found in seen:
+        assert 0.0 <= distance - found.gap[0].min() + 1e-9 < 1e-4
+    assert seen[0].gap[0] == pytest.approx(seen[1].gap[0], abs=1e-12)
 
 
 def test_a_capsule_rests_on_another_at_both_ends() -> None:
