@@ -34,7 +34,7 @@ from crossbody.reference.pairs.jets import (
 PARALLEL = 1e-24
 """Square of the sine below which the nearest points of two lines are lost in rounding: those of segments that do not
 lie side by side are ends, whichever way that rounds."""
-ABREAST = 1e-12  # part by which squared distances differ that are no more than abreast
+ABREAST = 1e-5  # part of the length that ends are in which are no more than abreast: the motion chooses, not the gap
 INSTANT = 1e-12
 """s, by which ways that are equal now are told apart."""
 Distance = Any
@@ -182,15 +182,15 @@ def ends(M: Vector, A: Vector, one: float, N: Vector, B: Vector, two: float, sig
     by, beyond = other * _ahead(dot(B, D)), -sign * _ahead(dot(A, D))  # how far E, and F, is in
     if max(by, beyond) < 0.0:
         return E, F
-    ours, theirs = (
-        along(N, _held(dot(B, apart(E, N)), -two, two), B),
-        along(M, _held(dot(A, apart(F, M)), -one, one), A),
-    )
-    if min(by, beyond) >= 0.0:  # as axes of one plane lie that meet outside
+    t, r = dot(B, apart(E, N)), dot(A, apart(F, M))
+    if other * t[0].real < -two.real:  # in one plane axes may lie so that a foot is beyond the far end
+        t = shifted(scaled(0.0, t), -other * two)
+    if sign * r[0].real < -one.real:
+        r = shifted(scaled(0.0, r), -sign * one)
+    ours, theirs = along(N, t, B), along(M, r, A)
+    if min(by, beyond) > ABREAST * min(one.real, two.real):
         here, there = apart(ours, E), apart(theirs, F)
-        near, far = dot(here, here)[0].real, dot(there, there)[0].real
-        if abs(near - far) > ABREAST * (near + far):
-            by, beyond = far, near
+        by, beyond = dot(there, there)[0].real, dot(here, here)[0].real
     if by >= beyond:
         return E, ours
     return theirs, F
