@@ -313,7 +313,8 @@ def test_an_interrupt_while_the_command_is_imported_is_one_sentence(after: float
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=20)
     assert process.returncode == 130
-    assert re.fullmatch(r"crossbody: interrupted\..*\n", said)
+    # Python itself may say that it ignored an interrupt in a callback of its import lock.
+    assert re.search(r"^crossbody: interrupted\..*\n\Z", said, re.MULTILINE)
 
 
 def test_a_child_that_has_ended_already_is_not_told_to(monkeypatch: pytest.MonkeyPatch) -> None:
