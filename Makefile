@@ -26,7 +26,7 @@ bench: $(READY)
 
 peers: $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[peers]'
-	$(BIN)/pytest tests/test_peers.py tests/test_bench.py tests/test_engine_contract.py -m "not bench"
+	$(BIN)/pytest tests/test_peers.py tests/test_drake_scenes.py tests/test_bench.py tests/test_engine_contract.py -m "not bench"
 
 JOBS ?= 1
 faults: $(READY)

@@ -10,12 +10,26 @@ _TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from e
 _FASTER = "of the tolerance, times the ratio of the fastest rate to the motion's"
 _IDENTITY = "an identity at every sample: rounding"
 _COUNT = "a count"
+_ON_THE_GRID = "impacts on the grid of the steps: the way of one of them"
+_LOCATED = "located events: rounding, and the tolerance of a root by its rate"
+_LOCATING = (
+    ("reference", "*"), ("mujoco", "matched"), ("pinocchio", "law"), ("pinocchio", "impulse"),
+    ("pinocchio", "impulse_simultaneous"), ("exudyn", "*"),
+)  # fmt: skip
+"""Engines and profiles whose events are located between their steps."""
 _SAMPLED = "the trapezoidal rule between a run's own samples; an impact inside a step costs half its way"
 
 
 def default_limits(case: Case) -> tuple[Limit, ...]:
     """Limits on position, velocity, force, energy, events and drift, as far as the case's rows have such numbers."""
-    return tuple(Limit(metric=metric, value=value, why=why) for metric, value, why in _defaults(case))
+    everyone = tuple(Limit(metric=metric, value=value, why=why) for metric, value, why in _defaults(case))
+    if not case.law.unilateral.any():
+        return everyone
+    located = (
+        Limit(metric="event_gap", value=1e-6, engine=engine, profile=profile, why=_LOCATED)
+        for engine, profile in _LOCATING
+    )
+    return (*everyone, *located)
 
 
 def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
@@ -35,6 +49,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     yield "contact_work", 1e-6, _TOLERANCE
     if case.law.unilateral.any():
         yield "gap_error", 1e-6, _TOLERANCE
+        yield "event_gap", 1.0, _ON_THE_GRID
         yield "complementarity", 1e-6, "contacts push only, to the precision of the released instant"
         yield "event_times", 1e-6, _TOLERANCE
         yield "mode_times", 1e-6, _TOLERANCE

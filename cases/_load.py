@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -11,12 +12,13 @@ import numpy as np
 
 from crossbody import cases
 from crossbody.cases import _registry
-from crossbody.cases._arguments import path
+from crossbody.cases._arguments import path, shown
 from crossbody.cases._case import Case, Parameter, Value
 from crossbody.cases._errors import CrossbodyError, SceneError, UnknownName
 from crossbody.cases._own_file import from_file
-from crossbody.cases.files.case import open_file
+from crossbody.cases.files.case import UNNAMED, case_of, open_file
 from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
+from crossbody.cases.scene import Scene
 
 
 def module(name: str) -> Any:
@@ -56,9 +58,30 @@ def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Cas
     numbers = resolve(label, source.PARAMETERS, source.VARIANTS[chosen], overrides)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            case: Case = source.build(chosen, numbers)
+            made = source.build(chosen, numbers)
+            return named(made, label, numbers)
     except CrossbodyError:
         raise
     except (ArithmeticError, ValueError) as error:  # a root of what is below 0, a number beyond double precision
         raise SceneError(f"{label}: no scene has these parameters ({error}).") from error
-    return case
+
+
+def named(made: object, label: str, numbers: Mapping[str, Value]) -> Case:
+    """Return what a file's `build` has made as a case: a scene starts at rest in its reference pose.
+
+    Args:
+        made: a case, or a scene.
+        label: CASE:VARIANT, the name of a case that has none.
+        numbers: the parameters; t_end is a scene's horizon, s.
+
+    Raises:
+        SceneError: for anything else.
+    """
+    if isinstance(made, Scene):
+        made = case_of(made, t_end=float(numbers.get("t_end", 1.0)))
+    if not isinstance(made, Case):
+        raise SceneError(f"{label}: build returns {shown(made)}; valid: a Case or a Scene.")
+    if made.scene is not None and made.name == UNNAMED:
+        name, _, variant = label.partition(":")
+        return replace(made, name=name, variant=variant, parameters=numbers)
+    return made

@@ -58,12 +58,14 @@ class Switch:
         t: instant, s.
         variable: index in `Case.discrete`.
         before, after: its values.
+        smooth: nothing jumps there, but the derivative of a force.
     """
 
     t: float
     variable: int
     before: int
     after: int
+    smooth: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

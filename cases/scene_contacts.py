@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crossbody.cases.scene import Pair, Scene, Shape
+from crossbody.cases._arrays import Floats
+from crossbody.cases._rotations import matrices
+from crossbody.cases.scene import Joint, Pair, Scene, Shape
 
 PLACES = {
     ("plane", "sphere"): 1, ("plane", "capsule"): 2, ("plane", "cylinder"): 4, ("plane", "box"): 8,
@@ -17,6 +19,8 @@ PLACES = {
 """Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box, lowest and highest
 points of a cylinder's caps, or where it stands four points of its rim;
 of two capsules one, or where they end if they lie along each other."""
+LEVELLED = 1e-14
+"""Sine of the angle between an axis and a plane below which it lies in it: rounding."""
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6
 """Largest sine at which capsules lie along each other; and of the sum of two capsules' radii, by how much their gap may
 be too large that is taken where they end. Last, the largest tilt with which a cylinder stands."""
@@ -63,8 +67,54 @@ def parallel(first: Shape, second: Shape) -> float:
 
 
 def contacts(scene: Scene) -> tuple[Contact, ...]:
-    """Return the pairs that have rows: without friction, of shapes whose gap is known in closed form."""
+    """Return the pairs that have rows: without friction, of shapes whose gap is known in closed form, and that move."""
     return tuple(found for found in _all(scene) if isinstance(found, Contact))
+
+
+def inert(scene: Scene) -> tuple[Pair, ...]:
+    """Return the pairs of a plane and a shape whose gap no joint changes: a puck on slides along a table.
+
+    A row of theirs would push without moving anything, and nothing would say how much.
+    """
+    shapes, axes = {shape.name: shape for shape in scene.shapes}, _Axes(scene)
+    return tuple(pair for pair in scene.pairs if axes.hold(shapes[pair.first], shapes[pair.second]))
+
+
+class _Axes:
+    """Axes of a scene's joints in the world, at its reference pose."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.turned, self.parents = {"": np.eye(3)}, {body.name: body.parent for body in scene.bodies}
+        for body in scene.bodies:
+            self.turned[body.name] = self.turned[body.parent] @ matrices(np.asarray(body.orientation))
+        self.joints: dict[str, list[Joint]] = {}
+        for joint in scene.joints:
+            self.joints.setdefault(joint.body, []).append(joint)
+
+    def hold(self, one: Shape, two: Shape) -> bool:
+        """Return whether one shape is a plane over which no joint lifts or tilts the other."""
+        plane, other = (one, two) if one.type == "plane" else (two, one)
+        if plane.type != "plane" or other.type == "plane":
+            return False
+        normal = self.turned[plane.body] @ matrices(np.asarray(plane.orientation))[:, 2]
+        between = set(self._above(plane.body)).symmetric_difference(self._above(other.body))
+        joints = [joint for body in between for joint in self.joints.get(body, ())]
+        return bool(joints) and all(self._keeps(joint, normal) for joint in joints)
+
+    def _above(self, body: str) -> list[str]:
+        """Return a body and those above it, without the world."""
+        found = []
+        while body:
+            found.append(body)
+            body = self.parents[body]
+        return found
+
+    def _keeps(self, joint: Joint, normal: Floats) -> bool:
+        """Return whether a joint moves along a plane, or turns about its normal."""
+        axis = self.turned[joint.body] @ joint.axis
+        if joint.type == "slide":
+            return bool(abs(axis @ normal) <= LEVELLED)
+        return joint.type == "hinge" and bool(np.linalg.norm(axis - (axis @ normal) * normal) <= LEVELLED)
 
 
 def watched(scene: Scene) -> tuple[Pair, ...]:
@@ -73,8 +123,10 @@ def watched(scene: Scene) -> tuple[Pair, ...]:
 
 
 def _all(scene: Scene) -> Iterator[Contact | Pair]:
-    shapes = {shape.name: shape for shape in scene.shapes}
+    shapes, axes = {shape.name: shape for shape in scene.shapes}, _Axes(scene)
     for pair in scene.pairs:
+        if axes.hold(shapes[pair.first], shapes[pair.second]):
+            continue
         one, two = shapes[pair.first], shapes[pair.second]
         if (one.type, two.type) not in PLACES:
             one, two = two, one

@@ -45,7 +45,11 @@ class Run(Protocol):
     settings: Mapping[str, Any]
 
     def run(self) -> Trajectory:
-        """Integrate from the start; the same result every time. Numerical failure is an Outcome."""
+        """Integrate from the start; the same result every time. Numerical failure is an Outcome.
+
+        Raises:
+            CaseUnsupported: where the motion shows that this engine cannot do the case.
+        """
         ...
 
     def audit(self) -> Mapping[str, Any]:

@@ -57,24 +57,35 @@ class LevelMachine:
         self.slow = 0.0
         self._closed: set[int] = set()
         self._unmoved: set[int] = set()
+        self._order: dict[Modes, tuple[NDArray[np.intp], list[int]]] = {}
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
         """FREE: h and h' (whose zero is where a dip is deepest); active: lam; BALLISTIC: -h, and the catch."""
         rows = self.rows
         h, hd = rows.gaps(q, v)
-        vd, lam = rows.accelerate(q, v, modes) if any(modes) else (None, None)
+        free, others = self._sorted(modes)
+        vd, lam = rows.accelerate(q, v, modes) if others and any(modes) else (None, None)
         out[:] = 1.0
-        for i in self.own:
+        out[WATCHED * free + GAP] = h[free]
+        out[WATCHED * free + PUSH] = np.maximum(hd[free], h[free] - rows.near[free])
+        for i in self._closed.intersection(free.tolist()):
+            out[WATCHED * i + GAP] = max(h[i], hd[i] + self.slow)
+        out[WATCHED * np.array([*self._unmoved], dtype=int) + PUSH] = 1.0
+        for i in others:
             mode, at = modes[i], WATCHED * i
-            if mode == FREE:
-                out[at + GAP] = max(h[i], hd[i] + self.slow) if i in self._closed else h[i]
-                out[at + PUSH] = 1.0 if i in self._unmoved else hd[i]
-            elif mode in ACTIVE and lam is not None:
+            if mode in ACTIVE and lam is not None:
                 out[at + PUSH] = lam[i]
                 out[at + SPENT] = self._left(q, v, modes, lam, i) if mode == COLLISION else 1.0
             elif vd is not None:
                 out[at + GAP] = -h[i]
                 out[at + PUSH] = max(hd[i] + self.slow, -rows.pressure(q, v, vd)[0][i])
+
+    def _sorted(self, modes: Modes) -> tuple[NDArray[np.intp], list[int]]:
+        """The rows that a machine decides about: those that are free, and the others; found once for a set of modes."""
+        if modes not in self._order:
+            free = [i for i in self.own if modes[i] == FREE]
+            self._order[modes] = np.array(free, dtype=np.intp), [i for i in self.own if modes[i] != FREE]
+        return self._order[modes]
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = frozenset()) -> Settled:
         """See `crossbody.engines._machines.Machine`."""

@@ -97,17 +97,16 @@ class Line:
         p: Floats = self.masses * change
         return p if self.floor else -np.cumsum(p, axis=-1)[..., :-1]
 
-    def memoryless(self, q: Floats, v: Floats) -> Floats:
-        """max(0, lam) of every row whose gap is closed, lam where it cannot open (..., nc), N."""
+    def memoryless(self, q: Floats, v: Floats, h: Floats | None = None) -> Floats:
+        """max(0, lam) of every row whose gap h, of q if not given, is closed, lam where it cannot open (..., nc), N."""
         lam = self.spring(q, v)
-        closed = np.where(self.gaps(q) <= 0.0, np.maximum(lam, 0.0), 0.0)
+        closed = np.where((self.gaps(q) if h is None else h) <= 0.0, np.maximum(lam, 0.0), 0.0)
         found: Floats = np.where(self.unilateral, closed, lam)
         return found
 
-    def modes(self, q: Floats, v: Floats, lam: Floats) -> Bytes:
+    def modes(self, h: Floats, rates: Floats, lam: Floats) -> Bytes:
         """Free above; below in contact while it pushes, or as it touches (..., nc)."""
-        h = self.gaps(q)
-        below = np.where((lam > 0.0) | ((h == 0.0) & (self.rates(v) < 0.0)), CONTACT, BALLISTIC)
+        below = np.where((lam > 0.0) | ((h == 0.0) & (rates < 0.0)), CONTACT, BALLISTIC)
         found: Bytes = np.where(self.unilateral, np.where(h > 0.0, FREE, below), int(Mode.BILATERAL)).astype(np.int8)
         return found
 

@@ -31,12 +31,14 @@ class Rows(Protocol):
         unilateral: which of them a machine may switch.
         follows: index of the row whose mode this one shares (a slip row follows its normal row); -1 for none.
         fast: which of them have constants of their own in COLLISION.
+        near (nc,): gap, m, from which on nobody looks for the bottom of a dip.
     """
 
     nc: int
     unilateral: Sequence[bool]
     follows: Sequence[int]
     fast: Sequence[bool]
+    near: Floats
 
     def gaps(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Gap, m, and its rate, m/s, of every row (nc,)."""

@@ -22,8 +22,10 @@ from crossbody.engines._line import FREE, MECHANISMS, Line
 
 ROUNDING = 1e-9
 """A multiplier below this part of the largest is zero where a crossing was put in."""
-Crossing = tuple[int, float, Floats, Floats]
-"""Before which sample, when (s), and q and v there."""
+Crossing = tuple[int, float, Floats, Floats, int]
+"""Before which sample, when (s), q and v there, and the row whose gap is zero; -1 where a force turns."""
+OPEN = float(np.finfo(np.float64).tiny)
+"""Gap of a row at the instant at which it comes free, m: no more than a sign."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -74,20 +76,37 @@ def sampled(
         lam: multipliers there (n, nc), N.
         more: wall_s, steps, outcome and message, as in `Trajectory`.
     """
-    at, new = _crossings(line, t, q, v)
+    at, new, rows = _crossings(line, t, q, v)
+    h = line.gaps(q)
     if len(at):
         t, q, v = (np.insert(a, at, b, axis=0) for a, b in zip((t, q, v), new, strict=True))
-        push = line.memoryless(*new[1:])
+        there = _gaps_there(line, new[1], new[2], rows)
+        push = line.memoryless(*new[1:], there)
         lam = np.insert(lam, at, np.where(push > ROUNDING * np.max(np.abs(lam), initial=0.0), push, 0.0), axis=0)
+        h = np.insert(h, at, there, axis=0)
     gap, energy = line.observe(q, v)
-    mode = line.modes(q, v, lam)
+    mode = line.modes(h, line.rates(v), lam)
     return Trajectory(
         t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=events(t, mode), **more
     )  # fmt: skip
 
 
-def _crossings(line: Line, t: Floats, q: Floats, v: Floats) -> tuple[list[int], tuple[Floats, Floats, Floats]]:
-    """Before which samples a gap passes zero, or below it what would push, and t, q, v there, in order."""
+def _gaps_there(line: Line, q: Floats, v: Floats, rows: list[int]) -> Floats:
+    """Gaps (n, nc) at crossings: that of the row that crosses is zero as it touches, and open as it leaves.
+
+    Else the mode changes at the sample behind, and a touch or a release is told a step late.
+    """
+    h, rates = line.gaps(q).copy(), line.rates(v)
+    for i, row in enumerate(rows):
+        if row >= 0:
+            h[i, row] = OPEN if rates[i, row] > 0.0 else 0.0
+    return h
+
+
+def _crossings(
+    line: Line, t: Floats, q: Floats, v: Floats
+) -> tuple[list[int], tuple[Floats, Floats, Floats], list[int]]:
+    """Before which samples a gap passes zero, or below it what would push; t, q, v there, and the rows, in order."""
     h, lam = line.gaps(q), line.spring(q, v)
     found = [_touch(line, t, q, v, i, row) for i, row in np.argwhere(h[1:] * h[:-1] < 0.0)]
     below = (h[1:] < 0.0) & (h[:-1] < 0.0) & (lam[1:] * lam[:-1] < 0.0) & line.unilateral
@@ -95,7 +114,7 @@ def _crossings(line: Line, t: Floats, q: Floats, v: Floats) -> tuple[list[int], 
     kept = sorted((e for e in found if e is not None), key=lambda entry: entry[1])
     n = len(line.masses)
     there = [np.reshape([e[k] for e in kept], (-1, n)) for k in (2, 3)]
-    return [e[0] for e in kept], (np.array([e[1] for e in kept]), there[0], there[1])
+    return [e[0] for e in kept], (np.array([e[1] for e in kept]), there[0], there[1]), [e[4] for e in kept]
 
 
 def _touch(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Crossing | None:
@@ -106,7 +125,7 @@ def _touch(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Cro
     tau = _root(0.5 * hdd, hd, h)
     if not t[i] < t[side] + tau < t[i + 1]:
         return None
-    return i + 1, float(t[side] + tau), q[side] + tau * (v[side] + 0.5 * tau * a), v[side] + tau * a
+    return i + 1, float(t[side] + tau), q[side] + tau * (v[side] + 0.5 * tau * a), v[side] + tau * a, row
 
 
 def _turn(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Crossing | None:
@@ -114,7 +133,7 @@ def _turn(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Cros
     cubic = CubicHermiteSpline(t[i : i + 2], q[i : i + 2], v[i : i + 2])
     rate = cubic.derivative()
     at = float(brentq(lambda s: float(line.spring(cubic(s), rate(s))[row]), t[i], t[i + 1], xtol=1e-300, rtol=1e-15))
-    return (i + 1, at, cubic(at), rate(at)) if t[i] < at < t[i + 1] else None
+    return (i + 1, at, cubic(at), rate(at), -1) if t[i] < at < t[i + 1] else None
 
 
 def _root(a: float, b: float, c: float) -> float:

@@ -36,6 +36,8 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
         return system.gap(q)[0]
 
     def lam(q: Floats, v: Floats) -> Floats:
+        if system.nc > len(v):
+            return np.full(system.nc, np.nan)
         mass, f = system.terms(q, v)
         rows, h, Hdv = system.constraint(q, v)
         a0, a1, a2 = law.T

@@ -19,18 +19,18 @@ from crossbody.cases._rotations import turned
 from crossbody.cases.scene import WIDTHS, Actuator, Joint, Scene, Tendon, Vector
 
 
-def polynomial(constants: Vector, x: Any) -> Any:
+def polynomial(constants: Any, x: Any) -> Any:
     """Return k0 x + k1 x^2 + k2 x^3."""
     k0, k1, k2 = constants
     return k0 * x + k1 * x**2 + k2 * x**3
 
 
-def clamped(x: Any, bounds: Vector) -> Any:
+def clamped(x: Any, bounds: Any) -> Any:
     """Return x within its bounds."""
     return np.clip(x, bounds[0], bounds[1])
 
 
-def drag(constants: Vector, v: Any) -> Any:
+def drag(constants: Any, v: Any) -> Any:
     """Return b0 v + b1 v |v| + b2 v^3."""
     b0, b1, b2 = constants
     return b0 * v + b1 * v * np.abs(v) + b2 * v**3
@@ -85,7 +85,7 @@ Stretch = tuple[Floats, Floats, Floats]
 """Lengths (nt,) of tendons, their rates, and their derivatives (nt, nv) along v."""
 
 
-@dataclass(slots=True)
+@dataclass
 class Forces:
     """Forces of a scene's springs, dampers and actuators.
 
@@ -127,11 +127,40 @@ class Forces:
         self.act = np.zeros(len(scene.actuators))
         self.u, self.pushes = np.zeros(len(scene.actuators)), np.zeros((len(scene.pushes), 3))
         self.T = tendons(scene)
-        self.A = np.zeros((len(scene.actuators), n))
-        for row, actuator in zip(self.A, scene.actuators, strict=True):
+        self.turning = [one for one in scene.joints if one.type in ("free", "ball") and any(one.stiffness)]
+        straight = [one for one in scene.joints if one.name in single]
+        self.stiffness = np.array([one.stiffness for one in straight]).reshape(-1, 3).T
+        self.rest = np.array([one.rest[0] for one in straight])
+        self.damping, self.joint_range = np.zeros((3, n)), np.tile([[-np.inf], [np.inf]], n)
+        for joint in scene.joints:
+            self.damping[:, self.moved(joint)] = np.array(joint.damping)[:, None]
+            self.joint_range[:, self.moved(joint)] = np.array(joint.force_range)[:, None]
+        self.tendon_stiffness, self.tendon_damping = (
+            np.array([getattr(one, name) for one in scene.tendons]).reshape(-1, 3).T
+            for name in ("stiffness", "damping")
+        )
+        self.slack = np.array([one.rest for one in scene.tendons]).reshape(-1, 2).T
+        self.spanning = [i for i, tendon in enumerate(scene.tendons) if tendon.bodies]
+        self._lay_out_actuators()
+
+    def _lay_out_actuators(self) -> None:
+        scene, names = self.scene, [tendon.name for tendon in self.scene.tendons]
+        parts = scene.actuators
+        self.A, self.dragged = np.zeros((len(parts), self.nv)), np.zeros(self.nv)
+        for row, actuator in zip(self.A, parts, strict=True):
             if not actuator.tendon:
                 moved = self.reached(actuator)
                 row[moved] = actuator.gear[: moved.stop - moved.start]
+                self.dragged[moved] += actuator.gear[0] ** 2 * actuator.damping
+        self.gear = np.array([actuator.gear[0] for actuator in parts])
+        self.pulling = np.array([i for i, one in enumerate(parts) if one.tendon], dtype=int)
+        self.pulled = np.array([names.index(one.tendon) for one in parts if one.tendon], dtype=int)
+        self.pull_damping = np.array([one.damping if one.tendon else 0.0 for one in parts])
+        self.gain, self.bias = (np.array([getattr(one, k) for one in parts]).reshape(-1, 3).T for k in ("gain", "bias"))
+        self.force_range, self.control_range, self.activation_range = (
+            np.array([getattr(one, k) for one in parts]).reshape(-1, 2).T
+            for k in ("force_range", "control_range", "activation_range")
+        )
 
     def x(self, q: Floats) -> Floats:
         """Return x (..., nv) of positions (..., nq)."""
@@ -172,16 +201,16 @@ class Forces:
 
     def driven(self) -> Floats:
         """Return what drives the actuators now (nu,): controls, or the activations that follow them."""
-        found: Floats = np.zeros(len(self.u))
+        found: Floats = clamped(self.u, self.control_range)
         gone = self.t - self.since
-        for i, (part, u, a) in enumerate(zip(self.scene.actuators, self.u, self.act, strict=True)):
-            c = clamped(u, part.control_range)
+        for i in self.scene.activated:
+            part, a, c = self.scene.actuators[i], self.act[i], found[i]
             if part.activation == "integrator":
-                c = a + c * gone
-            elif part.activation:
-                c = a - (c - a) * np.expm1(-gone / part.time_constant)
-            found[i] = clamped(c, part.activation_range)
-        return found
+                found[i] = a + c * gone
+            else:
+                found[i] = a - (c - a) * np.expm1(-gone / part.time_constant)
+        held: Floats = clamped(found, self.activation_range)
+        return held
 
     def change(self, values: Floats, t: float) -> None:
         """Put inputs of the scene in force from t on, s: controls, then pushes."""
@@ -196,66 +225,62 @@ class Forces:
 
     def __call__(self, q: Floats, v: Floats) -> Floats:
         """Return the generalised forces (nv,) at a state."""
-        total: Floats = np.zeros(len(v))
         x = self.x(q)
-        for joint in self.scene.joints:
-            moved = self.moved(joint)
-            total[moved] -= drag(joint.damping, v[moved])
-            if joint.type in ("slide", "hinge"):
-                total[moved] -= polynomial(joint.stiffness, x[moved] - joint.rest[0])
-            elif any(joint.stiffness):
-                turn = self.turned(joint, q)
-                angle = float(np.linalg.norm(turn)) or 1.0
-                total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
+        total: Floats = -drag(self.damping, v)
+        total[self.single[1]] -= polynomial(self.stiffness, x[self.single[1]] - self.rest)
+        for joint in self.turning:
+            moved, turn = self.moved(joint), self.turned(joint, q)
+            angle = float(np.linalg.norm(turn)) or 1.0
+            total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
         stretch = self.stretch(q, v)
-        for tendon, length, rate, row in zip(self.scene.tendons, *stretch, strict=True):
-            spring = polynomial(tendon.stiffness, self.outside(tendon.rest, length))
-            total -= row * (spring + drag(tendon.damping, rate))
-        for actuator, (row, _, rate) in zip(self.scene.actuators, self.strokes(x, v, stretch), strict=True):
-            if actuator.tendon:
-                total -= row * actuator.damping * rate
-            else:
-                reached = self.reached(actuator)
-                total[reached] -= actuator.gear[0] ** 2 * actuator.damping * v[reached]
-        return total + self.actuated(x, v, stretch)
+        if self.scene.tendons:
+            lengths, rates, rows = stretch
+            spring = polynomial(self.tendon_stiffness, self.outside(lengths))
+            total -= (spring + drag(self.tendon_damping, rates)) @ rows
+        return total + self.actuated(x, v, stretch) if self.scene.actuators else total
 
     def stretch(self, q: Floats, v: Floats) -> Stretch:
         """Return lengths of all tendons, their rates and derivatives."""
         lengths, rates, rows = self.T @ self.x(q), self.T @ v, self.T.copy()
-        at = [i for i, tendon in enumerate(self.scene.tendons) if tendon.bodies]
-        if at and self.spans is not None:
-            lengths[at], rates[at], rows[at] = self.spans(q, v)
+        if self.spanning and self.spans is not None:
+            lengths[self.spanning], rates[self.spanning], rows[self.spanning] = self.spans(q, v)
         return lengths, rates, rows
 
-    def strokes(self, x: Floats, v: Floats, stretch: Stretch) -> list[tuple[Floats, float, float]]:
-        """Return of every actuator the derivative (nv,) of its length, its length and its rate, gear included."""
-        names, found = [tendon.name for tendon in self.scene.tendons], []
-        for row, actuator in zip(self.A, self.scene.actuators, strict=True):
-            if not actuator.tendon:
-                found.append((row, float(row @ x), float(row @ v)))
-                continue
-            length, rate, T = (part[names.index(actuator.tendon)] for part in stretch)
-            found.append((actuator.gear[0] * T, actuator.gear[0] * length, actuator.gear[0] * rate))
-        return found
+    def strokes(self, x: Floats, v: Floats, stretch: Stretch) -> Stretch:
+        """Return lengths of all actuators, their rates and their derivatives (nu, nv), gear included."""
+        A, lengths = self.A.copy(), self.A @ x
+        if len(self.pulling):
+            gear, tendon = self.gear[self.pulling], self.pulled
+            A[self.pulling], lengths[self.pulling] = gear[:, None] * stretch[2][tendon], gear * stretch[0][tendon]
+        return lengths, A @ v, A
 
-    @staticmethod
-    def outside(rest: Vector, length: Floats) -> Floats:
-        """Return how far a length is outside its dead band."""
-        out: Floats = length - clamped(length, rest)
+    def bounds(self, q: Floats, lengths: Floats) -> list[float]:
+        """Return the gaps of all bounds at a state, in the order of their rows; lengths (nt,) are of the tendons."""
+        x, found = self.x(q), []
+        for joint in self.scene.joints:
+            if joint.type == "ball":
+                found.append(float(np.linalg.norm(angle_of(q[self.at[joint.name] :][:4]))))
+            else:
+                found.append(x[self.place[joint.name]])
+        h: list[float] = []
+        for part, length in zip(self.scene.bounded, (*found, *lengths), strict=True):
+            low, high = part.range
+            h += [length - low - part.margin] if np.isfinite(low) else []
+            h += [high - length - part.margin] if np.isfinite(high) else []
+        return h
+
+    def outside(self, lengths: Floats) -> Floats:
+        """Return how far the lengths (..., nt) of tendons are outside their dead bands."""
+        out: Floats = lengths - clamped(lengths, self.slack)
         return out
 
     def actuated(self, x: Floats, v: Floats, stretch: Stretch) -> Floats:
-        """Return what the actuators do (nv,), each within its bounds and their sum within the joint's."""
-        total: Floats = np.zeros(len(v))
-        strokes = self.strokes(x, v, stretch)
-        for (row, length, rate), actuator, given in zip(strokes, self.scene.actuators, self.driven(), strict=True):
-            terms = np.array([1.0, length, rate])
-            force = np.dot(actuator.gain, terms) * given + np.dot(actuator.bias, terms)
-            total += row * clamped(force, actuator.force_range)
-        for joint in self.scene.joints:
-            moved = self.moved(joint)
-            total[moved] = clamped(total[moved], joint.force_range)
-        return total
+        """Return what the actuators do (nv,), each within its bounds and their sum within the joint's; less damping."""
+        lengths, rates, A = self.strokes(x, v, stretch)
+        terms = np.array([np.ones(len(rates)), lengths, rates])
+        force = np.sum(self.gain * terms, axis=0) * self.driven() + np.sum(self.bias * terms, axis=0)
+        total: Floats = clamped(clamped(force, self.force_range) @ A, self.joint_range)
+        return total - self.dragged * v - (self.pull_damping * rates) @ A
 
     def energy(self, q: Floats) -> Floats:
         """Return what the springs hold (n,), J, at states q (n, nq)."""
@@ -269,65 +294,68 @@ class Forces:
         if self.scene.tendons:
             lengths = np.array([self.stretch(one, np.zeros(self.scene.nv))[0] for one in q]).T
             for tendon, length in zip(self.scene.tendons, lengths, strict=True):
-                total += stored(tendon.stiffness, self.outside(tendon.rest, length))
+                total += stored(tendon.stiffness, length - clamped(length, tendon.rest))
         return total
 
 
-@dataclass(slots=True)
 class Rows:
-    """Gaps of a scene's rows and their derivatives: loops of joints, then bounds of joints and of tendons."""
+    """Gaps of a scene's rows and their derivatives: loops of joints, then bounds of joints and of tendons.
 
-    scene: Scene
-    forces: Forces
-    ends: list[tuple[tuple[Floats, float], tuple[Floats, float]]] = field(init=False)
-    curves: list[tuple[Vector, Vector, Vector]] = field(init=False)
+    Args:
+        scene: whose; loops in space an engine's own kinematics must give.
+        forces: of the scene.
+    """
 
-    def __post_init__(self) -> None:
-        """Refuse loops in space, which an engine's own kinematics must give."""
-        for loop in self.scene.loops:
+    def __init__(self, scene: Scene, forces: Forces) -> None:
+        for loop in scene.loops:
             if loop.in_space:
                 raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
-        self.ends = [(self._end(loop.type, loop.first), self._end(loop.type, loop.second)) for loop in self.scene.loops]
-        self.curves = [derivatives(loop.polynomial) for loop in self.scene.loops]
+        self.scene, self.forces = scene, forces
+        self.ends = [(self._end(loop.type, loop.first), self._end(loop.type, loop.second)) for loop in scene.loops]
+        self.curves = [derivatives(loop.polynomial) for loop in scene.loops]
+        self._bound()
+
+    def _bound(self) -> None:
+        """Lay out the bounds: their gaps are straight x + offset, and of a ball joint its angle with a sign more."""
+        straight, offset = list[Floats](), list[float]()
+        self.balls: list[tuple[int, Joint, float]] = []
+        unit, forces = np.eye(self.forces.nv), self.forces
+        rows: list[tuple[Joint | Tendon, Floats]] = []
+        rows += [(joint, unit[forces.place[joint.name]]) for joint in self.scene.joints]
+        rows += [(tendon, row) for tendon, row in zip(self.scene.tendons, forces.T, strict=True) if tendon.joints]
+        for part, row in rows:
+            for sign, bound in zip((1.0, -1.0), part.range, strict=True):
+                if np.isfinite(bound):
+                    straight.append(sign * row)
+                    if isinstance(part, Joint) and part.type == "ball":
+                        self.balls.append((len(offset), part, sign))
+                        straight[-1] = np.zeros(len(row))
+                    offset.append(-sign * bound - part.margin)
+        self.straight, self.offset = np.array(straight).reshape(-1, forces.nv), np.array(offset)
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""
         x = self.forces.x(q)
-        h = [self._loop(i, x)[0] for i in range(len(self.ends))]
-        for part, length, _, _ in self._bounded(q, np.zeros(self.forces.nv)):
-            low, high = part.range
-            h += [length - low - part.margin] if np.isfinite(low) else []
-            h += [high - length - part.margin] if np.isfinite(high) else []
-        return np.array(h)
+        bounded = self.straight @ x + self.offset
+        for row, joint, sign in self.balls:
+            bounded[row] += sign * self._angle(joint, q, np.zeros(self.forces.nv))[0]
+        return np.concatenate([[self._loop(i, x)[0] for i in range(len(self.ends))], bounded])
 
     def jacobian(self, q: Floats) -> Floats:
         """Return H (nc, nv)."""
-        x = self.forces.x(q)
-        H = [self._loop(i, x)[1] for i in range(len(self.ends))]
-        for part, _, row, _ in self._bounded(q, np.zeros(self.forces.nv)):
-            H += [sign * row for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
-        return np.array(H).reshape(-1, len(x))
+        x, bounded = self.forces.x(q), self.straight.copy()
+        for row, joint, sign in self.balls:
+            bounded[row] = sign * self._angle(joint, q, np.zeros(len(x)))[1]
+        loops = np.array([self._loop(i, x)[1] for i in range(len(self.ends))]).reshape(-1, len(x))
+        return np.concatenate([loops, bounded])
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (nc,)."""
-        x = self.forces.x(q)
-        drift = [-self._loop(i, x)[2] * float(second @ v) ** 2 for i, (_, (second, _)) in enumerate(self.ends)]
-        for part, _, _, bend in self._bounded(q, v):
-            drift += [sign * bend for sign, bound in zip((1.0, -1.0), part.range, strict=True) if np.isfinite(bound)]
-        return np.array(drift)
-
-    def _bounded(self, q: Floats, v: Floats) -> list[tuple[Joint | Tendon, float, Floats, float]]:
-        """What may have bounds, but distances of points: its length, its derivative (nv,), and its drift."""
-        unit, forces, x = np.eye(self.forces.nv), self.forces, self.forces.x(q)
-        found: list[tuple[Joint | Tendon, float, Floats, float]] = []
-        for joint in self.scene.joints:
-            first = forces.place[joint.name]
-            if joint.type == "ball" and joint.limited:
-                found.append((joint, *self._angle(joint, q, v)))
-            else:
-                found.append((joint, float(x[first]), unit[first], 0.0))
-        lengths = zip(self.scene.tendons, forces.T, strict=True)
-        return [*found, *((tendon, float(row @ x), row, 0.0) for tendon, row in lengths if tendon.joints)]
+        x, bounded = self.forces.x(q), np.zeros(len(self.offset))
+        for row, joint, sign in self.balls:
+            bounded[row] = sign * self._angle(joint, q, v)[2]
+        loops = [-self._loop(i, x)[2] * float(second @ v) ** 2 for i, (_, (second, _)) in enumerate(self.ends)]
+        return np.concatenate([loops, bounded])
 
     def _angle(self, joint: Joint, q: Floats, v: Floats) -> tuple[float, Floats, float]:
         """Return the angle of a ball joint, its derivative along v (nv,), and its second along a steady v."""

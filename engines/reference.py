@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
+from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, SceneError, Trajectory
 from crossbody.cases._arrays import is_number
 from crossbody.engines import _settings
 from crossbody.engines._equations import known, module, system_of
@@ -18,6 +18,7 @@ from crossbody.engines._reference_audit import audit, listed
 from crossbody.engines._rolling import determined
 from crossbody.reference import Options, System, prepare
 from crossbody.reference._options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
+from crossbody.reference._start import NOT_FOUND, OffRowsError
 
 OF_THE_CASE = "case"
 _ROBOT = (
@@ -46,11 +47,13 @@ class ReferenceRun:
     engine: str = "reference"
 
     def run(self) -> Trajectory:
-        """Integrate from the start."""
+        """Integrate from the start, and see whether the motion stays within what the model covers."""
+        return within_the_model(self.case, self.motion()) if self.case.file else self.motion()
+
+    def motion(self) -> Trajectory:
+        """Integrate from the start, whatever shapes meet that have no rows."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
-        if self.case.scene is not None:
-            trajectory = determined(self.case.scene, trajectory)
-        return within_the_model(self.case, trajectory) if self.case.file else trajectory
+        return trajectory if self.case.scene is None else determined(self.case.scene, trajectory)
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""
@@ -65,11 +68,11 @@ def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
     from crossbody.cases.files.contacts import first_contact
     from crossbody.cases.files.reading import model_of
-    from crossbody.cases.scene_contacts import contacts
+    from crossbody.cases.scene_contacts import contacts, inert
 
     model = model_of(Path(case.file), str(case.parameters.get("without", "")))
-    rows = contacts(case.scene) if case.scene is not None else ()
-    known = {frozenset((contact.first.name, contact.second.name)) for contact in rows}
+    pairs = () if case.scene is None else (*(one.pair for one in contacts(case.scene)), *inert(case.scene))
+    known = {frozenset((pair.first, pair.second)) for pair in pairs}
     found = first_contact(model, run.t, run.q, run.v, known) if run.outcome.ok else ""
     return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
@@ -132,7 +135,10 @@ class Reference:
         check = getattr(module(case.mechanism), "check_start", None)
         if check is not None:
             check(case.parameters, case.q0, case.v0)
-        inner = prepare(system, case.q0, case.v0, options)
+        try:
+            inner = prepare(system, case.q0, case.v0, options)
+        except OffRowsError as error:
+            raise SceneError(_off(case, error)) if case.file else error from None
         inner.warm()
         return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
 
@@ -154,6 +160,15 @@ def _known(solver: str) -> dict[str, Parameter]:
     if solver == "ida":
         known["index"] = Parameter(default=1, doc="1, or 3 for bilateral rows", low=1, high=3)
     return known
+
+
+def _off(case: Case, error: OffRowsError) -> str:
+    """Return what is wrong with the start of a file and what its user can do, in the file's names."""
+    advice = f"--set assemble=1 starts in every engine at the nearest that is on them: {error.near}."
+    return (
+        f"{case.label}: the start is off {case.contacts[error.row]!r}, which is always on: {error.off}. "
+        f"{advice if error.near else NOT_FOUND} --without loops leaves such rows out of every engine."
+    )
 
 
 def _options(case: Case, solver: str, used: Mapping[str, Any]) -> Options:

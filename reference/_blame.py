@@ -13,6 +13,7 @@ from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.systems import _none
 
+VANISHED = 1e-6  # part of H M^-1 H^T of a row at the start below which what moves the row is as good as nothing
 LOOKS = 60  # states ahead, each twice as far as the one before
 
 
@@ -89,6 +90,29 @@ def _values(
         yield from ((name, key, value[np.argsort(rows)] if name == "rows" else value) for key, value in outputs.items())
 
 
+def vanished(system: System, active: Index, start: Floats, q: Floats, v: Floats) -> list[int]:
+    """Return the rows in force that hardly anything moves at the end of a run, and something did at its start.
+
+    Such a row, which has still to move, asks for velocities beyond all bounds: a string that its law pulls on where it
+    is as short as it can be.
+
+    Args:
+        system: the mechanism.
+        active: rows in force.
+        start: positions at the start (nq,).
+        q: positions at the end (nq,).
+        v: velocities there (n,).
+    """
+    sizes = []
+    for there, speed in ((start, np.zeros(system.n)), (q, v)):
+        M, H = system.mass_matrix(there, speed), system.constraint(there, speed)[0][active]
+        if not (np.isfinite(M).all() and np.isfinite(H).all()) or np.linalg.matrix_rank(M) != system.n:
+            return []
+        sizes.append(np.sum(H * np.linalg.solve(M, H.T).T, axis=1))
+    found: list[int] = np.asarray(active)[sizes[1] < VANISHED * sizes[0]].tolist()
+    return found
+
+
 def dependence(system: System, active: Index, q: Floats, v: Floats) -> str:
     """The condition of H M^-1 H^T of the active rows, as the start of a sentence; empty if there are none.
 
@@ -104,6 +128,8 @@ def dependence(system: System, active: Index, q: Floats, v: Floats) -> str:
     if not len(active):
         return ""
     A = np.linalg.solve(np.linalg.cholesky(M), H.T)
+    if len(active) == 1:
+        return f"Row {active[0]} has H M^-1 H^T = {np.sum(A * A):.3g}: hardly anything moves it near "
     rank = int(np.linalg.matrix_rank(A))
     if rank < len(active):
         return f"Rows {active.tolist()} have a singular H M^-1 H^T, of rank {rank}, near "

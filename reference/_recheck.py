@@ -87,7 +87,8 @@ def recheck(
     if not rows or not len(run.t) or (run.mode < 0).any():
         return ()
     told = system.control is None or (isinstance(system.control, Control) and inputs is not None)
-    known = told and system.latched == 0 and system.velocity is None
+    bands = system.kinks + 1 + system.inputs if system.kinks else 0  # they are of no motion
+    known = told and system.latched == bands and system.velocity is None
     found = _Recheck(system, run, rows, rtol, inputs, collisions).between() if known else _recorded(run, rows, rtol)
     worst: dict[tuple[int, Mode, str], Violation] = {}
     for one in found:
@@ -181,10 +182,13 @@ class _Recheck:
         """Rows first .. last, between which one set of equations holds."""
         run, e, work = self.run, self.equations, self.looks.work
         modes = run.mode[first].tolist()
+        for left_out in np.asarray(self.system.redundant).tolist():
+            modes[left_out] = int(Mode.FREE)
         held = self._held(self.inputs_t)[first]
         e.u[:] = self.inputs_u[held] if held >= 0 else 0.0
         discrete = self._discrete()[first]
-        e.p[len(e.p) - len(discrete) :] = discrete
+        jumping, end = len(discrete) - self.system.kinks, len(e.p) - self.system.latched
+        e.p[end - len(discrete) : end - self.system.kinks] = discrete[:jumping]  # sides of kinks are told by values
         e.activate(modes)
         contact = [i for i in self.rows if modes[i] in ACTIVE]
         if len(contact) > 1 and not self.frozen:

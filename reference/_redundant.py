@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from crossbody.cases import Outcome, SceneError, Trajectory
+from crossbody.cases import Mode, Outcome, SceneError, Trajectory
 from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._state import State, started
 from crossbody.reference._system import System
@@ -96,6 +96,7 @@ def watched(system: System, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where a row that was left out is not held by the others.
 
     The multipliers of what was left out are NaN: with those of the rows that they follow from they are one of many.
+    Its mode is that of rows that are always on: the others hold it.
     """
     left_out: Index = np.asarray(system.redundant)
     if not len(left_out) or not len(run.t):
@@ -114,10 +115,10 @@ def watched(system: System, run: Trajectory) -> Trajectory:
                 f"at t = {run.t[k]:.12g} s it has {what} = {values[k, row]:.3g}."
             )
             return replace(run, outcome=Outcome.INCONSISTENT, message=message)
-    lam = np.array(run.lam)
-    lam[:, left_out] = np.nan
+    lam, mode = np.array(run.lam), np.array(run.mode)
+    lam[:, left_out], mode[:, left_out] = np.nan, Mode.BILATERAL
     count = len(left_out) + run.counts.get("redundant", 0)
-    return replace(run, lam=lam, counts={**run.counts, "redundant": count}, message=_told(system, run))
+    return replace(run, lam=lam, mode=mode, counts={**run.counts, "redundant": count}, message=_told(system, run))
 
 
 def _told(system: System, run: Trajectory) -> str:

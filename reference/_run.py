@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.cases._control import Control, NotFinite
 from crossbody.reference._activations import Live
-from crossbody.reference._blame import dependence, not_finite
+from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
@@ -99,6 +99,7 @@ class CompiledRun:
             "fsm": FSMS.index(options.fsm), "rule": COLLISIONS.index(options.collisions),
             "frozen": options.freezes(system), "has_switch": system.switch is not None,
             "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
+            "kinks": system.kinks,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
@@ -128,9 +129,11 @@ class CompiledRun:
         return int(self.call(self.state, *self.tables, budget))
 
     def warm(self) -> None:
-        """Prepare for many repetitions: build the kernels into the program and run once."""
+        """Prepare for many repetitions: build the kernels into the program, and take one step."""
         self.call = entry(tuple(self.system.kernels.values()))
-        self.go()
+        if not isinstance(self.system.control, Control):  # a controller is asked by runs alone
+            self.start()
+            self.slice(1)
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
@@ -183,13 +186,23 @@ class CompiledRun:
             return Outcome.INTERRUPTED
 
     def _ended(self, code: int) -> Outcome:
-        """The outcome of a code; an account or a pivot that a kernel spoilt by NaN is neither open nor vanished."""
+        """The outcome of a code; an account or a pivot that a kernel spoilt by NaN is neither open nor vanished.
+
+        Where steps fell to nothing because nothing moves a row any more, the equations are ill posed, not stiff.
+        """
         spoilt = code == layout.INCONSISTENT and not np.isfinite(self.state["energy_open"][0])
         if code == layout.ILL_POSED:
             step = float(self.state["h"][0]) + RESOLUTION * float(self.options.t_end)
             q, v = np.split(self.work["y"], [self.system.nq])
             spoilt = self._blamed(q, v, step) != ""
+        if code == layout.STEP_TOO_SMALL and self._vanished():
+            return Outcome.ILL_POSED
         return Outcome.NOT_FINITE if spoilt else OUTCOMES[code]
+
+    def _vanished(self) -> list[int]:
+        q, v = np.split(self.work["y"], [self.system.nq])
+        active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
+        return vanished(self.system, active, self.start_state[: self.system.nq], q, v)
 
     def _finite_rows(self) -> int:
         """Rows before the first one that holds NaN or infinity: energies and powers steer no step, but are told."""
@@ -251,8 +264,9 @@ class CompiledRun:
     def _switch_list(self) -> tuple[Switch, ...]:
         count = int(self.state["switches"][0]) if self.options.events else 0
         times, changes = (self.buffers[name][:count].tolist() for name in _EVENT_BUFFERS[3:])
+        jumping = np.size(self.system.discrete) - self.system.kinks
         return tuple(
-            Switch(t=t, variable=i, before=before, after=after)
+            Switch(t=t, variable=i, before=before, after=after, smooth=i >= jumping)
             for t, (i, before, after) in zip(times, changes, strict=True)
         )
 
@@ -273,7 +287,8 @@ class CompiledRun:
         if outcome is Outcome.MODE_CYCLE:
             return f"Rows {marked} at "
         if outcome is Outcome.ILL_POSED:
-            return dependence(self.system, np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE)), q, v)
+            rows = self._vanished() or np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
+            return dependence(self.system, np.array(rows), q, v)
         if outcome is Outcome.INCONSISTENT and abs(state["energy_open"]) > state["energy_allowed"]:
             return (
                 f"The energy account is open by {state['energy_open']:.3g} J, where the steps taken admit "
@@ -296,5 +311,5 @@ class CompiledRun:
 
 def _books_everything(system: System) -> bool:
     """Whether the system says what its energy is and what changes it; one that nothing drives need not name a power."""
-    driven = system.inputs > 0 or system.switch is not None
+    driven = system.inputs > 0 or system.jumps
     return system.energy is not _none.energy and (system.power is not _none.power or not driven)

@@ -22,7 +22,26 @@ EXPLAINED = 1e3  # times the tolerance of q and v, by which a start may be off
 LARGEST = 1e-3  # part of q and v by which it may be off at the loosest tolerance
 ROUNDING = 1e3 * float(np.finfo(float).eps)  # part of the terms of a gap and of its rate
 ROUNDS = 50  # of Newton's method
+NOT_FOUND = "No start on the rows that are always on was found from there."
 DEPENDENT = 1e-12  # singular value of the rows, over the largest, that counts as zero
+
+
+class OffRowsError(SceneError):
+    """A start off a row that is always on.
+
+    Attributes:
+        row: which.
+        off: what its gap and its rate are.
+        near: the nearest start on all such rows, as text; empty if none was found.
+    """
+
+    def __init__(self, run: str, row: int, off: str, near: str) -> None:
+        self.row, self.off, self.near = row, off, near
+        offered = f"The nearest on all such rows is {near} (System.project)." if near else NOT_FOUND
+        super().__init__(
+            f"The start{run} is off row {row}, which is always on: {off}. {offered} "
+            "consistent=False admits a start that is off its rows on purpose."
+        )
 
 
 def check_start(
@@ -39,7 +58,7 @@ def check_start(
         run: which of many runs it is, for a message.
 
     Raises:
-        SceneError: naming the row, its gap and rate, and the nearest start on all such rows.
+        OffRowsError: naming the row, its gap and rate, and the nearest start on all such rows.
     """
     if not options.consistent or not np.any(_may_hold(system)):
         return
@@ -49,11 +68,8 @@ def check_start(
     off = _off(state, held, part, min(EXPLAINED * options.tolerance, LARGEST))
     if np.any(off):
         i = int(held[np.argmax(off)])
-        raise SceneError(
-            f"The start{run} is off row {i}, which is always on: h = {state.h[i]:.6g} and h' = {state.H[i] @ v:.6g}, "
-            f"more than rtol = {options.rtol:g} explains. {_offer(_projected(state, held))} "
-            "consistent=False admits a start that is off its rows on purpose."
-        )
+        rate = f"h = {state.h[i]:.6g} and h' = {state.H[i] @ v:.6g}, more than rtol = {options.rtol:g} explains"
+        raise OffRowsError(run, i, rate, _shown(_projected(state, held)))
 
 
 def check_starts(system: System, starts: Floats, parameters: Floats, options: Options) -> None:
@@ -77,11 +93,8 @@ def project(system: System, q: Floats, v: Floats) -> tuple[Floats, Floats]:
     return found
 
 
-def _offer(near: tuple[Floats, Floats] | None) -> str:
-    if near is None:
-        return "No start on the rows that are always on was found from there."
-    q, v = near
-    return f"The nearest on all such rows is q0 = {q.tolist()}, v0 = {v.tolist()} (System.project)."
+def _shown(near: tuple[Floats, Floats] | None) -> str:
+    return "" if near is None else f"q0 = {near[0].tolist()}, v0 = {near[1].tolist()}"
 
 
 def _may_hold(system: System) -> NDArray[np.bool_]:

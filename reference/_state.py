@@ -70,7 +70,7 @@ class State:
 
     def evaluated(self) -> NDArray[np.bool_]:
         """Which rows there are: one that cannot be touched in the present discrete state has a gap and no rate."""
-        there: NDArray[np.bool_] = (self.gap <= 0.0) | (self.rate != 0.0) | (self.system.switch is None)
+        there: NDArray[np.bool_] = (self.gap <= 0.0) | (self.rate != 0.0) | (not self.system.jumps)
         return there
 
     def sizes(self) -> Floats:

@@ -57,6 +57,9 @@ class System:
         guards: length of g of `watch`.
         discrete: discrete variables at the start; they follow the parameters in p, and each change is an event.
         latched: numbers that `switch` alone writes; they follow the discrete variables in p.
+        kinks: how many of the last discrete variables say on which side of a kink a force is that goes on there: the
+            motion has its derivatives all the same. 0 stands for the side on which the state is. With kinks the very
+            last numbers of p, counted in `latched`, are the run's tolerance and the inputs in force.
         span (nc, 2): first coordinate, and one past the last, that a row's H may touch; all of them if not given.
             With it the cost of a chain grows with its length, not with its square.
         above (n,): the nearest lower coordinate that M couples each one to, -1 for none: M is zero where neither of two
@@ -102,6 +105,7 @@ class System:
     guards: int = 0
     discrete: ArrayLike = ()
     latched: int = 0
+    kinks: int = 0
     span: ArrayLike | None = None
     above: ArrayLike | None = None
     constant_mass: bool = False
@@ -136,6 +140,7 @@ class System:
             raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
         put(self, "discrete", frozen("System", "discrete", self.discrete, (None,)))
+        self._check_kinks()
         state = np.concatenate([self.discrete, np.zeros(self.latched)])
         constants = frozen("System", "parameters", values, (None,))
         put(self, "p", frozen("System", "p", np.concatenate([constants, state]), (None,)))
@@ -151,6 +156,11 @@ class System:
     def nc(self) -> int:
         """Number of constraint rows."""
         return len(self.alpha)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether discrete variables change what a state's own values do not tell: not sides of kinks alone."""
+        return self.switch is not None and np.size(self.discrete) > self.kinks
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -216,7 +226,7 @@ class System:
     def _check_sizes(self) -> None:
         counts = (
             ("n", 1),
-            *((name, 0) for name in ("nq", "mass_block", "inputs", "scratch", "memory", "guards", "latched")),
+            *((name, 0) for name in ("nq", "mass_block", "inputs", "scratch", "memory", "guards", "latched", "kinks")),
         )
         for name, low in counts:
             value = getattr(self, name)
@@ -225,6 +235,13 @@ class System:
                 raise SceneError(f"System.{name} is {shown(value)}; it must be a whole number from {low} to {LARGEST}.")
         if self.mass_block and self.n % self.mass_block:
             raise SceneError(f"System.mass_block is {self.mass_block}; it must divide n = {self.n}.")
+
+    def _check_kinks(self) -> None:
+        if self.kinks > min(np.size(self.discrete), self.guards) or (self.kinks and self.latched <= self.inputs):
+            raise SceneError(
+                f"System.kinks is {self.kinks}; each needs a discrete variable and a guard, and `latched` room for the "
+                f"{self.inputs} inputs and the tolerance."
+            )
 
     def _check_told(self) -> None:
         """Bring `loose` to the rows that are redundant, and check what comes with a scene."""

@@ -24,7 +24,7 @@ matrix belong together, before it starts (`System.check`).
     switch(t, q, v, p, mode, fired)      optional: writes the discrete variables at the end of p, and may move the mode
                                          of a row to another; fired is the index in g, START at t = 0, or TOUCHED after
                                          the rows have settled, until it returns UNCHANGED; else CHANGED, or LOST,
-                                         which ends the run
+                                         which ends the run; in a system with `kinks` GIVEN at every change of inputs
 
 Each is compiled for float64, and for complex128 when a derivative is first asked for, which is a complex step: use np
 functions only, and neither abs, hypot, atan2 nor a branch on a complex value. `control` and `solve` are float64 alone.
@@ -48,7 +48,7 @@ from numba.core import types as core_types
 
 from crossbody.reference._cache import compiled
 
-START, TOUCHED = np.array([-1, -2])
+START, TOUCHED, GIVEN = np.array([-1, -2, -3])
 UNCHANGED, CHANGED, LOST = np.arange(3)
 
 _T = types.float64

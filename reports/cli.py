@@ -234,13 +234,15 @@ def stability(wanted: tuple[str, ...], out: Path) -> int:
 @click.option("--tls-key", default="", metavar="FILE", help="Its key, if it is not in the same file.")
 @click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("stress"), show_default=True, metavar="DIR")
+@_parameters
 @speaks
 def stress(
     names: tuple[str, ...], wanted: tuple[str, ...], runs: int | None, seed: int, jobs: int, scheduler: str | None,
-    tls_ca: str, tls_cert: str, tls_key: str, resume: bool, out: Path,
+    tls_ca: str, tls_cert: str, tls_key: str, resume: bool, out: Path, pairs: tuple[str, ...],
 ) -> int:  # fmt: skip
     """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
 
+    A SUITE may be a case of your own or a robot's file: other laws of its rows, pushes on its bodies, other numbers.
     A sweep that was interrupted goes on where it stood when the same command is given again.
     """
     from crossbody.reports.sweep.command import Ask
@@ -249,8 +251,9 @@ def stress(
 
     tls = Tls(ca=tls_ca, cert=tls_cert, key=tls_key)
     asked = Ask(
-        names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, tls=tls, resume=resume
-    )
+        names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, tls=tls, resume=resume,
+        pairs=pairs,
+    )  # fmt: skip
     return work(asked, out, _command())
 
 

@@ -13,7 +13,7 @@ from crossbody import engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
 from crossbody.cases._delta import pose
 from crossbody.reports.judging.truth import Truth, from_run, sample_times
-from crossbody.reports.metrics._contacts import CLOSED
+from crossbody.reports.metrics._contacts import AT_REST, CLOSED
 
 OFF = 1e-3
 """Size of an error, over what it is measured by."""
@@ -120,6 +120,17 @@ def bumped(signal: str, scale: Scale, columns: Callable[[Scene], Sequence[int]] 
         return changed(s.run, signal, (s.sample(), column), s.sign() * OFF * size[column]), OFF
 
     return known
+
+
+def off_its_surface(s: Scene) -> tuple[Trajectory, float]:
+    """One touch, or one row that comes free from below, recorded a part of the longest step's way away."""
+    own = (e for e in s.run.events if s.case.law.unilateral[e.contact] and e.t > 0.0)
+    closing = {(Mode.FREE, mode) for mode in CLOSED}
+    surface = [e for e in own if (e.before, e.after) in closing | {(Mode.BALLISTIC, Mode.FREE)}]
+    event = surface[s.one(range(len(surface)))]
+    near, by = AT_REST * max(1.0, np.abs(s.run.q).max()), OFF * np.abs(s.run.gap).max()
+    run = changed(s.run, "gap", (s.at(event.t), event.contact), s.sign() * (near + by))
+    return run, by / np.abs(np.diff(run.gap[:, event.contact])).max()
 
 
 def of_all(signal: str) -> Scale:
@@ -367,6 +378,8 @@ ERRORS: dict[str, tuple[str, Known]] = {
     "lam_impulse_path of collisions in no time": ("blow", struck),
     "complementarity": ("box", pulling),
     "complementarity of an open row": ("box", acting),
+    "event_gap": ("box", off_its_surface),
+    "event_gap of one row": ("linear ball", off_its_surface),
     "event_times": ("box", later),
     "event_times of one row": ("linear ball", later),
     "mode_times": ("box", handed),

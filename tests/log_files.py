@@ -77,7 +77,7 @@ def write_hdf5(path: Path, data: Table) -> None:
             )
 
 
-def write_mcap(path: Path, data: Table) -> None:
+def write_mcap(path: Path, data: Table, late: Any = None) -> None:
     from mcap_ros2.writer import Writer
 
     definition = _definition(data)
@@ -85,11 +85,11 @@ def write_mcap(path: Path, data: Table) -> None:
         schema = writer.register_msgdef("rig_msgs/msg/State", definition)
         for i in range(len(data["t"])):
             message = {name: values[i].item() for name, values in data.items()}
-            when = i * MILLI
-            writer.write_message("/rig", schema, message, log_time=when, publish_time=when)
+            when, sent = _stamps(i, late)
+            writer.write_message("/rig", schema, message, log_time=when, publish_time=sent)
 
 
-def write_mcap_json(path: Path, data: Table) -> None:
+def write_mcap_json(path: Path, data: Table, late: Any = None) -> None:
     from mcap.writer import Writer
 
     with path.open("wb") as file:
@@ -99,9 +99,15 @@ def write_mcap_json(path: Path, data: Table) -> None:
         channel = writer.register_channel("/rig", "json", schema)
         for i in range(len(data["t"])):
             text = json.dumps({name: values[i].item() for name, values in data.items()}).encode()
-            when = i * MILLI
-            writer.add_message(channel, log_time=when, publish_time=when, data=text)
+            when, sent = _stamps(i, late)
+            writer.add_message(channel, log_time=when, publish_time=sent, data=text)
         writer.finish()
+
+
+def _stamps(i: int, late: Any) -> tuple[int, int]:
+    """When message i was written and when it was sent, ns; `late` of each is what lies between."""
+    when = (i + 1) * MILLI if late is not None else i * MILLI
+    return when, when - (0 if late is None else int(late[i]))
 
 
 def _definition(data: Table) -> str:

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Pair, Push, Scene, Shape, Tendon
+from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Pair, Push, RowLaw, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import PLACES
 
 ALL = ("hinge", "slide", "ball", "free")
@@ -38,6 +38,17 @@ def random_scene(seed: int, types: Sequence[str] = ALL, bodies: int = 6) -> Scen
         loops=(*_loops(rng, single), *_joined(rng, made)), **_contacts(rng, made, joints),
         gravity=tuple(rng.normal(size=3) * 5.0), pushes=_pushes(rng, joints),
     )  # fmt: skip
+
+
+def with_own_laws(scene: Scene, seed: int) -> Scene:
+    """Return the scene with a law of its own for everything that has rows."""
+    rng = np.random.default_rng(seed)
+
+    def law() -> RowLaw:
+        return RowLaw(a0=float(rng.uniform(1e2, 1e4)), a1=float(rng.uniform(10.0, 1e3)))
+
+    groups = ("joints", "tendons", "loops", "pairs")
+    return scene.replace(**{name: tuple(replace(part, law=law()) for part in getattr(scene, name)) for name in groups})
 
 
 def random_state(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

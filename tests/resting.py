@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from crossbody import cases
-from crossbody.cases import Case
+from crossbody import cases, engines
+from crossbody.cases import Case, Outcome, Trajectory
+from crossbody.cases._rotations import differences
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 
 LAW = RowLaw(a0=4e4, a1=60.0)
@@ -49,3 +50,15 @@ def plate(
     w, u = q[0], q[1:]
     lowest = min(x[2] + 2.0 * (w * np.cross(u, x) + np.cross(u, np.cross(u, x)))[2] for x in points)
     return cases.from_scene(scene, q0=[0.0, 0.0, height + radius - lowest, *q], v0=v, t_end=t_end)
+
+
+def run(case: Case, profile: str = "compiled", engine: str = "reference", **settings: Any) -> Trajectory:
+    """Return the motion of a case to its horizon."""
+    found = engines.load(engine).prepare(case, profile, **settings).run()
+    assert found.outcome is Outcome.FINISHED, found.message
+    return found
+
+
+def apart(case: Case, one: Trajectory, other: Trajectory) -> float:
+    """Return by how much two motions of a case differ at their ends."""
+    return float(differences(one.q[-1:], other.q[-1:], case.quaternions).max())

@@ -13,13 +13,13 @@ from published import moves_as_in_mujoco
 
 from crossbody import cases, engines
 from crossbody.cases import Control, Outcome, SceneError
-from crossbody.cases.files.mjcf import compiled, scene_of
+from crossbody.cases.files.mjcf import model_of, scene_of
 from crossbody.cases.scene import Actuator
 from crossbody.engines.mujoco._build import compiled as build
 from crossbody.engines.mujoco._build import spec_of
 from crossbody.reference import recheck, simulate
 from crossbody.reference._activations import Activations
-from crossbody.reference.linear import linearise
+from crossbody.reference.linear import linearise, sensitivity
 
 ARM = """
 <mujoco><compiler angle="radian"/><option timestep="1e-3" integrator="RK4"/><worldbody><body>
@@ -101,7 +101,7 @@ def test_inputs_change_where_an_activation_comes_to_an_end_of_its_range(seed: in
 @pytest.mark.parametrize("ranges", [HELD, FREE])
 def test_forces_are_those_of_mujoco(tmp_path: Path, ranges: dict[str, str]) -> None:
     case = arm(tmp_path, ranges)
-    model = compiled(Path(case.file))
+    model = model_of(Path(case.file))
     assert scene_of(model).activated == (1, 2, 3)
     moves_as_in_mujoco(model, scene_of(model))
 
@@ -191,11 +191,43 @@ def test_judging_knows_activations(tmp_path: Path) -> None:
     assert found <= 1e-8
 
 
-def test_a_linear_model_of_activations_is_refused(tmp_path: Path) -> None:
-    system = engines.load("reference").prepare(arm(tmp_path)).system
+def test_activations_are_states_of_a_linear_model(tmp_path: Path) -> None:
+    """A small motion from a state at rest is the model's: all starts and controls, by differences of runs."""
+    system = engines.load("reference").prepare(arm(tmp_path, FREE)).system
+    q, u, a, T, step = np.array([0.2, -0.3]), np.array([0.1, 0.0, 0.2, 0.2]), np.array([0.0, 0.2, 0.2]), 5e-5, 1e-5
+    model = linearise(system, q, u=u, activations=a)
+    assert model.states == ("q[0]", "q[1]", "q[0]'", "q[1]'", "a[0]", "a[1]", "a[2]")
+    assert len(model.inputs) == 4
+    assert np.array_equal(model.A[4:], np.diag([0.0, 0.0, 0.0, 0.0, 0.0, -20.0, -5.0])[4:])
+    assert np.array_equal(np.argwhere(model.B[4:]), [[0, 1], [1, 2], [2, 3]])
+
+    def rate(x: np.ndarray, now: np.ndarray) -> np.ndarray:
+        """(v', a') as runs begin: a short run from x with controls that hold."""
+        made = dataclasses.replace(system.activations, start=x[4:])
+        run = simulate(dataclasses.replace(system, parameters=system.p[: -system.latched or None], activations=made),
+                       x[:2], x[2:4], T, rtol=1e-13, inputs=([0.0], [now]))  # fmt: skip
+        return (run.v[-1] - run.v[0]) / T
+
+    x = np.concatenate([q, np.zeros(2), a])
+    for k in range(7):
+        d = step * np.eye(7)[k]
+        off = (rate(x + d, u) - rate(x - d, u)) / (2.0 * step) - model.A[2:4, k]
+        assert np.abs(off).max() <= 1e-3 * np.abs(model.A[2:4]).max()
     with pytest.raises(SceneError, match="activation"):
-        linearise(system, [0.0, 0.0], [0.0, 0.0])
-    assert simulate(system, [0.0, 0.0], [0.0, 0.0], 0.1).outcome is Outcome.FINISHED
+        sensitivity(system, q, np.zeros(2), 0.1)
+    with pytest.raises(SceneError, match=r"linearise\.activations"):
+        linearise(system, q, activations=[0.0])
+
+
+def test_an_activation_that_leans_on_its_end_stands_still_in_a_linear_model(tmp_path: Path) -> None:
+    system = engines.load("reference").prepare(arm(tmp_path)).system  # the sum in -.4 .. .3, the last in -1 .. .5
+    free = linearise(system, [0.0, 0.0], u=[0.0, 1.0, 3.0, 0.1], activations=[0.1, 0.2, 0.2])
+    assert free.B[4, 1] == 1.0
+    assert free.B[5, 2] == 0.0  # its control is beyond its range
+    assert free.A[5, 5] == pytest.approx(-20.0)
+    end = linearise(system, [0.0, 0.0], u=[0.0, 1.0, 3.0, 1.1], activations=[0.3, 0.2, 0.5])
+    assert not end.A[[4, 6]].any()
+    assert not end.B[[4, 6]].any()
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ import pandas as pd
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import InvalidValue, Outcome, OutputError, Tier, Trajectory
+from crossbody.cases import InvalidValue, Mode, Outcome, OutputError, Tier, Trajectory
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import scenes
-from crossbody.reports.bench.errors import hermite
+from crossbody.reports.bench.errors import errors, hermite
 from crossbody.reports.bench.headline import REFERENCE, headline
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.measure import COLUMNS, bench, joined
@@ -70,6 +70,22 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> list[Pick]:
 def rows(fake: list[Pick]) -> pd.DataFrame:
     case = cases.load("bouncing_ball", "linear", t_end=1.0)
     return bench(case, [Pick(engine="reference", profile="compiled"), *fake], Effort(repeats=2, every=2))
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-7, 1e-3])
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-4])
+def test_the_error_of_a_timed_run_is_the_larger_of_where_and_when(late: float, off: float) -> None:
+    case = cases.load("bouncing_ball", "linear", t_end=1.0)
+    truth = truth_of(case)
+    run = truth.trajectory
+    events = tuple(replace(e, t=e.t + late * (e.before == Mode.CONTACT)) for e in run.events)
+    moved = replace(run, q=run.q * (1.0 + off), events=events)
+    found = errors(truth, moved, case)
+    assert found["error_times"] == pytest.approx(late, rel=1e-6, abs=1e-12)
+    assert found["error_q"] == pytest.approx(off, rel=1e-6, abs=1e-12)
+    assert found["error"] == max(found["error_q"], found["error_times"] / case.t_end)
+    assert errors(truth, replace(moved, events=moved.events[:-3]), case)["error"] == np.inf
+    assert errors(truth, replace(moved, outcome=Outcome.STEP_LIMIT), case)["error"] == np.inf
 
 
 def test_one_row_a_rung_with_every_error(rows: pd.DataFrame) -> None:

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from resting import FLOOR, LAW, quaternion
+from resting import FLOOR, LAW, apart, quaternion, run
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome, Trajectory
-from crossbody.cases._rotations import differences
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import LEVEL
 
@@ -41,17 +40,6 @@ def can(
     across = 2.0 * np.hypot(q[1] * q[3] + q[0] * q[2], q[2] * q[3] - q[0] * q[1])
     low = HALF * abs(1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2)) + RADIUS * across
     return cases.from_scene(scene, q0=[0.0, 0.0, height + low, *q], v0=v, t_end=t_end)
-
-
-def run(case: Case, profile: str = "compiled", engine: str = "reference", **settings: Any) -> Trajectory:
-    found = engines.load(engine).prepare(case, profile, **settings).run()
-    assert found.outcome is Outcome.FINISHED, found.message
-    return found
-
-
-def apart(case: Case, one: Trajectory, other: Trajectory) -> float:
-    """Return by how much two motions of a case differ at their ends."""
-    return float(differences(one.q[-1:], other.q[-1:], case.quaternions).max())
 
 
 @pytest.mark.parametrize("profile", ["compiled", "cvode", "ida"])

@@ -14,7 +14,7 @@ pin = pytest.importorskip("pinocchio")
 from crossbody.engines._level_machine import EPS, LevelMachine  # noqa: E402 - they import the engine's package
 from crossbody.engines._log import Log  # noqa: E402
 from crossbody.engines.pinocchio._flow import Flow  # noqa: E402
-from crossbody.engines.pinocchio._impulse import ImpulseMachine, sequential, simultaneous  # noqa: E402
+from crossbody.engines.pinocchio._impulse import ImpulseMachine, Instant, sequential, simultaneous  # noqa: E402
 from crossbody.engines.pinocchio._rows import PinRows  # noqa: E402
 from crossbody.engines.pinocchio._scene import World  # noqa: E402
 
@@ -121,6 +121,33 @@ def test_a_held_row_that_would_pull_is_let_go_by_a_strike(b: float, held: tuple[
     assert let_go == {0, 1} - set(held)
     bounced = [p for i, before, _, p in settled.passed if i == 2 and before == COLLISION]
     assert bounced == [pytest.approx(1.0 * (settled.v[2] + 1.0))]
+
+
+def test_what_is_struck_at_once_solves_its_complementarity_problem() -> None:
+    """0 <= p, H v+ + e H v >= 0, and one of both is 0 for every touching row, at random rows and masses."""
+    rng, several = np.random.default_rng(3), 0
+    for _ in range(60):
+        n = int(rng.integers(2, 6))
+        nc = int(rng.integers(2, n + 1))
+        H, e = rng.normal(size=(nc, n)), rng.uniform(0.0, 1.0, nc)
+        its_law, masses = law([1e4] * nc, [0.0] * nc), 10.0 ** rng.uniform(-1.0, 1.0, n)
+        machine = ImpulseMachine(rows(masses, H, np.zeros(nc), its_law, [0.0] * n).rigid(), [1e4] * nc, e.tolist())
+        v = rng.normal(size=n)
+        instant = Instant(machine.rows, np.zeros(n), v.copy(), (FREE,) * nc)
+        instant.touching, before = list(range(nc)), H @ v
+        if not simultaneous(instant, [1e4] * nc, e.tolist()):
+            assert before.min() >= 0.0
+            continue
+        p = np.zeros(nc)
+        for i, _, _, impulse in instant.passed:
+            p[i] += impulse
+        np.testing.assert_allclose(masses * (instant.v - v), H.T @ p, atol=1e-11)
+        parts = H @ instant.v + e * before
+        assert p.min() >= 0.0
+        assert parts.min() >= -1e-9
+        assert np.abs(p * parts).max() < 1e-9
+        several += int((p > 0.0).sum() > 1 and (p == 0.0).any())
+    assert several > 5
 
 
 @pytest.mark.parametrize("rule", [sequential, simultaneous])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -108,6 +110,37 @@ def test_a_dip_inside_one_step_is_found() -> None:
         touched = [e for e in flow.log.events if e.after == CONTACT]
         assert len(touched) == (clearance < 0)
         assert all(abs(e.t - 0.5 + np.sqrt(2e-9 / 9.81)) < 1e-6 for e in touched)
+
+
+RAIL = """<mujoco><worldbody>
+<geom type="capsule" size="0.1 0.3" euler="0 90 0" condim="1" solref="-1e4 -20"/>
+<body><freejoint/><geom type="sphere" size="0.1" mass="1" condim="1" solref="-1e4 -20"/></body>
+</worldbody></mujoco>"""
+
+
+def test_what_flies_freely_past_a_shape_touches_it_where_its_parabola_does(tmp_path: Path) -> None:
+    # Nothing bends a parabola: a step of the integrator is as long as the flight, up, down past the rail and beyond.
+    path, rng, touched = tmp_path / "rail.xml", np.random.default_rng(18), 0
+    path.write_text(RAIL)
+    case = cases.load(str(path))
+    fall = np.array([0.0, 0.0, -9.81])
+    for _ in range(8):
+        place, there = rng.uniform((-0.2, -1.0, -0.5), (0.2, 1.0, 0.5)), rng.uniform(-0.22, 0.22, 3)
+        near = rng.uniform(0.2, 0.8)
+        speed = (there - place) / near - 0.5 * near * fall
+        t = np.linspace(0.0, near + 0.5, 10_001)[:, None]
+        way = place + speed * t + 0.5 * fall * t**2
+        gap = np.linalg.norm(way - np.clip(way[:, :1], -0.3, 0.3) * np.eye(3)[0], axis=1) - 0.2
+        if gap[0] < 0.05 or abs(gap.min()) < 1e-3:
+            continue
+        below = np.flatnonzero(gap < 0.0)
+        q0, v0 = np.array([*place, 1.0, 0.0, 0.0, 0.0]), np.array([*speed, 0.0, 0.0, 0.0])
+        found = run(replace(case, q0=q0, v0=v0, t_end=float(t[-1, 0])))
+        first = [e.t for e in found.events][:1]
+        assert len(first) == bool(len(below)), (place, speed)
+        assert not first or t[below[0] - 1, 0] <= first[0] <= t[below[0], 0]
+        touched += len(first)
+    assert touched > 2
 
 
 @pytest.mark.parametrize("a1", [0.0, 20.0, 100.0, 150.0])

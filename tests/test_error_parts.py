@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Tier, Trajectory
+from crossbody.cases import Case, Mode, Tier, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.reports.judging.comparison import Entry, judged
-from crossbody.reports.judging.parts import Positions, Split, Study, splits
+from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
 from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.runs import jobs
@@ -155,6 +155,37 @@ def test_an_error_that_is_a_cubic_is_laid_exactly_between_samples(case: Case, se
     whole = Positions(case, truth, right)
     error = np.stack([whole.t**k for k in range(4)], axis=1) @ made
     assert whole(cubic(case, other, made)) == pytest.approx(error / whole.scale, abs=1e-12)
+
+
+@pytest.mark.parametrize("stretch", [0.8, 1.25])
+def test_a_run_whose_clock_alone_is_another_has_no_error_between_its_samples(stretch: float) -> None:
+    """Its rates are those of its own clock."""
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    assert ball.closed_form is not None
+    truth = replace(from_run(ball.closed_form(np.linspace(0.0, 1.0, 301)), Tier.A, "exact"), at=ball.closed_form)
+    few = ball.closed_form(np.linspace(0.0, 1.0, 12))
+    last = max(event.t for event in few.events if event.before == Mode.FREE)
+
+    def when(t: Any) -> Any:
+        return stretch * np.minimum(t, last) + np.maximum(t - last, 0.0)
+
+    v = np.where(few.t[:, None] <= last, few.v / stretch, few.v)
+    events = tuple(replace(event, t=float(when(event.t))) for event in few.events)
+    whole = Positions(ball, truth, truth.trajectory)
+    falls = whole.t <= few.t[few.t < np.sqrt(2.0 / 9.81)].max()
+    assert np.abs(whole(replace(few, t=when(few.t), v=v, events=events))[falls]).max() < 1e-9
+
+
+def test_without_the_instant_of_one_event_there_are_no_parts_of_their_errors() -> None:
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    assert ball.closed_form is not None
+    truth = replace(from_run(ball.closed_form(np.linspace(0.0, 1.0, 301)), Tier.A, "exact"), at=ball.closed_form)
+    run = truth.trajectory
+    assert Events(ball, truth, run).whole.size
+    for k in range(len(run.events)):
+        if Mode.FREE in (run.events[k].before, run.events[k].after) and run.events[k].before != Mode.BALLISTIC:
+            lost = (*run.events[:k], replace(run.events[k], t=np.nan), *run.events[k + 1 :])
+            assert not Events(ball, truth, replace(run, events=lost)).whole.size, k
 
 
 def test_turns_are_told_by_their_vectors() -> None:

@@ -9,7 +9,7 @@ from rig_data import channels, log_of, needs_pendulum, pendulum, run_as_log
 from crossbody import cases, engines, hw
 from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw import models
-from crossbody.hw.fitting.derivative import Exact
+from crossbody.hw.fitting.derivative import Exact, apart
 from crossbody.hw.models._contract import Segment
 from crossbody.hw.replaying.windows import windows
 
@@ -33,6 +33,26 @@ def swing(noise: float, seed: int, seconds: float = 4.0, rates: float = 0.0) -> 
 
 
 FREE = ("k1", "s1", "k2", "s2", "a1", "I2", "L1", "gravity")
+
+
+@pytest.mark.parametrize("low", [-np.inf, 0.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_column_that_is_off_is_found_by_differences_within_its_bounds(seed: int, low: float) -> None:
+    """Those of second order are exact for a quadratic, central or forward; below its bound nothing is evaluated."""
+    rng, step, asked = np.random.default_rng(seed), 1e-2, list[float]()
+    x, A, B = np.append(rng.uniform(0.5, 1.0, 2), 1e-3), rng.normal(size=(7, 3)), rng.normal(size=(7, 3, 3))
+
+    def residual(at: np.ndarray) -> np.ndarray:
+        asked.append(float(at[2]))
+        return A @ at + np.einsum("nij,i,j->n", B, at, at)
+
+    J = A + np.einsum("nij,j->ni", B + B.swapaxes(1, 2), x)
+    assert apart(residual, x, J, 2, step, low) < 1e-10
+    assert apart(residual, x, 0.99 * J, 2, step, low) == pytest.approx(0.01 / 0.99, rel=1e-6)
+    assert apart(residual, x, np.zeros_like(J), 2, step, low) == 1.0
+    assert apart(lambda _: np.zeros(7), x, np.zeros_like(J), 2, step, low) == 0.0
+    assert min(asked) >= low
+    assert (min(asked) < 0.0) == np.isinf(low)
 
 
 @pytest.mark.parametrize("starts", [False, True])

@@ -13,6 +13,7 @@ import pytest
 from crossbody import hw
 from crossbody.cases import FormatUnavailable, LogFormatError, UnknownName
 from crossbody.hw import formats
+from crossbody.hw.formats._mat_elements import described, starts
 
 CASES = list(log_files.WRITERS)
 NASTY = np.array([5e-324, -0.0, 1.7976931348623157e308, 0.1, 1 / 3, -np.pi, 2.0**-1022, 1e22, 123456789.125, 0.0])
@@ -36,6 +37,34 @@ def test_a_table_comes_back_to_the_last_bit(case: str, tmp_path: Path) -> None:
         assert kept.tobytes() == data[name].astype(np.float64).tobytes(), name
     assert log.provenance.format == log_files.WRITERS[case][0]
     assert log.provenance.rows == 1000
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_variables_of_a_mat_file_are_described_as_they_were_written(seed: int, tmp_path: Path) -> None:
+    """Of names of any length, kinds and shapes, unfolded or not: small elements keep their data in their own tags."""
+    from scipy.io import savemat, whosmat
+
+    rng, kinds = np.random.default_rng(seed), ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?")
+    words = ["".join(rng.choice(list("abcxyz_9"), n - 1)) for n in rng.choice(np.arange(1, 32), 6, replace=False)]
+    held = {f"v{word}": np.ones(rng.integers(0, 4, rng.integers(2, 4)), rng.choice(kinds)) for word in words}
+    path = tmp_path / "log.mat"
+    savemat(path, held | {"inside": {"a": np.eye(2)}}, do_compression=bool(seed % 2))
+    found = [described(path, start) for start in starts(path)]
+    assert found == [(name, tuple(shape), kind) for name, shape, kind in whosmat(path)]
+
+
+@pytest.mark.parametrize("case", ["mcap", "mcap-json"])
+def test_the_two_clocks_of_a_message_are_told_apart(case: str, tmp_path: Path) -> None:
+    late = np.random.default_rng(5).integers(1, 900_000, 50)  # ns, from when it was sent to when it was written
+    data = log_files.table(50)
+    writer = {"mcap": log_files.write_mcap, "mcap-json": log_files.write_mcap_json}[case]
+    writer(tmp_path / "log.mcap", data, late)
+    signal = '[sensors.angle]\ncolumn = "/rig.angle"\nunit = "rad"\n'
+    written, sent = (
+        hw.read(tmp_path / "log.mcap", hw.parse_columns(f'[time]\ncolumn = "/rig.{clock}"\nunit = "ns"\n{signal}')).time
+        for clock in ("log_time", "publish_time")
+    )
+    np.testing.assert_allclose(written - sent, 1e-9 * late, rtol=0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize("case", CASES)

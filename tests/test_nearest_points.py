@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,8 +13,9 @@ from scipy.spatial.transform import Rotation
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES
-from crossbody.engines._contacts import Contacts, Pose, _placed
-from crossbody.reports.scenes._meetings import meeting
+from crossbody.engines._contacts import FAR, Contacts
+from crossbody.engines._nearest import Pose
+from crossbody.reports.scenes.scene import _meeting
 
 TURN, DRAWS, POINTS = 1e-6, 40, 4000
 GRID = 0.03
@@ -45,8 +47,8 @@ def turned(along: Floats, about: Floats, pose: Pose, step: float) -> Pose:
 
 def rate(met: Contacts, poses: dict[str, Pose], k: int, body: str, change: Callable[[Pose, float], Pose]) -> float:
     """Rate of gap k while a body moves."""
-    gaps = [met.touches((poses | {body: change(poses[body], step)}).__getitem__)[k].gap for step in (TURN, -TURN)]
-    return (gaps[0] - gaps[1]) / (2.0 * TURN)
+    gaps = [met.touches((poses | {body: change(poses[body], step)}).__getitem__, [k]).gap for step in (TURN, -TURN)]
+    return float(gaps[0][0] - gaps[1][0]) / (2.0 * TURN)
 
 
 @pytest.mark.parametrize("types", PLACES, ids=":".join)
@@ -55,26 +57,35 @@ def test_a_gap_changes_along_its_normal_and_by_no_turn_about_its_point(types: tu
     rng = np.random.default_rng(0)
     for _ in range(DRAWS):
         met, poses = drawn(rng, types)
-        for k, touch in enumerate(met.touches(poses.__getitem__)):
-            if not touch.normal.any():  # capsules that cross have one row, and one that is none
+        found = met.touches(poses.__getitem__)
+        for k, (normal, point) in enumerate(zip(found.normal, found.point, strict=True)):
+            if not normal.any():  # capsules that cross have one row, and one that is none
                 assert types == ("capsule", "capsule")
                 assert k == 1
+                assert found.gap[k] == FAR
                 continue
-            assert abs(np.linalg.norm(touch.normal) - 1.0) < 1e-12
-            for body, sign in ((touch.first, -1.0), (touch.second, 1.0)):
-                along = rng.normal(size=3)
+            assert abs(np.linalg.norm(normal) - 1.0) < 1e-12
+            for number, sign in ((found.first[k], -1.0), (found.second[k], 1.0)):
+                along, body = rng.normal(size=3), met.bodies[number]
                 shifted = rate(met, poses, k, body, partial(moved, along))
-                assert shifted == pytest.approx(sign * (touch.normal @ along), abs=1e-6)
-                assert abs(rate(met, poses, k, body, partial(turned, along, touch.point))) < 1e-6
+                assert shifted == pytest.approx(sign * (normal @ along), abs=1e-6)
+                assert abs(rate(met, poses, k, body, partial(turned, along, point))) < 1e-6
+
+
+def placed(shape: Shape, pose: Pose) -> Pose:
+    """Pose of a shape in the world by that of its body."""
+    return pose[0] @ Rotation.from_quat(np.roll(shape.orientation, -1)).as_matrix(), pose[1] + pose[0] @ shape.position
 
 
 def surface(rng: np.random.Generator, shape: Shape) -> Floats:
-    """Points of the surface of a box or cylinder in its axes, or of the axis of a capsule."""
+    """Points of the surface of a box, cylinder or ellipsoid in its axes, or of the axis of a capsule."""
     size, x = np.array(shape.size), rng.uniform(-1.0, 1.0, (POINTS, 3))
     if shape.type == "sphere":
         return np.zeros((1, 3))
     if shape.type == "capsule":
         return np.linspace(-size[1], size[1], 400)[:, None] * np.array([0.0, 0.0, 1.0])
+    if shape.type == "ellipsoid":
+        return size * x / np.linalg.norm(x, axis=1, keepdims=True)
     if shape.type == "box":
         side = rng.integers(3, size=POINTS)
         x[np.arange(POINTS), side] = np.sign(x[np.arange(POINTS), side])
@@ -98,35 +109,56 @@ def test_no_point_of_a_surface_is_nearer(types: tuple[str, str]) -> None:
     rng, within = np.random.default_rng(1), 0
     for _ in range(DRAWS):
         met, poses = drawn(rng, types)
-        contact, touch = met.all[0], min(met.touches(poses.__getitem__), key=lambda touch: touch.gap)
+        contact, gap = met.all[0], float(met.touches(poses.__getitem__).gap.min())
         one, two = contact.first, contact.second
-        (ours, x), (theirs, y) = (_placed(shape, met.shapes[shape.name][1], poses[shape.body]) for shape in (one, two))
+        (ours, x), (theirs, y) = (placed(shape, poses[shape.body]) for shape in (one, two))
         mine, other = surface(rng, one) @ ours.T + x, surface(rng, two) @ theirs.T + y
         apart = float(np.linalg.norm(mine[:, None, :] - other[None, :, :], axis=2).min())
         deep = inside(two, theirs.T @ (x - y))
         rounded = one.size[0] + (two.size[0] if two.type in ("sphere", "capsule") else 0.0)
-        found = touch.gap + contact.pair.margin + rounded  # of a centre or axis
+        found = gap + contact.pair.margin + rounded  # of a centre or axis
         assert -1e-9 < apart - abs(found) < GRID
         assert (found < 0.0) == deep
         within += deep
     assert within > 3 or two.type in ("sphere", "capsule")
 
 
-@pytest.mark.parametrize("types", PLACES, ids=":".join)
-def test_forces_are_drawn_where_an_engine_finds_the_contact(types: tuple[str, str]) -> None:
-    """At its point, or of a sphere at its own surface; along its normal, unless the sphere's centre is inside."""
-    rng = np.random.default_rng(2)
+@pytest.mark.parametrize("types", [types for types in PLACES if "plane" in types], ids=":".join)
+def test_no_point_of_a_surface_is_lower(types: tuple[str, str]) -> None:
+    """The least gap over a plane is the height of the lowest point of the surface: sampled, to its grid."""
+    rng = np.random.default_rng(3)
     for _ in range(DRAWS):
         met, poses = drawn(rng, types)
-        contact = met.all[0]
-        pair = (contact.first, contact.second)
-        turned_at = [_placed(shape, met.shapes[shape.name][1], poses[shape.body]) for shape in pair]
-        placed = [(shape, (p[None], R[None])) for shape, (R, p) in zip(pair, turned_at, strict=True)]
-        for k, touch in enumerate(met.touches(poses.__getitem__)):
-            gap = touch.gap + contact.pair.margin
-            if (contact.first.type == "sphere" and gap < -contact.first.size[0]) or not touch.normal.any():
-                continue
-            at, normal = meeting(placed[0], placed[1], k)
-            assert normal[0] == pytest.approx(touch.normal, abs=1e-9)
-            off = -gap * touch.normal if contact.first.type == "sphere" else np.zeros(3)
-            assert at[0] == pytest.approx(touch.point + off, abs=1e-9)
+        contact, gap = met.all[0], float(met.touches(poses.__getitem__).gap.min())
+        (floor, x), (theirs, y) = (placed(shape, poses[shape.body]) for shape in (contact.first, contact.second))
+        heights = (surface(rng, contact.second) @ theirs.T + y - x) @ floor[:, 2]
+        rounded = contact.second.size[0] if types[1] in ("sphere", "capsule") else 0.0
+        assert -1e-9 < heights.min() - rounded - (gap + contact.pair.margin) < GRID
+
+
+@pytest.mark.parametrize("types", PLACES, ids=":".join)
+def test_instants_and_pairs_are_computed_at_once_as_one_by_one(types: tuple[str, str]) -> None:
+    """Many pairs, of many instants, in every engine and in pictures: what one pair alone gives at one instant."""
+    rng = np.random.default_rng(2)
+    scenes = [drawn(rng, types) for _ in range(4)]
+    shapes = [shape for met, _ in scenes for shape in (met.all[0].first, met.all[0].second)]
+    renamed = [replace(shape, name=f"{i}", body=f"{i}") for i, shape in enumerate(shapes)]
+    bodies = tuple(Body(name=one.body, mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)) for one in renamed)
+    pairs = tuple(Pair(name=f"{k}", first=f"{2 * k}", second=f"{2 * k + 1}", margin=0.01) for k in range(4))
+    all_of_them = Contacts(Scene(bodies=bodies, shapes=tuple(renamed), pairs=pairs))
+    order = [poses[shape.body] for met, poses in scenes for shape in (met.all[0].first, met.all[0].second)]
+    several = {f"{i}": tuple(np.stack([part, order[i - i % 2 + 1 - i % 2][j]]) for j, part in enumerate(pose))
+               for i, pose in enumerate(order)}  # fmt: skip
+    found = all_of_them.touches(several.__getitem__)
+    for k, (met, poses) in enumerate(scenes):
+        one = met.touches(poses.__getitem__)
+        mine = [row for row, (contact, _) in enumerate(all_of_them.rows) if contact == k]
+        for name in ("gap", "normal", "point"):
+            np.testing.assert_allclose(getattr(found, name)[0][mine], getattr(one, name), atol=1e-15)
+        swapped = {"one": poses["two"], "two": poses["one"]}
+        turned_round = met.touches(swapped.__getitem__)
+        np.testing.assert_allclose(found.gap[1][mine], turned_round.gap, atol=1e-15)
+        drawn_at = _meeting(met.all[0], {name: (p[None], R[None]) for name, (R, p) in poses.items()})
+        there = np.isfinite(drawn_at[0][0])
+        np.testing.assert_allclose(drawn_at[0][0][there] - met.all[0].pair.margin, one.gap[there], atol=1e-15)
+        np.testing.assert_allclose(drawn_at[2][0][there], one.point[there], atol=1e-15)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from crossbody.cases import OutputError, load
+from crossbody.cases import Outcome, OutputError, Trajectory, load
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.runs import store
 from crossbody.reports.runs.output import MARKER, check, folder, replace_text
 from crossbody.reports.runs.store import Trace, save
 from crossbody.reports.runs.store import load as load_trace
@@ -110,3 +113,24 @@ def test_a_motion_comes_back_bit_for_bit(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.run.ledger.contact, run.ledger.contact)
     assert back.truth is not None
     np.testing.assert_array_equal(back.truth.q, run.q)
+
+
+def test_a_motion_is_read_back_within_the_memory_that_its_numbers_allow(tmp_path: Path) -> None:
+    """A robot on hundreds of rows, long columns of zeros in a small file: what Arrow has at once is in the bound."""
+    n, rows = 20_000, 100
+    zeros = np.zeros((n, rows))
+    run = Trajectory(
+        t=np.linspace(0.0, 1.0, n), q=zeros[:, :1], v=zeros[:, :1], gap=zeros, lam=zeros, energy=zeros[:, :2],
+        mode=zeros.astype(np.int8), outcome=Outcome.FINISHED,
+    )  # fmt: skip
+    about = {"case": "a", "variant": "b", "engine": "c", "profile": "d", "coordinates": ["q"],
+             "contacts": [str(i) for i in range(rows)]}  # fmt: skip
+    path = tmp_path / "long.parquet"
+    save(path, Trace(about=about, run=run, truth=run))
+    code = (
+        "import sys; from pathlib import Path; from crossbody.reports.runs import store; "
+        f"store.MOTION = {store.PEAK} * 8 * {n} * ({2 * (3 * rows + 4) + 1}); "
+        "print(store.load(Path(sys.argv[1])).run.lam.shape)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"({n}, {rows})"

@@ -14,6 +14,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Trajectory
+from crossbody.cases._maze.geometry import maze_of
 from crossbody.reports import scenes
 from crossbody.reports.metrics._impulse import with_collisions
 from crossbody.reports.pages.case_page import PLOTTED
@@ -145,6 +146,28 @@ def test_a_drawn_force_opens_the_gap_of_its_row(name: str) -> None:
         alone = np.abs(np.delete(rates, body, axis=1)).max(axis=(1, 2), initial=0.0) < 1e-9
         assert np.abs(power[alone]).max() > 0.1
         assert np.allclose(power[alone], lam[row] * gap[alone, row], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_drawn_force_of_a_tip_pushes_the_ball_away_from_its_drawn_end(seed: int) -> None:
+    """As hard as its multiplier says, at any angle of the maze, and whichever wall the tip is of."""
+    case, rng = cases.load("ball_maze", "solve"), np.random.default_rng(seed)
+    scene, maze = scenes.load(case.mechanism), maze_of(case.parameters)
+    ring = maze.rings[int(rng.choice([i for i, ring in enumerate(maze.rings) if ring.gaps]))]
+    gap, end = int(rng.integers(ring.gaps)), int(rng.integers(2))
+    theta, lean = rng.uniform(-np.pi, np.pi), rng.uniform(-1.2, 1.2)
+    angle = theta + ring.tips(gap)[end]
+    into = angle + (0.5 - end) * np.pi + lean  # towards the gap
+    ball = ring.middle * np.array([np.cos(angle), np.sin(angle)])
+    ball += (ring.cap + maze.ball) * np.array([np.cos(into), np.sin(into)])
+    q, lam = np.array([theta, *ball, 0.0]), rng.uniform(1.0, 2.0, len(case.contacts))
+    arrows, pose = scene.arrows(q[None], lam[None], case.parameters)[0], scene.poses(q[None], case.parameters)[0]
+    walls = [shape for shape in scene.stage(case.parameters).bodies[0] if "points" in shape]
+    for row in (1, 2, 4, 5):
+        force = arrows[row, 2:]
+        assert np.linalg.norm(force) == pytest.approx(lam[row])
+        away, near = (from_outline(walls, pose[0], tuple(ball + s * 1e-4 * force / lam[row])) for s in (1.0, -1.0))
+        assert (away - near) / 2e-4 == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_drawn_force_of_a_delta_robot_closes_its_loop() -> None:

@@ -193,6 +193,24 @@ def test_touches_between_steps_are_put_in_where_free_flight_has_them() -> None:
     assert [(e.t, e.after) for e in run.events] == [(run.t[2], Mode.CONTACT)]
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_touches_and_releases_between_steps_are_told_where_they_are(seed: int) -> None:
+    """Whichever sign rounding gives the gap at the instant that was put in."""
+    rng, scene = np.random.default_rng(seed), line(drop(t_end=0.9))
+    touch, contact = np.sqrt(2.0 / G), np.pi / np.sqrt(A0)
+    inside = touch + contact * np.sort(rng.uniform(0.05, 0.95, 6))
+    t = np.concatenate(([0.0], np.sort(rng.uniform(0.0, touch, 8)), inside, np.sort(rng.uniform(0.5, 0.9, 5))))
+    q = np.array([[height(x)] for x in t])
+    s = t - touch
+    v = np.where(
+        s < 0.0, -G * t, np.where(s < contact, -touch * G * np.cos(np.sqrt(A0) * s), G * (touch - s + contact))
+    )
+    run = sampled(scene, t, q, v[:, None], scene.memoryless(q, v[:, None]), wall_s=0.0, steps=len(t) - 1)
+    assert [e.after for e in run.events] == [Mode.CONTACT, Mode.FREE]
+    assert [e.t for e in run.events] == pytest.approx([touch, touch + contact], abs=1e-14)
+    assert max(np.abs(run.gap[run.t == e.t]).max() for e in run.events) < 1e-14
+
+
 def test_a_state_that_leaves_the_scene_has_diverged() -> None:
     scene, q = line(drop()), np.array([0.0])
     assert ended(scene, q, np.array([-4.0])) is Outcome.FINISHED

@@ -139,6 +139,17 @@ def test_an_input_acts_when_it_was_true(late: int) -> None:
     np.testing.assert_array_equal(found, told[np.clip(np.arange(len(told)) + late, 0, len(told) - 1)])
 
 
+@pytest.mark.parametrize(("told", "more"), [(0.0, 0.0), (0.02, 0.0), (0.0, 0.02), (0.015, 0.01), (0.0, -0.01)])
+def test_a_window_starts_where_the_motion_was_and_not_where_a_late_sensor_reads(told: float, more: float) -> None:
+    t = np.linspace(0.0, 3.0, 3001)
+    late = channels("coordinates", "rad", {"th1": np.sin(2.0 * (t - told - more))})
+    log = log_of(t, tuple(replace(one, delay=told) for one in late))
+    for window in windows(log, hw.models.load("single_pendulum"), restart=0.5, delay=more):
+        begun = window.t[0]
+        assert window.segment.y[0] == pytest.approx(np.sin(2.0 * begun), abs=2.1 * (told + more) ** 2 + 1e-6)
+        np.testing.assert_allclose(window.age[:, 0], window.t - begun - told - more, atol=1e-12)
+
+
 def hw_error() -> type[Exception]:
     from crossbody.cases import UnknownName
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
-from resting import FLOOR, LAW, plate
+import resting
+from resting import FLOOR, LAW, apart, plate
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Mode, Outcome, Trajectory
-from crossbody.cases._rotations import differences
+from crossbody.cases import Case, Mode, Outcome
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.reference import recheck
 
@@ -19,17 +20,7 @@ SQUARE = np.array([(x, y, 0.0) for x in (-0.1, 0.1) for y in (-0.1, 0.1)])
 MIDDLES = np.array([(0.0, 0.1, 0.0), (0.1, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.0, -0.1, 0.0)])
 SOLVERS = ("compiled", "cvode", "ida")
 WEIGHT = 9.81
-
-
-def run(case: Case, profile: str = "compiled", **settings: Any) -> Trajectory:
-    found = engines.load("reference").prepare(case, profile, **{"rtol": 1e-10, **settings}).run()
-    assert found.outcome is Outcome.FINISHED, found.message
-    return found
-
-
-def apart(case: Case, one: Trajectory, other: Trajectory) -> float:
-    """Return by how much two motions of a case differ at their ends."""
-    return float(differences(one.q[-1:], other.q[-1:], case.quaternions).max())
+run = partial(resting.run, rtol=1e-10)
 
 
 @pytest.mark.parametrize("profile", SOLVERS)

@@ -91,3 +91,24 @@ def test_both_witnesses_of_a_random_scene_agree(seed: int) -> None:
     (row,) = truth_row(case, found, "")
     assert "they share the scene alone" in row.why
     assert row.verdict == Word.WITHIN, row.why
+
+
+@pytest.mark.parametrize("seed", [5, 7])
+@pytest.mark.parametrize(
+    ("engine", "profile"),
+    [
+        ("reference", "compiled"),
+        ("reference", "cvode"),
+        pytest.param("pinocchio", "law", marks=pytest.mark.slow),
+    ],
+)
+def test_a_string_that_cannot_get_shorter_ends_a_motion_with_a_sentence(seed: int, engine: str, profile: str) -> None:
+    """Its law pulls on where it is square to all that could shorten it: velocities have no bound, in every engine."""
+    from crossbody import engines
+    from crossbody.cases import Outcome
+
+    scene = random_scene(seed, bodies=3).replace(loops=(), pairs=(), shapes=())
+    run = engines.load(engine).prepare(case_of(scene, t_end=0.5), profile).run()
+    assert run.outcome is Outcome.ILL_POSED
+    assert run.t[-1] == pytest.approx({5: 0.02570867479, 7: 0.00196796183}[seed], rel=1e-6)
+    assert "ardly anything moves" in run.message

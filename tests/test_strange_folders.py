@@ -8,7 +8,6 @@ import random
 import re
 import shutil
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ import pytest
 from ladder import ladder
 
 from crossbody.cases import OutputError, load
-from crossbody.hw.formats._budget import Budget
 from crossbody.reports.cli import main
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
@@ -124,7 +122,7 @@ def test_a_motion_that_unfolds_to_too_much_is_refused(tmp_path: Path, monkeypatc
     path = tmp_path / "traces" / "0000.parquet"
     pq.write_table(pa.table({f"q{i}": pa.nulls(1 << 20, pa.float64()) for i in range(10)}), path)
     assert path.stat().st_size < 30_000
-    monkeypatch.setattr(store, "Budget", partial(Budget, memory=50_000_000))
+    monkeypatch.setattr(store, "MOTION", 50_000_000)
     with pytest.raises(OutputError, match="it needs 84 MB in memory"):
         store.load(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import subprocess
@@ -28,7 +29,7 @@ from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
 from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, row
 from crossbody.reports.sweep.map import MAP, stability_map, summary
-from crossbody.reports.sweep.measure import Error
+from crossbody.reports.sweep.measure import Asked, Error, error, instants
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.together import together
@@ -256,6 +257,29 @@ def test_the_error_of_a_wrong_run_is_seen(fake: Callable[..., Spec]) -> None:
     assert missing["error"] < 1e-13
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_one_wrong_coordinate_of_several_is_the_error_of_a_run(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    case = cases.load("newtons_cradle", "sliders", n=int(rng.integers(2, 6)))
+    assert case.closed_form is not None
+    run = case.closed_form(instants(case.t_end))
+    asked = Asked(limit=1.0, near=lambda: case)
+    assert error(case, run, asked).value < 1e-13
+    for k in range(run.q.shape[1]):
+        q = run.q.copy()
+        q[:, k] += 1e-3 * np.abs(run.q).max()
+        assert error(case, replace(run, q=q), asked).value == pytest.approx(1e-3, rel=1e-6), k
+
+
+def test_within_is_a_run_that_ended_well_with_an_error_that_is_known_and_small() -> None:
+    values, open_, tiers = (math.nan, math.inf, 1e-3, 1e-9), (math.nan, 1e-3, 1e-9), ("", "C")
+    for value, left_open, tier, outcome in itertools.product(values, open_, tiers, Outcome):
+        ended = Tried(outcome=outcome.value)
+        said = _verdict(drawn()[0], ended, Error(value=value, tier=tier), 1e-6, left_open, [])[0]
+        sound = outcome is Outcome.FINISHED and not left_open > 1e-5
+        assert (said == Word.WITHIN) == (sound and tier == "C" and value == 1e-9)
+
+
 def test_a_release_without_a_trace_in_the_motion_is_rounding_and_one_with_it_is_an_error(
     fake: Callable[..., Spec],
 ) -> None:
@@ -297,6 +321,45 @@ def test_a_truth_is_asked_for_no_longer_than_it_is_sharper_than_the_tolerance(
     assert "diverges" in row["why"]
     early = execute(fake(lambda: exact(q=1.01 * exact().q)))
     assert early["error"] == pytest.approx(0.01, rel=0.05)
+
+
+@pytest.mark.parametrize("steps", [1, 100, 10_000, 1_000_000])
+@pytest.mark.parametrize(("times", "excused"), [(0.5, False), (2.0, True)])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_what_a_truth_must_be_known_to_falls_with_the_root_of_the_steps(
+    steps: int, times: float, excused: bool, sign: float
+) -> None:
+    """So many errors of the size of the tolerance add up to the limit: a neighbour that parts by more excuses."""
+    case, limit = cases.load("bouncing_ball", "linear", t_end=0.4), 1e-2  # it falls, and touches nothing
+    assert case.closed_form is not None
+    motion = case.closed_form(np.linspace(0.0, case.t_end, 50))
+    late = motion.t[:, None] > 0.2
+    apart = times * limit / math.sqrt(max(100, steps)) * float(np.abs(motion.q).max())
+
+    def moved(t: Any) -> Trajectory:
+        run = case.closed_form(t)  # type: ignore[misc]
+        return replace(run, q=run.q + sign * apart * (run.t[:, None] > 0.2))
+
+    asked = Asked(limit=limit, near=lambda: replace(case, closed_form=moved))
+    found = error(case, replace(motion, q=np.where(late, 2.0, 1.0) * motion.q, steps=steps), asked)
+    assert (found.value < 1e-13) == excused
+
+
+@pytest.mark.parametrize("by", [-1e-2, 1e-2])
+def test_a_truth_whose_touch_comes_earlier_or_later_beside_it_excuses_that_touch(by: float) -> None:
+    case = cases.load("bouncing_ball", "linear", t_end=0.6)
+    assert case.closed_form is not None
+    motion = case.closed_form(np.linspace(0.0, case.t_end, 50))
+    touches = [event.t for event in motion.events if event.before == Mode.FREE]
+
+    def shifted(t: Any) -> Trajectory:
+        run = case.closed_form(t)  # type: ignore[misc]
+        return replace(run, events=tuple(replace(event, t=event.t + by) for event in run.events))
+
+    wrong = replace(motion, q=np.where(motion.t[:, None] > touches[0] + 0.02, 2.0, 1.0) * motion.q)
+    found = error(case, wrong, Asked(limit=1e-3, near=lambda: replace(case, closed_form=shifted)))
+    assert found.until == pytest.approx(touches[0] + min(by, 0.0), abs=1e-12)
+    assert found.value < 1e-13
 
 
 def test_a_slow_touch_does_not_set_the_clock_of_what_moves_fast() -> None:
@@ -440,6 +503,26 @@ def test_a_failure_keeps_only_what_it_needs(needs: set[str], left: Mapping[str, 
     assert all(small[name] == pytest.approx(value, rel=0.1) for name, value in left.items())
     assert fails(small)
     assert tries < 60
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_parameter_is_moved_to_within_half_of_the_way_that_it_may_go(seed: int) -> None:
+    """As a part of the way to its default, of its logarithm where both are above 0; numbers keep two digits."""
+    rng = np.random.default_rng(seed)
+    ratio = bool(rng.integers(2))
+    a, b = 10.0 ** rng.uniform(-3.0, 3.0, 2) if ratio else rng.uniform(-9.0, 9.0, 2) * (1.0, -1.0)
+    scaled: Callable[[float], float] = math.log if ratio else float
+    needs = float(rng.uniform(0.0, 1.0))
+
+    def part(x: float) -> float:
+        return (scaled(x) - scaled(b)) / (scaled(a) - scaled(b))
+
+    small, tries = shrink({"x": a}, {"x": b}, lambda given: "x" in given and part(given["x"]) >= needs)
+    rounding = 0.06 if ratio else 0.06 * abs(small["x"])
+    wanted = next((0.5**k for k in range(6, -1, -1) if 0.5**k >= needs), 1.0)
+    assert needs <= part(small["x"])
+    assert part(small["x"]) <= 2.0 * wanted * (wanted < 1.0) + (wanted == 1.0) + rounding / abs(scaled(a) - scaled(b))
+    assert tries < 20
 
 
 def test_a_failure_that_does_not_repeat_stays_as_it_came() -> None:

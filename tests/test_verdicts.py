@@ -12,9 +12,9 @@ import pytest
 from crossbody import cases as cases_
 from crossbody import engines
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
-from crossbody.cases._defaults import default_limits, limits_of
-from crossbody.cases.files.case import AS_IT_STANDS, AT_STEPS
-from crossbody.reports.judging.audit import AuditRow, audit, difference
+from crossbody.cases._defaults import limits_of
+from crossbody.cases.files.case import AS_IT_STANDS
+from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
@@ -233,6 +233,31 @@ def test_two_truths_must_agree_to_a_multiple_of_the_tolerance(
     assert row.verdict == word
 
 
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.999])
+def test_a_source_that_ended_early_agrees_as_far_as_it_went(share: float, case: Case, motion: Trajectory) -> None:
+    at, ledger = motion.t <= share * case.t_end, motion.ledger
+    short = replace(
+        motion, ledger=None, outcome=Outcome.STEP_TOO_SMALL,
+        **{name: getattr(motion, name)[at] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")},
+        events=tuple(event for event in motion.events if event.t <= share * case.t_end),
+    )  # fmt: skip
+    assert ledger is None or len(ledger.input) == len(motion.t)
+    found = _held_against(replace(truth_of(case), trusted=math.inf), short, case, 1e-9)
+    assert found.trusted <= share * case.t_end
+    (row,) = truth_row(case, found, "")
+    assert row.verdict == Word.OUTSIDE
+    assert row.compared <= share
+
+
+@pytest.mark.parametrize(("end", "reached"), [(0.0, False), (0.5, False), (1.0 - 1e-6, False), (1.0 - 1e-12, True),
+                                              (1.0 + 1e-12, True), (1.0 + 1e-6, False), (2.0, False)])  # fmt: skip
+def test_a_record_ends_at_the_horizon_whatever_it_says_of_itself(
+    end: float, reached: bool, case: Case, motion: Trajectory
+) -> None:
+    rows = compare(case, [Entry(engine="fake", profile="short", run=replace(motion, t=end * motion.t))])
+    assert (word(rows, "finished") == Word.WITHIN) == reached
+
+
 @pytest.mark.parametrize("change", [{"parameters": {"height": 2.0}}, {"settings": {"rtol": 1e-3}}])
 def test_what_was_stored_of_other_parameters_or_settings_is_not_taken(change: dict[str, Any]) -> None:
     engine = engines.load("reference")
@@ -277,6 +302,18 @@ def test_a_number_that_is_missing_is_expected_only_where_it_was_missing_before(c
         assert {row.metric: row.verdict for row in rows}["energy_integrator"] == Word.OUTSIDE
 
 
+@pytest.mark.parametrize("name", ["bouncing_ball", "newtons_cradle", "soft_contact"])
+def test_the_audit_looks_where_every_contact_is_entered(name: str) -> None:
+    case = load(name)
+    theirs = engines.load("reference").prepare(case, "compiled").audit()
+    at = states(case, theirs)
+    rows = case.law.unilateral
+    assert len(at) == 20
+    for q, v in at:
+        assert (theirs["gap"](q)[rows] < 0.0).all()
+        assert (theirs["H"](q)[rows] @ v < 0.0).all()
+
+
 @pytest.mark.parametrize(("off", "same"), [(1e-12, True), (1e-8, False)])
 def test_the_audit_allows_rounding_alone(off: float, same: bool, case: Case) -> None:
     mine = {**PHYSICS, "M": lambda q: np.array([[1.0 + off]])}
@@ -306,8 +343,8 @@ def test_the_largest_difference_counts() -> None:
     assert difference([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]) == 0.25
 
 
-@pytest.mark.parametrize("metric", ["start_error", "mode_residual"])
-def test_no_known_property_explains_where_a_run_starts_and_modes_that_no_event_left(metric: str) -> None:
+@pytest.mark.parametrize("metric", ["start_error", "mode_residual", "event_gap"])
+def test_no_known_property_explains_what_a_run_says_of_itself(metric: str) -> None:
     for each in (load(name, variant) for name in cases_.names() for variant in cases_.variants(name)):
         limits = limits_of(each)
         for one in limits:
@@ -326,7 +363,7 @@ def test_every_case_is_limited_in_all_that_it_has() -> None:
         "rate_residual",
     }
     rows = {"gap_residual", "mode_residual", "law_residual", "lam_impulse_path", "contact_work"}
-    opening = {"gap_error", "complementarity", "event_times", "mode_times", "touch_count", "release_count"}
+    opening = {"gap_error", "event_gap", "complementarity", "event_times", "mode_times", "touch_count", "release_count"}
     for name in cases_.names():
         for variant in cases_.variants(name):
             each = load(name, variant)
@@ -346,12 +383,3 @@ def test_a_file_as_it_stands_may_count_no_touches(profile: str, word: Word, case
     entry = Entry(engine="mujoco", profile=profile, run=silent)
     rows = judged(replace(case, limits=AS_IT_STANDS), [entry], truth_of(case), "")
     assert {row.metric: row.verdict for row in rows}["event_times"] == word
-
-
-def test_limits_of_matched_scenes_are_those_of_all_engines_with_their_own_reason(case: Case) -> None:
-    everyone = {limit.metric: limit.value for limit in default_limits(case)}
-    for limit in AT_STEPS:
-        assert limit.value == everyone[limit.metric]
-        found = limit_for((*default_limits(case), *AT_STEPS), limit.metric, "mujoco", "matched")
-        assert found is not None
-        assert "at the ends of steps" in found.why

@@ -18,10 +18,11 @@ from crossbody.cases._rotations import normalised
 from crossbody.cases.files.assemble import assembled
 from crossbody.cases.files.controls import pushed, read_control, read_controls, under
 from crossbody.cases.files.reading import findings_of, model_of, scene_of
+from crossbody.cases.files.text import check_text
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import contacts
 
-REFERENCE_POSE = "reference"
+REFERENCE_POSE, UNNAMED = "reference", "scene"
 OF_THE_FILE = -1.0
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
@@ -51,7 +52,8 @@ class FileCase:
 
     @cached_property
     def model(self) -> Any:
-        """MuJoCo's model of the whole file."""
+        """MuJoCo's model of the whole file, whose text is looked at here, once."""
+        check_text(self.path)
         return model_of(self.path)
 
     @cached_property
@@ -64,12 +66,13 @@ class FileCase:
         """Return the case of one keyframe."""
         index = list(self.VARIANTS).index(variant) if self.model.nkey else -1
         q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
-        if p["assemble"]:
-            q0 = assembled(model_of(self.path, str(p["without"])), q0)
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
+        model = model_of(self.path, str(p["without"]))
+        if p["assemble"]:
+            q0, v0 = assembled(model, q0, v0)
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         act0 = np.zeros(self.model.na) if index < 0 else self.model.key_act[index]
-        scene = overruled(scene_of(self.path, model_of(self.path, str(p["without"]))), float(p["a0"]), float(p["a1"]))
+        scene = overruled(scene_of(self.path, model), float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
@@ -110,7 +113,7 @@ def overruled(scene: Scene, a0: float, a1: float) -> Scene:
 def case_of(
     scene: Scene,
     *,
-    name: str = "scene",
+    name: str = UNNAMED,
     variant: str = REFERENCE_POSE,
     q0: Any = None,
     v0: Any = None,
@@ -160,7 +163,7 @@ def case_of(
         v0=np.zeros(scene.nv) if v0 is None else v0, act0=np.zeros(0) if act0 is None else act0, t_end=t_end, law=law,
         inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
-        limits=(*(AT_STEPS if law.unilateral.any() else ()), *(AS_IT_STANDS if file else ())),
+        limits=AS_IT_STANDS if file else (),
     )  # fmt: skip
 
 
@@ -232,6 +235,10 @@ AS_IT_STANDS = (
         metric="*", engine="mujoco", profile="as_is", covers_none=True,
         known="the file's own step, integrator and soft rows: parts of its error say how far each of them goes",
     ),
+    Limit(
+        metric="event_gap", value=1.0, engine="mujoco", profile="as_is", covers_none=True,
+        known="its rows are in contact where they push, which may begin and end below their surface",
+    ),
     *(
         Limit(
             metric=f"largest {metric} (importer)", value=1e-9, engine="mujoco", profile="as_is",
@@ -239,21 +246,15 @@ AS_IT_STANDS = (
         )
         for metric in ("position", "event_times")
     ),
+    *(
+        Limit(metric="*", engine="drake", profile=profile, covers_none=True, known=known)
+        for profile, known in (
+            ("continuous", "Runge-Kutta 3 and an accuracy of 1e-4, what a Simulator starts with, and no rows"),
+            ("default", "steps of 1 ms, and bounds that are springs: parts of its error say how far it goes"),
+        )
+    ),
 )  # fmt: skip
 """Of what an engine makes of a file by itself: its reader is judged, what it computes is told."""
-
-
-AT_STEPS = tuple(
-    Limit(
-        metric=metric, value=value, engine="mujoco", profile="matched",
-        why="as of all engines; here rows touch and let go at the ends of steps: of first order there, else of fourth",
-    )
-    for metric, value in (
-        ("position", 1e-6), ("velocity", 1e-5), ("energy_drift", 1e-6), ("event_times", 1e-6), ("gap_error", 1e-6),
-        ("lam_impulse_path", 1e-5), ("contact_work", 1e-6),
-    )
-)  # fmt: skip
-"""Of MuJoCo's matched profile in a scene whose rows open: the usual limits, with what takes it outside."""
 
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")

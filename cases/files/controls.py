@@ -59,10 +59,11 @@ def _from_npz(path: Path, names: list[str]) -> tuple[Floats, Floats]:
 def _from_table(path: Path, names: list[str]) -> tuple[Floats, Floats]:
     import pandas as pd
 
-    table = _parquet(path, ["t", *names]) if path.suffix == ".parquet" else pd.read_csv(path)
-    missing = [name for name in ("t", *names) if name not in table.columns]
-    if missing:
-        raise ValueError(f"there is no column {missing[0]!r}; it has: {', '.join(map(str, table.columns))}.")
+    if path.suffix == ".parquet":
+        table = _parquet(path, names)
+    else:
+        table = pd.read_csv(path)
+        _check_columns(list(map(str, table.columns)), names)
     return table["t"].to_numpy(dtype=float), table[names].to_numpy(dtype=float)
 
 
@@ -70,9 +71,19 @@ def _parquet(path: Path, names: list[str]) -> Any:
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(path) as file:
-        known = [name for name in file.schema_arrow.names if name in names]
-        _check_size(8 * file.metadata.num_rows * len(known))
-        return file.read(columns=known).to_pandas()
+        _check_columns(file.schema_arrow.names, names)
+        _check_size(8 * file.metadata.num_rows * file.metadata.num_columns)
+        return file.read().to_pandas()
+
+
+def _check_columns(columns: list[str], names: list[str]) -> None:
+    """Refuse a table that lacks a column, or has one that is no actuator's."""
+    for name in ("t", *names):
+        if name not in columns:
+            raise ValueError(f"there is no column {name!r}; it has: {', '.join(columns)}.")
+    for name in columns:
+        if name not in ("t", *names):
+            raise ValueError(f"the column {name!r} is no actuator's; valid: {', '.join(('t', *names))}.")
 
 
 def _check_size(size: int) -> None:

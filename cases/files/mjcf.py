@@ -11,6 +11,7 @@ import numpy as np
 from crossbody.cases._errors import SceneError
 from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
+from crossbody.cases.files.warned import compiled, sentences
 from crossbody.cases.scene import (
     ROWS,
     UNBOUNDED,
@@ -36,18 +37,24 @@ WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 JOINT_WRAP, SITE_WRAP = 1, 3
 
 
-def compiled(path: Path) -> mujoco.MjModel:
+def model_of(path: Path) -> mujoco.MjModel:
     """Return MuJoCo's model of a file as it stands.
 
     Raises:
         SceneError: with MuJoCo's own sentence.
     """
+    return _compiled(path)[0]
+
+
+def _compiled(path: Path) -> tuple[mujoco.MjModel, list[str]]:
     import mujoco
 
-    try:
-        return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
+    return compiled(path, lambda: mujoco.MjModel.from_xml_path(str(path)))
+
+
+def findings(path: Path) -> list[str]:
+    """Return what MuJoCo warns of."""
+    return sentences(_compiled(path)[1])
 
 
 def scene_of(model: mujoco.MjModel) -> Scene:

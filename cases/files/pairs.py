@@ -26,15 +26,25 @@ def pairs_of(model: Any, name: Callable[[int], str], law: Callable[[Any, Any, An
         law: model, solref, solimp -> the law of a row.
     """
     given = [_explicit(model, i, name, law) for i in range(model.npair)]
-    listed = {frozenset((int(a), int(b))) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)}
+    listed = {frozenset(pair) for pair in _listed(model)}
     return (*given, *(_mixed(model, a, b, name, law) for a, b in _met(model) if frozenset((a, b)) not in listed))
+
+
+def allowed(model: Any) -> Iterator[tuple[int, int]]:
+    """Yield the numbers of shapes that may touch, by a pair of the file's or by its filters; some of them twice."""
+    yield from _listed(model)
+    yield from _met(model)
+
+
+def _listed(model: Any) -> Iterator[tuple[int, int]]:
+    yield from zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
 
 
 def constants_of(model: Any, name: Callable[[int], str]) -> dict[frozenset[str], tuple[Any, Any]]:
     """Return solref and solimp of every pair of shapes that may touch, by their names."""
     listed = {
-        frozenset((name(int(a)), name(int(b)))): (model.pair_solref[i], model.pair_solimp[i])
-        for i, (a, b) in enumerate(zip(model.pair_geom1, model.pair_geom2, strict=True))
+        frozenset((name(a), name(b))): (model.pair_solref[i], model.pair_solimp[i])
+        for i, (a, b) in enumerate(_listed(model))
     }
     return {frozenset((name(a), name(b))): _softness(model, a, b) for a, b in _met(model)} | listed
 

@@ -31,7 +31,7 @@ def model_of(path: Path, without: str = "") -> mujoco.MjModel:
         SceneError: with the compiler's own sentence.
         InvalidValue: for a word in `without` that names nothing.
     """
-    model = urdf.model_of(path) if is_urdf(path) else mjcf.compiled(path)
+    model = (urdf if is_urdf(path) else mjcf).model_of(path)
     strip(model, without)
     return model
 
@@ -48,4 +48,4 @@ def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
 
 def findings_of(path: Path) -> tuple[str, ...]:
     """Return sentences on what is strange in a file but taken as it stands."""
-    return tuple(urdf.findings(path)) if is_urdf(path) else ()
+    return tuple((urdf if is_urdf(path) else mjcf).findings(path))

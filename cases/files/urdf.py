@@ -16,13 +16,12 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases._errors import SceneError
+from crossbody.cases.files.warned import compiled, sentences
 from crossbody.cases.scene import Body, Loop, Scene
 
 if TYPE_CHECKING:
     import mujoco
 
-LARGEST = 50_000_000
-"""Bytes of a file."""
 PLACEHOLDER = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
@@ -30,10 +29,8 @@ def parsed(path: Path) -> ElementTree.Element:
     """Return the root of a URDF.
 
     Raises:
-        SceneError: with the parser's own place, or for a file without end.
+        SceneError: with the parser's own place.
     """
-    if path.stat().st_size > LARGEST:
-        raise SceneError(f"{path} has {path.stat().st_size} bytes; a URDF may have {LARGEST}.")
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
@@ -68,15 +65,8 @@ def _compiled(path: Path) -> tuple[mujoco.MjModel, list[str]]:
         root.remove(own)
     setting = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
-    warned: list[str] = []
-    previous = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(warned.append)
-    try:
-        return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode")), warned
-    except ValueError as error:
-        raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
-    finally:
-        mujoco.set_mju_user_warning(previous)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return compiled(path, lambda: mujoco.MjModel.from_xml_string(text))
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:
@@ -95,7 +85,7 @@ def findings(path: Path) -> list[str]:
 
     One more counts the meshes that would collide.
     """
-    told = [f"MuJoCo warns: {' '.join(text.split())}." for text in dict.fromkeys(_compiled(path)[1])]
+    told = sentences(_compiled(path)[1])
     meshes = parsed(path).findall("link/collision/geometry/mesh")
     if meshes:
         told.append(f"Meshes that collide ({len(meshes)}) are left out of every engine: no hull has a row here.")

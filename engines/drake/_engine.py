@@ -1,4 +1,4 @@
-"""Drake as an engine: profiles, settings, and prepared runs."""
+"""Drake as an engine: profiles, settings, and prepared runs of bodies on a line; scenes have a file of their own."""
 
 from __future__ import annotations
 
@@ -8,86 +8,22 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
-from pydrake.systems.framework import EventStatus
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases._arrays import Floats
 from crossbody.engines import _settings
+from crossbody.engines._contract import Run
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
+from crossbody.engines.drake import _scene
 from crossbody.engines.drake._plant import offsets, plant
+from crossbody.engines.drake._scene import SceneRun
+from crossbody.engines.drake._simulate import Sim
 from crossbody.engines.drake._symbolic import system
 
 SCHEMES = ("runge_kutta5", "runge_kutta3", "bogacki_shampine3", "radau3")
 USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4
 """What a Simulator of 1.51.1 starts with."""
-LONGEST = 0.1  # s, Drake's own bound on a step
-SHORTEST = 1e-14  # s
-
-Sample = tuple[float, Floats]
-
-
-class Sim:
-    """A simulator that keeps the state at the end of every step.
-
-    Args:
-        root: system or diagram that is simulated.
-        x0: its state at t = 0.
-        scheme: what integrates.
-        accuracy: what it is asked for; 0 for a system in discrete time.
-    """
-
-    def __init__(self, root: Any, x0: Floats, scheme: str, accuracy: float) -> None:
-        self.root, self.x0, self.scheme, self.accuracy = root, x0, scheme, accuracy
-        self.simulator = Simulator(root)
-        self.rows: list[Sample] = []
-
-    def start(self) -> None:
-        """Back to the start, with an integrator that remembers no step of an earlier run."""
-        context = self.simulator.get_mutable_context()
-        context.SetTime(0.0)
-        if not self.accuracy:
-            context.SetDiscreteState(self.x0)
-            return
-        context.SetContinuousState(self.x0)
-        ResetIntegratorFromFlags(self.simulator, self.scheme, LONGEST)
-        chosen = self.simulator.get_mutable_integrator()
-        chosen.set_target_accuracy(self.accuracy)
-        chosen.set_requested_minimum_step_size(SHORTEST)
-        chosen.set_throw_on_minimum_step_size_violation(False)
-
-    def state(self, context: Any) -> Floats:
-        """The state (2 n,)."""
-        vector = context.get_continuous_state_vector() if self.accuracy else context.get_discrete_state_vector()
-        found: Floats = vector.CopyToVector()
-        return found
-
-    def run(self, t_end: float, max_steps: int) -> None:
-        """From the start to t_end, s, or through so many steps."""
-        rows: list[Sample] = []
-        self.rows = rows
-        kept, state = rows.append, self.state
-
-        def monitor(now: Any) -> Any:
-            kept((now.get_time(), state(now)))
-            if len(rows) > max_steps and now.get_time() < t_end:
-                return EventStatus.ReachedTermination(self.root, "steps")
-            return None
-
-        self.simulator.set_monitor(monitor)
-        self.simulator.Initialize()
-        self.simulator.AdvanceTo(t_end)
-
-    def rates(self, times: Floats, states: Floats) -> Floats:
-        """X' at given states (n, 2 nb), as the system evaluates it."""
-        context = self.root.CreateDefaultContext()
-        found = np.empty_like(states)
-        for i, (t, x) in enumerate(zip(times.tolist(), states, strict=True)):
-            context.SetTime(t)
-            context.SetContinuousState(x)
-            found[i] = self.root.EvalTimeDerivatives(context).CopyToVector()
-        return found
 
 
 def _runner(case: Case, scene: Line, sim: Sim, shift: Floats, max_steps: int, dt: float) -> Callable[[], Trajectory]:
@@ -95,13 +31,11 @@ def _runner(case: Case, scene: Line, sim: Sim, shift: Floats, max_steps: int, dt
 
     def integrate() -> Trajectory:
         sim.start()
-        told, start = "", perf_counter()
-        try:
-            sim.run(case.t_end, max_steps)
-        except RuntimeError as error:
-            told = " ".join(str(error).split())
+        rows: list[tuple[float, Floats]] = []
+        start = perf_counter()
+        told = sim.run(case.t_end, max_steps, lambda t, x: rows.append((t, x)))
         wall = perf_counter() - start
-        t, x = np.array([r[0] for r in sim.rows]), np.array([r[1] for r in sim.rows])
+        t, x = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
         q, v = x[:, :n] - shift, x[:, n:]
         q[0], v[0] = scene.q0, scene.v0
         lam = _multipliers(scene, sim, t, x, dt)
@@ -156,6 +90,8 @@ class Drake:
         """Mechanisms that are not on a line; contacts of a plant that never open."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
+        if case.scene is not None:
+            return _scene.why_not(case.scene)
         reason = why_not("Drake", case)
         if reason is None and profile != "matched" and not case.law.unilateral.all():
             return "A contact of a MultibodyPlant pushes only: a row that is always on is none."
@@ -163,7 +99,7 @@ class Drake:
             return "A contact of a MultibodyPlant needs a stiffness above 0."
         return reason
 
-    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> PeerRun:
+    def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> Run:
         """Build the system and its simulator.
 
         Args:
@@ -178,6 +114,8 @@ class Drake:
         if reason is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
+        if case.scene is not None:
+            return SceneRun(case=case, profile=profile, settings=used)
         scene, dt, physics = line(case), float(used.get("dt", 0.0)), {}
         if profile == "matched":
             root, shift = system(scene), np.zeros(len(scene.masses))
@@ -197,11 +135,11 @@ class Drake:
 
 
 def _read(scene: Line, made: Any) -> dict[str, Any]:
-    """Numbers as the plant has them; its contact has a stiffness and no constants of the law."""
+    """Return the plant's numbers; its contact has a stiffness, and constants of the law are none of it."""
     context = made.CreateDefaultContext()
     masses = [made.GetBodyByName(f"ball {i}").get_mass(context) for i in range(len(scene.masses))]
     gravity = -float(made.gravity_field().gravity_vector()[2])
-    return {"masses": masses, "gravity": gravity, "constants": {"stiffness": scene.reduced * scene.a0}}
+    return {"masses": masses, "gravity": gravity}
 
 
 def _known(case: Case, profile: str) -> dict[str, Parameter]:

@@ -10,8 +10,9 @@ import numpy as np
 
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
+from crossbody.cases.files.warned import captured
 from crossbody.engines.mujoco._direct import law_of
-from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._globals import hooked
 from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._scene import Scene
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Joint, Scene, Tendon
-from crossbody.engines._contacts import TURN, Contacts, drift
+from crossbody.engines._contacts import TURN, Contacts, Indices, closing, drift
 from crossbody.engines._scene import angle_of, places
 from crossbody.engines.mujoco._observe import numbers, pose_of
 
@@ -50,9 +50,10 @@ class Drift:
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
             mujoco.mj_comVel(self.model, self.data)
-            touches = self.contacts.touches(self.pose, rows, along)
-            closing = [t.normal @ (self._carried(t.second, t.point) - self._carried(t.first, t.point)) for t in touches]
-            return np.array([*(self._rate(self.bounded[i], v) for i in parts), *closing])
+            found = [self._rate(self.bounded[i], v) for i in parts]
+            if len(rows):
+                found += closing(self.contacts.touches(self.pose, rows, along), self._carry).tolist()
+            return np.array(found)
 
         lengths, touches = np.split(drift(rates, v, turn), [len(parts)])
         return lengths, touches
@@ -75,6 +76,11 @@ class Drift:
         one, two = (self._carried(body, point) for body, point in zip(tendon.bodies, at, strict=True))
         apart = at[1] - at[0]
         return float(apart @ (two - one) / np.linalg.norm(apart))
+
+    def _carry(self, bodies: Indices, points: Floats) -> Floats:
+        """Return the velocities (n, 3) of points of the bodies of the contacts."""
+        names = [self.contacts.bodies[i] for i in bodies]
+        return np.array([self._carried(body, point) for body, point in zip(names, points, strict=True)])
 
     def _carried(self, body: str, point: Floats) -> Floats:
         """Return the velocity of a point of a body; MuJoCo's twists are about a tree's centre of mass."""

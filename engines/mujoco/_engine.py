@@ -12,10 +12,11 @@ from typing import Any
 import mujoco
 
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory, _registry
+from crossbody.cases.files.warned import captured
 from crossbody.engines import _settings
 from crossbody.engines._contract import Run
 from crossbody.engines._linear import Spot, Tangent
-from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._globals import hooked
 from crossbody.engines.mujoco._march import March
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._tape import Tape

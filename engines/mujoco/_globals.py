@@ -12,18 +12,6 @@ Hook = Callable[[Any, Any], None]
 
 
 @contextmanager
-def captured() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings, which else go to stderr and to MUJOCO_LOG.TXT in the working directory."""
-    messages: list[str] = []
-    previous = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(messages.append)
-    try:
-        yield messages
-    finally:
-        mujoco.set_mju_user_warning(previous)
-
-
-@contextmanager
 def hooked(hook: Hook | None) -> Iterator[None]:
     """Call `hook(model, data)` in every evaluation, between the rows' reference accelerations and the solver.
 

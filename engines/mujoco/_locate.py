@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import mujoco
 from scipy.optimize import brentq
@@ -13,6 +13,8 @@ from crossbody.engines.mujoco._scene import Scene
 
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
+TRIALS = 300
+"""Most that one row takes; bisection alone takes 50."""
 Sign = tuple[int, int, float]
 """(row, 0 for its gap or 1 for its multiplier, sign that it has in its present mode)."""
 WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
@@ -22,9 +24,13 @@ WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
 }
 
 
-def signs(modes: Modes) -> list[Sign]:
+OUTLIVING = WATCHED | {CONTACT: ((1, 1.0),)}
+"""Of rows that push above their surface too until their multiplier is zero, as the law has it."""
+
+
+def signs(modes: Modes, watched: Mapping[int, tuple[tuple[int, float], ...]] = WATCHED) -> list[Sign]:
     """What must keep its sign while the modes last."""
-    return [(i, which, sign) for i, mode in enumerate(modes) for which, sign in WATCHED.get(mode, ())]
+    return [(i, which, sign) for i, mode in enumerate(modes) for which, sign in watched.get(mode, ())]
 
 
 class Locator:
@@ -37,7 +43,8 @@ class Locator:
     def __init__(self, scene: Scene, advance: Callable[[], None], rewind: Callable[[], None]) -> None:
         assert scene.margins is not None
         self.model, self.data, self.margins = scene.model, scene.data, scene.margins
-        self.advance, self.rewind = advance, rewind
+        self.advance, self.rewind, self.outlives = advance, rewind, scene.outlives
+        self.watched = OUTLIVING if scene.outlives else WATCHED
 
     def beyond(self, modes: Modes) -> Modes:
         """The modes just behind the event: those rows that crossed are taken by their gap and multiplier.
@@ -45,9 +52,10 @@ class Locator:
         What pushes is in CONTACT here: only the scene knows of COLLISION.
         """
         return tuple(
-            mode if mode not in WATCHED else FREE if h > 0.0 else CONTACT if lam > 0.0 else BALLISTIC
+            mode if mode not in WATCHED or (self.outlives and mode == CONTACT and lam > 0.0)
+            else FREE if h > 0.0 else CONTACT if lam > 0.0 else BALLISTIC
             for mode, (h, lam) in zip(modes, self.margins(), strict=True)
-        )
+        )  # fmt: skip
 
     def land(self, modes: Modes) -> int:
         """Redo the step so that it ends just behind its first event; returns the trials that it took.
@@ -68,7 +76,10 @@ class Locator:
         for row, which, sign in self._crossed(modes):
             start = value(0.0, row, which)
             bracketed = sign * start > 0.0
-            roots.append(brentq(value, 0.0, full, args=(row, which), xtol=1e-15 * full) if bracketed else 0.0)
+            try:
+                roots.append(brentq(value, 0.0, full, (row, which), 1e-15 * full, maxiter=TRIALS) if bracketed else 0.0)
+            except ValueError:  # a trial starts from an evaluation of its own, and may just miss what the step passed
+                roots.append(full)
         tau, nudge = min(roots), 1e-16 * full
         self._redo(tau)
         while not self._crossed(modes) and tau < full:
@@ -79,7 +90,7 @@ class Locator:
 
     def _crossed(self, modes: Modes) -> list[Sign]:
         now = self.margins()
-        return [s for s in signs(modes) if _gone(now[s[0]][s[1]], s)]
+        return [s for s in signs(modes, self.watched) if _gone(now[s[0]][s[1]], s)]
 
     def _redo(self, tau: float) -> None:
         self.rewind()

@@ -19,6 +19,8 @@ from crossbody.engines.mujoco._locate import Locator
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._tape import Tape
 
+ROUNDS = 20
+"""Of rows that open and close each other at one instant."""
 SAME_INSTANT = 100
 """Events in a row without the time moving on that make a cycle."""
 
@@ -122,15 +124,20 @@ class March:
         return t
 
     def _settled(self, guess: Modes) -> Modes:
-        """Open and close the rows, evaluate, and read the modes that this gives."""
+        """Open and close the rows, evaluate, and read the modes that this gives, until they are what was put in."""
         scene = self.scene
-        if scene.arm is not None:
-            scene.arm(guess)
-            # Called even when no row is there: a third of the cost of a free step.
-            if scene.hook is not None and not scene.always:
-                mujoco.set_mjcb_control(scene.hook if any(guess) else None)
-        mujoco.mj_forward(scene.model, scene.data)
-        return scene.modes()
+        for _ in range(ROUNDS):
+            if scene.arm is not None:
+                scene.arm(guess)
+                # Called even when no row is there: a third of the cost of a free step.
+                if scene.hook is not None and not scene.always:
+                    mujoco.set_mjcb_control(scene.hook if any(guess) else None)
+            mujoco.mj_forward(scene.model, scene.data)
+            found = scene.modes()
+            if found == guess or not scene.outlives:
+                break
+            guess = found
+        return found
 
     def _broken(self) -> bool:
         data = self.scene.data

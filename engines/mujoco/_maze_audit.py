@@ -10,10 +10,11 @@ import numpy as np
 
 from crossbody.cases import Case
 from crossbody.cases._arrays import Floats
+from crossbody.cases.files.warned import captured
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.rows import SLIP_BELOW
 from crossbody.engines.mujoco._direct import law_of
-from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._globals import hooked
 from crossbody.engines.mujoco._maze_charts import Charts
 from crossbody.engines.mujoco._maze_model import PHI, RHO, THETA, X, Y
 from crossbody.engines.mujoco._observe import mass_matrix

@@ -12,9 +12,9 @@ import numpy as np
 
 from crossbody.cases import Case, Mode, Outcome, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.cases.files.warned import captured
 from crossbody.engines._cube import Cube, cube, quaternion, rotation_vector
 from crossbody.engines._log import Log, charted
-from crossbody.engines.mujoco._globals import captured
 
 FASTEST = 1e4
 """Speed at which a run has diverged, m/s or rad/s."""

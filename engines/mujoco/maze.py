@@ -13,13 +13,14 @@ import mujoco
 
 from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases._arrays import Floats
+from crossbody.cases.files.warned import captured
 from crossbody.engines._linear import Spot
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.scene import ONLY_CONTINUOUS, BallMaze, ball_maze
 from crossbody.engines.mujoco import _maze_audit as audits
 from crossbody.engines.mujoco import _maze_segments as segments
-from crossbody.engines.mujoco._globals import captured, hooked
+from crossbody.engines.mujoco._globals import hooked
 from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._maze_charts import Charts
 from crossbody.engines.mujoco._maze_march import MazeMarch

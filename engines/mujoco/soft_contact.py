@@ -15,12 +15,13 @@ import numpy as np
 
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
+from crossbody.cases.files.warned import captured
 from crossbody.engines import _soft_contact as soft
 from crossbody.engines._linear import Spot, same
 from crossbody.engines._log import Chart, Modes, charted
 from crossbody.engines._soft_contact import NAMES, SoftContact
 from crossbody.engines.mujoco._direct import without_regularisation
-from crossbody.engines.mujoco._globals import Hook, captured, hooked
+from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._pairs import add_pairs

@@ -14,6 +14,7 @@ import numpy as np
 
 from crossbody.cases import Case, Mode
 from crossbody.cases._arrays import Floats
+from crossbody.cases.files.warned import captured
 from crossbody.engines import _soft_contact as soft
 from crossbody.engines._linear import Spot
 from crossbody.engines._log import charted
@@ -33,7 +34,7 @@ from crossbody.engines._soft_delta import (
 )
 from crossbody.engines.mujoco._delta_model import FLAGS, text
 from crossbody.engines.mujoco._direct import law_of, without_regularisation
-from crossbody.engines.mujoco._globals import Hook, captured, hooked
+from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._pairs import Pairs, add_pairs

@@ -10,11 +10,10 @@ import pinocchio as pin
 
 from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Scene
-from crossbody.engines._contacts import Contacts, Pose, Poses, Touch, drift, gradient
-from crossbody.engines.pinocchio._rows import point_jacobian
+from crossbody.engines._contacts import Contacts, Indices, Poses, closing, drift
+from crossbody.engines._nearest import Pose, cross
 
-CLEAR = 0.02
-"""m: H of shapes that are further apart is left zero while a motion is computed, which does not ask for it."""
+WORLD = pin.LOCAL_WORLD_ALIGNED
 
 
 class ContactRows:
@@ -22,7 +21,7 @@ class ContactRows:
 
     Attributes:
         count: number of rows.
-        clear: of shapes further apart, m, rows of H are left zero.
+        along: of contacts whose shapes may lie along each other, whether these do; as they lie where it says nothing.
     """
 
     def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
@@ -30,29 +29,32 @@ class ContactRows:
         self.count = self.contacts.count
         self.model, self.data, self.placed = model, model.createData(), placed
         self._moved = model.createData()
-        self.clear = CLEAR
-        self._at: Floats = np.full(model.nq, np.nan)
-        self._found: list[Touch] = []
-        self._H: Floats | None = None
+        self.along: dict[int, bool] = {}
+        self.carriers = [placed[body][0] for body in self.contacts.bodies]
 
-    def heights(self, q: Floats) -> Floats:
-        """Return h (n,)."""
-        return np.array([touch.gap for touch in self._touches(q)])
+    def heights(self, q: Floats, rows: Sequence[int] | None = None) -> Floats:
+        """Return h (n,) of some rows, or of all."""
+        return self.contacts.touches(self._now(q), rows, self.along).gap if self.count else np.zeros(0)
 
-    def forget(self) -> None:
-        """Compute anew at the next call, wherever it is."""
-        self._at = np.full(self.model.nq, np.nan)
+    def parted(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return by how much the shapes that may lie along each other do not, and to which side (`Contacts.parted`)."""
+        return self.contacts.parted(self._now(q))
 
-    def jacobian(self, q: Floats) -> Floats:
-        """Return H (n, nv)."""
+    def gradients(self, q: Floats, rows: Sequence[int] | None = None) -> tuple[Floats, Floats]:
+        """Return h (n,) and H (n, nv) of some rows, or of all."""
         if not self.count:
-            return np.zeros((0, self.model.nv))
-        touches = self._touches(q)
-        if self._H is None:
-            pin.computeJointJacobians(self.model, self.data, q)
-            none = np.zeros(self.model.nv)
-            self._H = np.array([gradient(touch, self._velocity) if touch.normal.any() else none for touch in touches])
-        return self._H
+            return np.zeros(0), np.zeros((0, self.model.nv))
+        met = self.contacts.touches(self._now(q), rows, self.along)
+        pin.computeJointJacobians(self.model, self.data, q)
+        J, origins = np.zeros((len(self.carriers), 6, self.model.nv)), self._origins(self.data)
+        for i, carrier in enumerate(self.carriers):
+            if carrier:
+                J[i] = pin.getJointJacobian(self.model, self.data, carrier, WORLD).reshape(6, -1)
+        H = np.zeros((len(met.gap), self.model.nv))
+        for bodies, sign in ((met.second, 1.0), (met.first, -1.0)):
+            about = cross(met.point - origins[bodies], met.normal)
+            H += sign * np.matmul(np.concatenate([met.normal, about], axis=1)[:, None], J[bodies])[:, 0]
+        return met.gap, H
 
     def drift(self, q: Floats, v: Floats, rows: Sequence[int]) -> Floats:
         """Return H' v of some rows."""
@@ -60,26 +62,13 @@ class ContactRows:
             return np.zeros(0)
         data = self._moved
         along, turn = self.contacts.lying(self._now(q), rows)
+        along |= self.along
 
         def rates(t: float) -> Floats:
             pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
-            touches = self.contacts.touches(lambda body: self._pose(body, data), rows, along)
-            points, normals = (np.array([getattr(touch, name) for touch in touches]) for name in ("point", "normal"))
-            moving, held = (
-                self._carried([self.placed[body][0] for body in bodies], points)
-                for bodies in ([touch.second for touch in touches], [touch.first for touch in touches])
-            )
-            total: Floats = np.sum(normals * (moving - held), axis=1)
-            return total
+            return closing(self.contacts.touches(lambda body: self._pose(body, data), rows, along), self._carried)
 
         return drift(rates, v, turn)
-
-    def _touches(self, q: Floats) -> list[Touch]:
-        """Return the contacts at q; those of the last one are kept, for a step asks several times."""
-        if not np.array_equal(q, self._at):
-            self._found = self.contacts.touches(self._now(q), clear=self.clear)
-            self._at, self._H = q.copy(), None
-        return self._found
 
     def _now(self, q: Floats) -> Poses:
         """Return what gives the poses of bodies at q."""
@@ -91,13 +80,13 @@ class ContactRows:
         world = data.oMi[carrier] * pose
         return world.rotation, world.translation
 
-    def _velocity(self, body: str, point: Floats) -> Floats:
-        return point_jacobian(self.model, self.data, self.placed[body][0], point)
+    def _carried(self, bodies: Indices, points: Floats) -> Floats:
+        """Return the velocities (n, 3) of points that bodies carry, where `drift` has moved them."""
+        data = self._moved
+        twists = np.array([pin.getVelocity(self.model, data, joint, WORLD).vector for joint in self.carriers])[bodies]
+        carried: Floats = twists[:, :3] + cross(twists[:, 3:], points - self._origins(data)[bodies])
+        return carried
 
-    def _carried(self, joints: list[int], points: Floats) -> Floats:
-        """Return the velocities (n, 3) of points that joints carry, where `drift` has moved them."""
-        data, frame = self._moved, pin.LOCAL_WORLD_ALIGNED
-        twists = np.array([pin.getVelocity(self.model, data, joint, frame).vector for joint in joints])
-        (x, y, z), (a, b, c) = (points - [data.oMi[joint].translation for joint in joints]).T, twists[:, 3:].T
-        velocities: Floats = twists[:, :3] + np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
-        return velocities
+    def _origins(self, data: Any) -> Floats:
+        """Return where the joints are that carry the bodies (nb, 3)."""
+        return np.array([data.oMi[joint].translation for joint in self.carriers]).reshape(-1, 3)

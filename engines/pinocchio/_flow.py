@@ -14,6 +14,7 @@ from crossbody.cases._control import NotFinite
 from crossbody.engines._log import Log
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Settled, first_modes
 from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio._rows import PinRows
 from crossbody.engines.pinocchio._scene import World
 from crossbody.reference.sundials.quiet import quiet
 
@@ -21,8 +22,12 @@ PER_SOLVE = 100_000
 """Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""
 ROOT_FOUND = 2
 """CVODE's word for a step that ended at a zero of a watched function; later steps still carry the old events."""
+VANISHED = 1e-6
+"""Part of H M^-1 H^T of a row at the start below which nothing is left that could move the row as its law says."""
 TINY = 1e-300
 """In place of a watched function that is exactly 0: it has not passed yet. CVODE complains of what stays at 0."""
+LOOKS = np.linspace(0.0, 1.0, 10)[1:-1].tolist()
+"""Parts of a step at which rows are looked at that may have turned twice in it."""
 SAME_INSTANT = 100
 """Events in a row without the time moving on that make a cycle."""
 
@@ -50,7 +55,8 @@ class Flow:
         self.outcome, self.message = Outcome.FINISHED, ""
         self.modes = first_modes(self.rows)
         options: dict[str, Any] = {"rtol": rtol, "atol": atol, "method": method, "max_num_steps": PER_SOLVE}
-        watched = WATCHED * self.rows.nc
+        self.ways = machine.rows.ways if isinstance(machine.rows, PinRows) else None
+        watched = WATCHED * self.rows.nc + (self.ways.watched if self.ways is not None else 0)
 
         def watch(t: float, y: NDArray[Any], out: NDArray[Any]) -> None:  # CVODE hangs attributes on it
             self._watch(t, y, out)
@@ -62,7 +68,10 @@ class Flow:
 
     def run(self, q0: Floats, v0: Floats, t_end: float) -> None:
         """Integrate from (q0, v0) to t_end, s."""
+        self.start = q0.copy()
         self.world.reset()
+        if self.ways is not None:
+            self.ways.begin()
         with quiet() as said:
             self._run(np.concatenate((q0, v0)), t_end)
         words = " ".join(said.getvalue().split())
@@ -97,7 +106,7 @@ class Flow:
     def _until(self, t: float, y: Floats, end: float) -> Floats:
         """The state at `end`, s, or where the run ended."""
         self.solver.init_step(t, y)
-        stop = end
+        stop, asked = end, t
         while t < end and self.outcome.ok:
             if self.steps >= self.max_steps:
                 return self._end(Outcome.STEP_LIMIT, t, y, f"{self.max_steps} steps were not enough")
@@ -105,24 +114,47 @@ class Flow:
             self.steps += 1
             if not self._sound(step, t, y):
                 return y
-            fired = _fired(step)
-            if step.t > t and stop != step.t and self._overran(y, step.y, fired):
-                stop = float(step.t)  # a dip that began and turned inside one step: again, no further than its bottom
+            fired, turned = self._fired(step)
+            deepest = self._passed_over(t, y, step, fired) if step.t > t else None
+            if deepest is None and step.t > t and self.ways is not None and self.ways.through(turned):
+                deepest = float(step.t)
+            if deepest is not None and deepest != asked:
+                stop = asked = deepest  # a dip that began and turned inside one step: again, no further than its bottom
                 self.solver.init_step(t, y)
                 continue
-            before, t, stop = t, float(step.t), end
-            modes, y = self.modes, self._switch(t, np.array(step.y), fired)
+            before, t, stop, asked = t, float(step.t), end, t
+            modes, y = self.modes, self._switch(t, np.array(step.y), fired, turned=turned)
             self.still = self.still + 1 if t == before else 0
             if self.still > SAME_INSTANT:
-                bad = Outcome.MODE_CYCLE if fired else Outcome.STEP_TOO_SMALL
-                return self._end(bad, t, y, f"the time does not move on (rows {modes})")
-            if self.modes != modes or not np.array_equal(y, step.y):
+                bad = Outcome.MODE_CYCLE if fired or turned else Outcome.STEP_TOO_SMALL
+                gone = "" if fired or turned else self._vanished(y)
+                bad = Outcome.ILL_POSED if gone else bad
+                return self._end(bad, t, y, gone or f"the time does not move on (rows {modes})")
+            if turned or self.modes != modes or not np.array_equal(y, step.y):
                 self.solver.init_step(t, y)
         return y
 
+    def _vanished(self, y: Floats) -> str:
+        """What to say where hardly anything moves a row any more that has to move, and something did at the start."""
+        q = self._state(y)[0]
+        on = [i for i, mode in enumerate(self.modes) if mode in ACTIVE]
+        before, now = (np.diag(self.rows.delassus(at))[on] for at in (self.start, q))
+        gone = [i for i, a, b in zip(on, before, now, strict=True) if b < VANISHED * a]
+        return f"hardly anything moves rows {gone} any more, which have to move" if gone else ""
+
+    def _fired(self, step: Any) -> tuple[Fired, frozenset[int]]:
+        """(row, function) of every function that fell to zero, and pairs that lie the other way."""
+        if step.status != ROOT_FOUND or step.i_events is None:
+            return frozenset(), frozenset()
+        fallen, rows = np.flatnonzero(step.i_events[-1] < 0), WATCHED * self.rows.nc
+        turned = frozenset((fallen[fallen >= rows] - rows).tolist())
+        return frozenset(divmod(int(k), WATCHED) for k in fallen[fallen < rows]), turned
+
     def _sound(self, step: Any, t: float, y: Floats) -> bool:
         """Whether a step succeeded, with a state that is finite and that the scene can reach."""
-        if not step.success:
+        if not step.success and (gone := self._vanished(y)):
+            self._end(Outcome.ILL_POSED, t, y, gone)
+        elif not step.success:
             finite = bool(np.isfinite(self.vd).all())
             bad = Outcome.STEP_TOO_SMALL if finite else Outcome.NOT_FINITE
             self._end(bad, t, y, "CVODE gave up" if finite else f"the acceleration is {self.vd.tolist()}")
@@ -132,39 +164,72 @@ class Flow:
             self._end(Outcome.DIVERGED, t, y, "the state left what the scene can reach")
         return self.outcome.ok
 
-    def _switch(self, t: float, y: Floats, fired: Fired, first: bool = False) -> Floats:
+    def _switch(
+        self, t: float, y: Floats, fired: Fired, first: bool = False, turned: frozenset[int] = frozenset()
+    ) -> Floats:
         """Record an instant, let the machine look at it, and record it again if something switched."""
         self._tell(t)
         q, v = self._state(y)
         lam = self.rows.accelerate(q, v, self.modes)[1]
         if not first:
             self.log.add(t, q, v, lam, self.modes)
-        if not first and not fired and not self._pulls(lam):
+        if not first and not fired and not turned and not self._pulls(lam):
             return y
+        self._turn(t, q, turned)
         settled: Settled = self.machine.settle(q, v, self.modes, fired)
         if settled.passed:
             self.modes = settled.modes
             self.log.events += settled.events(t)
             lam = self.rows.accelerate(q, settled.v, self.modes)[1]
         y = np.concatenate((y[: self.n], settled.v))
-        if settled.passed or first:
+        if self.ways is not None:
+            self.ways.hold(q, self.modes)
+        if settled.passed or first or turned:
             self.log.add(t, q, settled.v, lam, self.modes)
         if settled.cycle:
             self._end(Outcome.MODE_CYCLE, t, y, f"the rows come back to {settled.modes} at one instant")
         return y
 
+    def _turn(self, t: float, q: Floats, turned: frozenset[int]) -> None:
+        """Let pairs of shapes lie the other way, with the modes of their rows."""
+        if self.ways is None or not turned:
+            return
+        before, self.modes = self.modes, self.ways.turn(q, self.modes, turned)
+        pairs = zip(before, self.modes, strict=True)
+        passed = tuple((i, b, a, 0.0) for i, (b, a) in enumerate(pairs) if a != b)
+        self.log.events += Settled(self.modes, np.zeros(0), passed).events(t)
+
     def _pulls(self, lam: Floats) -> bool:
         """Whether a contact pulls though its zero was not found: it began below, by the rounding of its start."""
         return any(m in ACTIVE and m != Mode.BILATERAL and lam[i] < 0.0 for i, m in enumerate(self.modes))
 
-    def _overran(self, before: Floats, after: Floats, fired: Fired) -> bool:
-        """Whether a free row came from above its surface and stands below it without its touch having been found."""
-        h = self.rows.gaps(*self._state(after))[0]
-        if not (h < 0.0).any():
-            return False
-        above = self.rows.gaps(*self._state(before))[0]
-        free = [i for i, m in enumerate(self.modes) if m == Mode.FREE]
-        return any(h[i] < 0.0 < above[i] and (i, 0) not in fired for i in free)
+    def _passed_over(self, t: float, before: Floats, step: Any, fired: Fired) -> float | None:
+        """When in a step a free row was at its lowest whose touch was not found; None if there is none.
+
+        It stands below its surface at the end, or it turned twice in between: up, down and up again has the same signs
+        at both ends. What falls freely takes steps as long as that.
+        """
+        (h, rate), (end, rate_end) = (self.rows.gaps(*self._state(y)) for y in (before, step.y))
+        free = np.array([m == Mode.FREE for m in self.modes], dtype=bool)
+        if any(free[i] and end[i] < 0.0 < h[i] and (i, 0) not in fired for i in range(len(h))):
+            return float(step.t)
+        dt, bend = float(step.t) - t, np.abs(rate_end - rate)
+        fast = np.maximum(np.abs(rate), np.abs(rate_end)) + bend
+        may = free & (np.minimum(np.abs(rate), np.abs(rate_end)) < bend) & (h + end < fast * dt) & (h > 0.0)
+        if not may.any():
+            return None
+        lowest = np.minimum(h, end)[may]
+        dip, where = min((float(np.min(self._heights(before, step.y, dt, x)[may] - 0.5 * lowest)), x) for x in LOOKS)
+        return t + where * dt if dip < 0.0 else None
+
+    def _heights(self, before: Floats, after: Floats, dt: float, x: float) -> Floats:
+        """Gaps (nc,) at a part x of a step of dt, s: where the cubic through both ends has the positions."""
+        (q, v), (p, u) = ((y[: self.n], y[self.n :]) for y in (before, after))
+        if self.coordinates is not None:
+            v, u = self.coordinates.rates(q, v), self.coordinates.rates(p, u)
+        at = q + x * x * (3.0 - 2.0 * x) * (p - q) + x * (1.0 - x) * dt * ((1.0 - x) * v - x * u)
+        self._normalise(at)
+        return self.rows.gaps(at, before[self.n :])[0]
 
     def _state(self, y: Floats) -> tuple[Floats, Floats]:
         """Copies of q, with quaternions of length 1, and v."""
@@ -195,16 +260,12 @@ class Flow:
         self._tell(t)
         self.q[:], self.v[:] = y[: self.n], y[self.n :]
         self._normalise(self.q)
-        self.machine.watch(self.q, self.v, self.modes, out)
+        rows = WATCHED * self.rows.nc
+        self.machine.watch(self.q, self.v, self.modes, out[:rows])
+        if self.ways is not None:
+            self.ways.watch(self.q, out[rows:])
 
     def _end(self, outcome: Outcome, t: float, y: Floats, what: str) -> Floats:
         self.outcome = outcome
         self.message = f"t = {t:g} s, q = {y[: self.n].tolist()}, v = {y[self.n :].tolist()}: {what}."
         return y
-
-
-def _fired(step: Any) -> Fired:
-    """(row, function) of every function that fell to zero."""
-    if step.status != ROOT_FOUND or step.i_events is None:
-        return frozenset()
-    return frozenset(divmod(int(k), WATCHED) for k in np.flatnonzero(step.i_events[-1] < 0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +12,9 @@ from crossbody.cases import Law, Mode
 from crossbody.cases._arrays import Floats
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import active, elastic_part
+
+if TYPE_CHECKING:
+    from crossbody.engines.pinocchio._ways import Ways
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
@@ -91,9 +94,12 @@ class PinRows:
         jacobian: q -> H (nc, nv).
         heights: q -> h (nc,), m.
         drift: (q, v) -> H' v (nc,), m/s^2.
-        drift_of: (q, v, rows) -> that of some rows; where it costs less than that of all.
+        drift_of, gradient_of: (q, v, rows) -> that of some rows, and (q, rows) -> their h and H; given where these cost
+            less than those of all.
         law: constants of every row.
+        near: as of `crossbody.engines._machines.Rows`.
         follows: index of the row whose mode each one shares; -1 for none.
+        ways: how pairs of shapes lie to each other that may in two ways; None where there is none.
         shared: what makes multipliers of rows that depend on each other such that none pulls; None where rows do not.
     """
 
@@ -108,19 +114,23 @@ class PinRows:
         follows: Sequence[int] = (),
         forces: Forces | None = None,
         drift_of: Callable[[Floats, Floats, Chosen], Floats] | None = None,
+        gradient_of: Callable[[Floats, Chosen], tuple[Floats, Floats]] | None = None,
     ) -> None:
         self.model, self.data = model, model.createData()
         self.jacobian, self.heights, self.drift, self.forces = jacobian, heights, drift, forces
         self.drift_of = drift_of or (lambda q, v, rows: drift(q, v)[rows])
+        self.gradient_of = gradient_of or (lambda q, rows: (heights(q)[rows], jacobian(q)[rows]))
         self.nc = len(law.a0)
         self.unilateral: Sequence[bool] = law.unilateral.tolist()
         self.follows: Sequence[int] = tuple(follows) or (-1,) * self.nc
+        self.near: Floats = np.full(self.nc, np.inf)
         self.tau = np.zeros(model.nv)
         self.slow = np.stack((law.a0, law.a1, law.a2))
         self.fast: Sequence[bool] = (law.b0 > 0.0).tolist()
         quick = np.stack((law.b0, law.b1, np.zeros(self.nc)))
         self.entered = np.where(law.b0 > 0.0, quick, self.slow)  # what a row has that is just entered
         self._sets: dict[Modes, Any] = {}
+        self.ways: Ways | None = None
         self.shared: Shared | None = None
         self.solve = ALGEBRA[algebra](model, self.data, self.tau)
 
@@ -166,7 +176,7 @@ class PinRows:
         rows, one_sided, a0, a1, a2 = self._chosen(modes)
         if rows is None:
             return pin.aba(self.model, self.data, q, v, self.tau), np.zeros(self.nc)
-        J, h = self.jacobian(q)[rows], self.heights(q)[rows]
+        h, J = self.gradient_of(q, rows)
         gamma = self.drift_of(q, v, rows) + a1 * J.dot(v) + (a0 + a2 * h * h) * h
         vd, part = self.solve(q, v, J, gamma)
         if self.shared is not None and np.min(part[one_sided], initial=0.0) < 0.0:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,19 +13,23 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
-from crossbody.engines.pinocchio._contacts import CLEAR, ContactRows
+from crossbody.engines.pinocchio._contacts import ContactRows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
+from crossbody.engines.pinocchio._ways import Ways
 
 SMALL = 1e-4
 """Size of coordinates and rates, SI, below which they are known to the absolute tolerance alone:
 a pendulum that is let go upright moves by less for a while, and by all of it later."""
+DIPS = 0.02
+"""m: shapes further apart are not looked at for dips that begin and end in one step; a robot has hundreds of pairs,
+every one of which would have steps end where it is nearest."""
 Heights = Callable[[Floats], Floats]
-Whole = Callable[[], AbstractContextManager[None]]
-"""Within it H has all its rows, those of shapes far apart too."""
+Gradients = tuple[Floats, Floats]
+"""h (n,) and H (n, nv)."""
 Placed = dict[str, tuple[int, Any]]
 """Body -> joint that carries it, and its pose in that joint's frame."""
 
@@ -63,15 +66,33 @@ def build(case: Case, algebra: str) -> Prepared:
     ]  # fmt: skip
     touching, order = ContactRows(scene, model, placed), _order(scene)
 
-    @LastAsked
     def heights(q: Floats) -> Floats:
         own = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
         return np.concatenate([own[order], touching.heights(q)])
 
+    def own_gradients(q: Floats) -> Gradients:
+        h = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
+        H = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
+        return h[order], H[order]
+
     @LastAsked
-    def jacobian(q: Floats) -> Floats:
-        own = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
-        return np.concatenate([own[order], touching.jacobian(q)])
+    def gradients(q: Floats) -> Gradients:
+        (h, H), (gaps, N) = own_gradients(q), touching.gradients(q)
+        return np.concatenate([h, gaps]), np.concatenate([H, N])
+
+    def gradient_of(q: Floats, chosen: Chosen) -> Gradients:
+        if isinstance(chosen, slice):
+            return gradients(q)
+        wanted = np.array(chosen)
+        before = wanted < len(order)
+        if before.all():
+            h, H = own_gradients(q)
+            return h[wanted], H[wanted]
+        h, H = np.empty(len(wanted)), np.empty((len(wanted), model.nv))
+        h[~before], H[~before] = touching.gradients(q, (wanted[~before] - len(order)).tolist())
+        if before.any():
+            h[before], H[before] = (part[wanted[before]] for part in own_gradients(q))
+        return h, H
 
     def drift_of(q: Floats, v: Floats, chosen: Chosen) -> Floats:
         wanted = np.arange(len(order) + touching.count)[chosen]
@@ -83,28 +104,18 @@ def build(case: Case, algebra: str) -> Prepared:
         total[~before] = touching.drift(q, v, list(wanted[~before] - len(order)))
         return total
 
-    @contextmanager
-    def whole() -> Iterator[None]:
-        def look(clear: float) -> None:
-            touching.clear = clear
-            touching.forget()
-            jacobian.forget()
-
-        look(np.inf)
-        try:
-            yield
-        finally:
-            look(CLEAR)
-
     pinned = PinRows(
-        model, jacobian, heights, lambda q, v: drift_of(q, v, slice(None)), law=case.law, algebra=algebra, forces=apply,
-        drift_of=drift_of,
+        model, lambda q: gradients(q)[1], lambda q: gradients(q)[0], lambda q, v: drift_of(q, v, slice(None)),
+        law=case.law, algebra=algebra, forces=apply, drift_of=drift_of, gradient_of=gradient_of,
     )  # fmt: skip
+    pinned.near[len(order) :] = DIPS
+    if touching.contacts.turning:
+        pinned.ways = Ways(touching, len(order), gradients.forget)
     start = to.theirs(case.q0)
     if _may_depend(scene, touching.count):
         widths = [loop.width for loop in scene.loops]
         root = np.linalg.cholesky(mass_matrix(model, pinned.data, start))
-        A = np.linalg.solve(root, jacobian(start)[: sum(widths)].T).T
+        A = np.linalg.solve(root, gradients(start)[1][: sum(widths)].T).T
         loose = loose_rows(A, widths, case.rank) if widths else ()
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
@@ -112,7 +123,7 @@ def build(case: Case, algebra: str) -> Prepared:
         rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
         sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
-        world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to, whole),
+        world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
 
@@ -130,19 +141,20 @@ def _may_depend(scene: Scene, touching: int) -> bool:
 class LastAsked:
     """The last answer of a function of q, which may only be read: a step asks several times at one place."""
 
-    def __init__(self, function: Heights) -> None:
+    def __init__(self, function: Callable[[Floats], Gradients]) -> None:
         self.function = function
         self.forget()
 
     def forget(self) -> None:
-        """Compute anew at the next call, wherever it is."""
+        """Ask anew next time, wherever it is."""
         self.at: Floats = np.zeros(0)
 
-    def __call__(self, q: Floats) -> Floats:
+    def __call__(self, q: Floats) -> Gradients:
         """Return the answer."""
         if not np.array_equal(q, self.at):
             self.found = self.function(q)
-            self.found.flags.writeable = False
+            for part in self.found:
+                part.flags.writeable = False
             self.at = np.array(q)
         return self.found
 
@@ -272,7 +284,7 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
 
 
 def _audit(
-    scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates, whole: Whole
+    scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates
 ) -> dict[str, Any]:  # fmt: skip
     """What differs from the rows' own audit: masses body by body, forces at zero input, and the scene's coordinates."""
     model, data = rows.model, rows.data
@@ -295,13 +307,11 @@ def _audit(
     def lam(q: Floats, v: Floats) -> Floats:
         forces.still()
         r = to.theirs(q)
-        with whole():
-            return rows.accelerate(r, to.back(r, v), on)[1]
+        return rows.accelerate(r, to.back(r, v), on)[1]
 
     def H(q: Floats) -> Floats:
         r = to.theirs(q)
-        with whole():
-            return to.velocities(r, rows.jacobian(r))
+        return to.velocities(r, rows.jacobian(r))
 
     return {
         "masses": np.array([body.mass for body in scene.bodies]),

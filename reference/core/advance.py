@@ -46,8 +46,8 @@ from crossbody.reference.core.layout import (
     open_model,
     open_work,
 )
+from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
-from crossbody.reference.kernels import START
 
 
 class Kernels(NamedTuple):
@@ -82,6 +82,12 @@ def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
         s.stop = min(s.stop, b.inputs_t[s.next_input])
     if s.has_control:
         s.stop = min(s.stop, s.next_tick * s.tick)
+    if s.kinks > 0:
+        first = len(m.p) - s.nu
+        m.p[first - 1] = s.rtol
+        for i in range(s.nu):
+            m.p[first + i] = w.u[i]
+        settle.switch(K, s, m, w, b, GIVEN)
 
 
 @compiled

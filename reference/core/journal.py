@@ -68,7 +68,8 @@ def write_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
     first = len(m.p) - s.latched - s.nd
     for j in range(s.nd):
         e, before, after = s.switches, w.discrete[j], m.p[first + j]
-        if before != after and e < len(b.switches_t):
+        told = j < s.nd - s.kinks or before * after != 0.0  # 0: a kink whose side is not held
+        if before != after and told and e < len(b.switches_t):
             b.switches_t[e] = s.t
             b.switches[e, 0], b.switches[e, 1], b.switches[e, 2] = j, int(before), int(after)
             s.switches = e + 1

@@ -46,6 +46,7 @@ STATE = np.dtype(
         ("ng", "i8"),
         ("nd", "i8"),
         ("latched", "i8"),
+        ("kinks", "i8"),  # p ends with the tolerance and the inputs in force
         ("has_solve", "i8"),
         ("constant_mass", "i8"),
         ("affine", "i8"),

@@ -71,14 +71,14 @@ class Derivatives:
     size: Floats
 
 
-def check_held(system: System) -> None:
+def check_held(system: System, *, driven: bool = False) -> None:
     """Refuse a system whose inputs follow from its state in a way that has no derivative.
 
     Raises:
         SceneError: if a controller in Python gives its inputs, or some of them are activations.
     """
-    if system.activations is not None:
-        raise SceneError("Actuators with an activation have a state beside q and v: no linear model has it; not done.")
+    if system.activations is not None and not driven:
+        raise SceneError("Actuators with an activation have a state beside q and v: only linearise knows it.")
     if isinstance(system.control, Control):
         raise SceneError(
             f"System.control is the controller {system.control.label} in Python, which has no derivatives; "

@@ -15,6 +15,7 @@ from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
 from crossbody.reference.linear._analytic import check_analytic
 from crossbody.reference.linear._derivatives import Derivatives, Point, check_held, derivatives, turning
+from crossbody.reference.linear._driven import driven
 from crossbody.reference.linear._model import LinearModel
 
 OUTPUTS = ("q", "v", "gap", "lam")
@@ -25,6 +26,7 @@ def linearise(
     system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
     active: Sequence[int] | None = None, *, outputs: Sequence[str] = OUTPUTS, reduce: bool = False,
     names: Sequence[str] | None = None, t: float = 0.0, colliding: Sequence[int] = (),
+    activations: ArrayLike | None = None,
 ) -> LinearModel:  # fmt: skip
     """First-order model dx' = A dx + B du, dy = C dx + D du of v' = M^-1 (f + H_A^T lam) about a state, lam eliminated.
 
@@ -35,11 +37,14 @@ def linearise(
     Where q' is not v (quaternions) it lives on the tangent space: n coordinates dq that change as the velocities act,
     for a quaternion the rotation vector from q in body axes, so that dq' = dv - v x dq about a turning state.
 
+    Activations of actuators are states behind q and v. Where a force or a control is beyond its bounds, or an
+    activation leans on an end of its range, the model is that side's: small motions that stay there.
+
     Args:
         system: the mechanism with the law of its rows.
         q: positions (nq,).
         v: velocities (n,), zero if not given.
-        u: inputs (nu,), zero if not given.
+        u: inputs (nu,), zero if not given; without those that stand for activations.
         active: rows that are on, all others are free; those that are always on (not unilateral), if not given.
         outputs: which of "q", "v", "gap", "lam" make up y, in this order; gap and lam of every row.
         reduce: hold the active rows at rest (dh = 0, dh' = 0) instead of following their law: a minimal set of states
@@ -47,45 +52,53 @@ def linearise(
         names: of the coordinates (n,); "q[0]", ..., or "dq[0]", ... on a tangent space, if not given.
         t: time, s.
         colliding: active rows that follow their fast constants (COLLISION).
+        activations: of the actuators that have one (na,); those of the start if not given.
 
     Returns:
-        x = (q, v), or the part of it that remains; inputs "u[0]", ...; a velocity is named as its coordinate, primed.
+        x = (q, v, a), or the part of it that remains; inputs "u[0]", ...; a velocity is named as its coordinate,
+        primed, an activation "a[0]".
 
     Raises:
         SceneError: for a state of another shape, rows that do not exist, that are redundant here, or, with `reduce`,
             that move.
         UnknownName: for another output.
     """
-    at = point(system, q, v, u, active, t, colliding)
-    found = derivatives(at)
-    n, nu = system.n, system.inputs
+    acts = driven(system, u, activations, t)
+    at = point(system, q, v, acts.u, active, t, colliding, driven=True)
+    found = acts.widened(derivatives(at))
+    n, (na, nu) = system.n, acts.B.shape
     letter, T = "q" if system.velocity is None else "dq", turning(system, t, at.q, at.v)
     chosen = tuple(f"{letter}[{i}]" for i in range(n)) if names is None else tuple(names)
-    states = (*chosen, *(f"{name}'" for name in chosen))
+    states = (*chosen, *(f"{name}'" for name in chosen), *acts.names)
     if len(chosen) != n:
         raise SceneError(f"linearise.names has {len(chosen)} entries; the system has {n} coordinates.")
     C, D, read = _outputs(system, at.active, found, outputs, states)
+    own = np.hstack([np.zeros((na, 2 * n)), np.diag(acts.A)])
     model = LinearModel(
-        A=np.block([[T, np.eye(n)], [found.vd_x]]), B=np.vstack([np.zeros((n, nu)), found.vd_u]),
+        A=np.vstack([np.hstack([T, np.eye(n), np.zeros((n, na))]), found.vd_x, own]),
+        B=np.vstack([np.zeros((n, nu)), found.vd_u, acts.B]),
         C=C, D=D, states=states, inputs=tuple(f"u[{i}]" for i in range(nu)), outputs=read,
     )  # fmt: skip
     if not reduce:
         return model
-    whole = np.block([[np.abs(T), np.eye(n), np.zeros((n, nu))], [found.size]])
+    whole = np.vstack([
+        np.hstack([np.abs(T), np.eye(n), np.zeros((n, na + nu))]), found.size,
+        np.hstack([np.abs(own), np.abs(acts.B)]),
+    ])  # fmt: skip
     return model.restricted(np.vstack([found.gap_x[at.active], found.rate_x[at.active]]), size=whole)
 
 
 def point(
     system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None, active: Sequence[int] | None, t: float,
-    colliding: Sequence[int] = (),
+    colliding: Sequence[int] = (), *, driven: bool = False,
 ) -> Point:  # fmt: skip
-    """Where to linearise, checked.
+    """Where to linearise, checked; `driven` where activations are known.
 
     Raises:
         SceneError: for a state of another shape, rows that do not exist, rows that collide without being on, or
             kernels that are not analytic.
     """
-    check_held(system)
+    check_held(system, driven=driven)
     on = np.flatnonzero(np.asarray(system.unilateral) == 0).tolist() if active is None else active
     rows = different("active", on, system.nc)
     if not set(colliding) <= set(rows.tolist()):
@@ -102,13 +115,13 @@ def _outputs(
     system: System, active: Index, found: Derivatives, outputs: Sequence[str], states: tuple[str, ...]
 ) -> tuple[Floats, Floats, tuple[str, ...]]:
     """C, D and the names of their rows."""
-    n, nu, nc = system.n, system.inputs, system.nc
-    whole = np.eye(2 * n)
-    lam_x, lam_u = np.zeros((nc, 2 * n)), np.zeros((nc, nu))
+    n, nu, nc = system.n, found.vd_u.shape[1], system.nc
+    whole = np.eye(len(states))
+    lam_x, lam_u = np.zeros((nc, len(states))), np.zeros((nc, nu))
     lam_x[active], lam_u[active] = found.lam_x, found.lam_u
     known = {
         "q": (whole[:n], np.zeros((n, nu)), states[:n]),
-        "v": (whole[n:], np.zeros((n, nu)), states[n:]),
+        "v": (whole[n : 2 * n], np.zeros((n, nu)), states[n : 2 * n]),
         "gap": (found.gap_x, np.zeros((nc, nu)), tuple(f"gap[{i}]" for i in range(nc))),
         "lam": (lam_x, lam_u, tuple(f"lam[{i}]" for i in range(nc))),
     }
@@ -116,6 +129,6 @@ def _outputs(
         if name not in known:
             raise UnknownName("output of linearise", name, known)
     none: tuple[str, ...] = ()
-    parts = [(np.zeros((0, 2 * n)), np.zeros((0, nu)), none), *(known[name] for name in outputs)]
+    parts = [(np.zeros((0, len(states))), np.zeros((0, nu)), none), *(known[name] for name in outputs)]
     C, D = np.vstack([part[0] for part in parts]), np.vstack([part[1] for part in parts])
     return C, D, tuple(name for part in parts for name in part[2])

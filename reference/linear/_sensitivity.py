@@ -120,7 +120,7 @@ def sensitivity(
     run = simulate(
         system, at.q, at.v, t_end, rtol=rtol, collisions=collisions, inputs=([0.0], [at.u]), max_steps=max_steps
     )
-    if any(switch.t > 0.0 for switch in run.switches):
+    if any(switch.t > 0.0 and not switch.smooth for switch in run.switches):
         raise SceneError("sensitivity: the motion switches discrete variables; end it before the first switch.")
     walk = _Walk(at, over, rtol)
     outcome, n, nq = walk.along(run, t_end) if run.outcome.ok else run.outcome, system.n, system.nq

@@ -7,8 +7,11 @@ PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(6)
 TYPE, NODE, POSE, SIZE, SHAPE = 0, 1, 2, 14, 17
 # A pair: two shapes, and the distance at which its rows begin.
 # Then the variable that says how its shapes lie to each other (-1: it is always the same), the sine of the angle at
-# which that changes, and where among the variables the angle stands from which points of a cap count.
-FIRST, SECOND, MARGIN, LIES, SINE, PHASE, PAIR = (0, SHAPE, *range(2 * SHAPE, 2 * SHAPE + 5))
+# which that changes, and where among the variables the angle stands from which points of a cap count; last the number
+# of the first of its kinks (-1: it has none).
+FIRST, SECOND, MARGIN, LIES, SINE, PHASE, BENDS, PAIR = (0, SHAPE, *range(2 * SHAPE, 2 * SHAPE + 6))
+BENDING = {CAPSULE: 1, CYLINDER: 2, BOX: 3}
+"""Kinks of a sphere against a solid: where the nearest point comes to an end along an axis, or to a cylinder's side."""
 # A contact row, in the columns behind its kind: which pair, and which of its places.
 WHICH, PLACE = 1, 2
 # How two shapes lie to each other: not yet decided, at an angle, or along each other; a cylinder on the one cap or the

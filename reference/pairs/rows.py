@@ -55,18 +55,43 @@ def _over_plane(p: Array, w: Array, o: int, kind: int, place: int, P: Any, N: An
 
 
 @kernels.helper
-def _from_solid(p: Array, w: Array, o: int, C: Any) -> Any:
-    """Return the distance of a point from the surface of the shape at p[o:], and the direction to the point."""
+def _side(p: Array, pair: int, kind: int, which: int) -> int:
+    """Return on which side of one of its kinks the pair at p[pair:] is."""
+    first = int(p[pair + layout.BENDS].real)
+    if first < 0 or (which > 0 and kind == layout.CAPSULE) or (which > 1 and kind == layout.CYLINDER):
+        return tree.OPEN
+    return int(p[int(p[tree.AT_BEND].real) + first + which].real)
+
+
+@kernels.helper
+def bend(p: Array, w: Array, pair: int, which: int) -> tuple[float, float]:
+    """Return a coordinate of the sphere of the pair at p[pair:] in its solid, and the size at which its gap bends."""
+    o = pair + layout.SECOND
+    D, kind = apart(_point(p, w, pair + layout.FIRST), _point(p, w, o)), int(p[o].real)
+    if kind == layout.BOX:
+        return dot(_axis(p, w, o, which), D)[0], p[o + layout.SIZE + which]
+    s = dot(_axis(p, w, o, 2), D)[0]
+    if which == 0:
+        return s, p[o + layout.SIZE + 1]
+    return dot(D, D)[0] - s * s, p[o + layout.SIZE] ** 2  # about the axis: squares
+
+
+@kernels.helper
+def _from_solid(p: Array, w: Array, pair: int, C: Any) -> Any:
+    """Return the distance of a point from the surface of the second shape of a pair, and the direction to the point."""
+    o = pair + layout.SECOND
     kind, M, s = int(p[o].real), _point(p, w, o), o + layout.SIZE
     if kind == layout.SPHERE:
         d, n = solids.point(C, M)
         return shifted(d, -p[s]), n
+    sides = (_side(p, pair, kind, 0), _side(p, pair, kind, 1), _side(p, pair, kind, 2))
     if kind == layout.BOX:
-        return solids.box(C, M, _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2), (p[s], p[s + 1], p[s + 2]))
+        X, Y, Z = _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2)
+        return solids.box(C, M, X, Y, Z, (p[s], p[s + 1], p[s + 2]), sides)
     A = _axis(p, w, o, 2)
     if kind == layout.CYLINDER:
-        return solids.cylinder(C, M, A, p[s], p[s + 1])
-    d, n = solids.segment(C, M, A, p[s + 1])
+        return solids.cylinder(C, M, A, p[s], p[s + 1], sides)
+    d, n = solids.segment(C, M, A, p[s + 1], sides)
     return shifted(d, -p[s]), n
 
 
@@ -194,7 +219,7 @@ def touch(p: Array, w: Array, o: int, place: int) -> Any:
         return shifted(h, -p[o + layout.MARGIN]), n, at
     if first == layout.SPHERE:
         C, r = _point(p, w, one), p[one + layout.SIZE]
-        d, m = _from_solid(p, w, two, C)
+        d, m = _from_solid(p, w, o, C)
         c = value(C)
         return shifted(d, -r - p[o + layout.MARGIN]), (-m[0], -m[1], -m[2]), (
             c[0] - r * m[0], c[1] - r * m[1], c[2] - r * m[2],

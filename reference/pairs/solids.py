@@ -34,6 +34,9 @@ from crossbody.reference.pairs.jets import (
 PARALLEL = 1e-24
 """Square of the sine below which the nearest points of two lines are lost in rounding: those of segments that do not
 lie side by side are ends, whichever way that rounds."""
+OPEN, INSIDE, LOW = range(3)
+"""On which side of its bounds a coordinate is held: on none, so that it tells by itself; between; below; else above."""
+FREE = (OPEN, OPEN, OPEN)
 ABREAST = 1e-5  # part of the length that ends are in which are no more than abreast: the motion chooses, not the gap
 INSTANT = 1e-12
 """s, by which ways that are equal now are told apart."""
@@ -52,9 +55,13 @@ def _held(s: Jet, low: float, high: float) -> Jet:
 
 
 @kernels.helper
-def _beyond(s: Jet, half: float) -> Jet:
+def _beyond(s: Jet, half: float, side: int) -> Jet:
     """Return how far s is beyond -half .. half, with its sign; 0 between them."""
-    return less(s, _held(s, -half, half))
+    if side == OPEN:
+        return less(s, _held(s, -half, half))
+    if side == INSIDE:
+        return scaled(0.0, s)
+    return shifted(s, half if side == LOW else -half)
 
 
 @kernels.helper
@@ -72,9 +79,10 @@ def point(C: Vector, M: Vector) -> Distance:
 
 
 @kernels.helper
-def segment(C: Vector, M: Vector, A: Vector, half: float) -> Distance:
+def segment(C: Vector, M: Vector, A: Vector, half: float, sides: Any = FREE) -> Distance:
     """Return the distance of C from a segment about M along the unit vector A."""
-    return point(C, along(M, _held(dot(A, apart(C, M)), -half, half), A))
+    s = dot(A, apart(C, M))
+    return point(C, along(M, less(s, _beyond(s, half, sides[0])), A))
 
 
 @kernels.helper
@@ -87,11 +95,11 @@ def _face(s: Jet, half: float, X: Vector) -> Distance:
 
 
 @kernels.helper
-def box(C: Vector, M: Vector, X: Vector, Y: Vector, Z: Vector, size: Point) -> Distance:
+def box(C: Vector, M: Vector, X: Vector, Y: Vector, Z: Vector, size: Point, sides: Any = FREE) -> Distance:
     """Return the distance of C from a box about M with half sides along X, Y, Z; inside, from its nearest face."""
     D = apart(C, M)
     x, y, z = dot(X, D), dot(Y, D), dot(Z, D)
-    a, b, c = _beyond(x, size[0]), _beyond(y, size[1]), _beyond(z, size[2])
+    a, b, c = _beyond(x, size[0], sides[0]), _beyond(y, size[1], sides[1]), _beyond(z, size[2], sides[2])
     square = add(add(times(a, a), times(b, b)), times(c, c))
     if square[0].real > 0.0:
         zero = scaled(0.0, a)
@@ -111,18 +119,18 @@ def _scaled_to(D: Vector, length: Jet, d: Jet) -> Vector:
 
 
 @kernels.helper
-def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float) -> Distance:
+def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float, sides: Any = FREE) -> Distance:
     """Return the distance of C from a cylinder about M along A; inside, from its side or its nearer end."""
     D = apart(C, M)
     s = dot(A, D)
     out = along(D, scaled(-1.0, s), A)
     square = dot(out, out)
-    wide = square[0].real > radius.real**2
-    if abs(s[0].real) > half.real:
+    wide = square[0].real > radius.real**2 if sides[1] == OPEN else sides[1] != INSIDE
+    if abs(s[0].real) > half.real if sides[0] == OPEN else sides[0] != INSIDE:
         if not wide:
             return _face(s, half, A)
         rho = root(square)
-        a, b = shifted(rho, -radius), _beyond(s, half)
+        a, b = shifted(rho, -radius), _beyond(s, half, sides[0])
         far = root(add(times(a, a), times(b, b)))
         return _toward(along(_scaled_to(out, a, rho), b, A), far)
     if not wide and abs(s[0].real) - half.real > np.sqrt(square[0].real) - radius.real:

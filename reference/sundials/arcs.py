@@ -41,6 +41,7 @@ LOOSE = 1e-2  # of the size of a multiplier: it follows from the state
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 FAR = 1e30  # beyond this a motion has diverged
 SAME_INSTANT = 8.0 * ULP
+MANY = 100  # rows: from there on those that are off have no unknowns; they would be most of a norm, and of a Jacobian
 NOISY = 64.0  # rounding of a multiplier along a step, in units of its bound at the start
 MOST_TERMS = 5  # of the guards of one row
 ENDLESS = 2**62
@@ -118,6 +119,7 @@ class Arc:
         self.nq, self.ny = scene.equations.system.nq, scene.equations.system.nq + scene.equations.system.n
         self.single, self.fresh = single, True
         self.guards = [*scene.machine.guards, *scene.discrete.watched()]
+        *self.firsts, self.terms = np.cumsum([0, *(len(guard.terms) for guard in self.guards)]).tolist()
         scene.looks.begin(self.guards, scene.machine.frozen, scene.machine.tied)
         self.ask = scene.looks.ask
         scene.work["clock"][:2] = -np.inf, _damped_pole(scene.equations)
@@ -140,6 +142,29 @@ class Arc:
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
         """The solver, and where it starts."""
         raise NotImplementedError
+
+    def _unknowns(self, carried: int, y: Floats) -> None:
+        """Say which entries of a whole vector the solver has: all, or of many rows those that are active.
+
+        Args:
+            carried: how many sets of an entry a row stand behind q and v, before the accounts of work.
+            y: the vector at the start.
+        """
+        e, nc, nz = self.scene.equations, self.scene.equations.system.nc, self.scene.nz
+        self.whole, self.kept = y.copy(), np.arange(len(y))
+        if nc < MANY or e.spread is not None:  # shared multipliers may stand in any row
+            return
+        idle = np.setdiff1d(np.arange(nc), e.active)
+        firsts = [self.ny + k * nc for k in range(carried)] + [len(y) - nz] * (nz > 0)
+        self.kept = np.setdiff1d(self.kept, np.concatenate([np.zeros(0, dtype=int), *(at + idle for at in firsts)]))
+
+    def _wide(self, y: Floats) -> Floats:
+        """The whole vector of one of the solver's: what has no unknown stands still."""
+        if len(y) == len(self.whole):
+            return y
+        wide = self.whole.copy()
+        wide[self.kept] = y
+        return wide
 
     def _state(self, t: float, y: Floats) -> State:
         raise NotImplementedError
@@ -215,13 +240,13 @@ class Arc:
                 known[t] = self.scene.looks.values.copy()
             return known[t]
 
-        end, found, at = self.t1, [], 0
+        end, found = self.t1, []
         precision = max(64.0 * ULP, SHARE * self.options.rtol)
-        above = roots.stay_above(terms, self.t0, self.t1)
-        for guard, open_ in zip(self.guards, self.scene.work["undecided"].tolist(), strict=False):
-            mine, at = slice(at, at + len(guard.terms)), at + len(guard.terms)
-            if not open_ or above[mine].any():
-                continue
+        above = roots.stay_above(terms, self.t0, self.t1)[: self.terms]  # behind them stand those of earlier arcs
+        open_ = self.scene.work["undecided"][: len(self.guards)] != 0
+        for k in np.flatnonzero(open_ & ~np.logical_or.reduceat(above, self.firsts)).tolist():
+            guard = self.guards[k]
+            mine = slice(self.firsts[k], self.firsts[k] + len(guard.terms))
 
             def its_own(t: float, mine: slice = mine) -> Floats:
                 return terms(t)[mine]
@@ -270,21 +295,29 @@ class CvodeArc(Arc):
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
         scene, call, lines = self.scene, self.scene.looks.call, self.scene.looks.lines
 
-        def rhs(t: float, y: Floats, yp: Floats) -> None:
+        whole = np.concatenate([start.q, start.v, start.z])
+        self._unknowns(0, whole)
+        kept, slopes = self.kept, np.empty(len(whole))
+
+        def all_of_them(t: float, y: Floats, yp: Floats) -> None:
             if code := call(evaluation.DERIVATIVE, t, y, yp, lines):
                 raise Ended(ENDS[code], scene.equations.active)
 
+        def some(t: float, y: Floats, yp: Floats) -> None:
+            all_of_them(t, self._wide(y), slopes)
+            yp[:] = slopes[kept]
+
+        rhs = all_of_them if len(kept) == len(whole) else some
         if self.method == "Adams":
             scene.work["count"][3] = STALLED
         order = {"max_order": ORDER_IN_CONTACT if scene.equations.active else ORDER} if self.method == "Adams" else {}
-        solver = CVODE(rhs, method=self.method, atol=self._tolerances(), **self.common, **order)
-        y = np.concatenate([start.q, start.v, start.z])
-        solver.init_step(start.t, y)
-        return solver, y
+        solver = CVODE(rhs, method=self.method, atol=self._tolerances()[kept], **self.common, **order)
+        solver.init_step(start.t, whole[kept])
+        return solver, whole[kept]
 
     def _state(self, t: float, y: Floats) -> State:
-        nq, ny = self.nq, self.ny
-        return State(t, y[:nq], y[nq:ny], y[ny:])
+        nq, ny, whole = self.nq, self.ny, self._wide(y)
+        return State(t, whole[:nq], whole[nq:ny], whole[ny:])
 
 
 class BdfArc(CvodeArc):
@@ -318,23 +351,35 @@ class IdaArc(Arc):
         looks.work["rigid"][self.rigid] = range(nb)
         looks.work["scale"][e.active] = self._masses(start)
 
-        def residual(t: float, y: Floats, yp: Floats, out: Floats) -> None:
+        zero = np.zeros(nb)
+        whole = np.concatenate([start.q, start.v, view.alone, zero, start.z])
+        self._unknowns(1, whole)
+        kept, left = self.kept, np.empty(len(whole))
+
+        def all_of_them(t: float, y: Floats, yp: Floats, out: Floats) -> None:
             slopes[:] = yp
             if code := call(evaluation.RESIDUAL, t, y, out, lines):
                 raise Ended(ENDS[code], e.active)
 
+        def some(t: float, y: Floats, yp: Floats, out: Floats) -> None:
+            slopes[:] = 0.0
+            slopes[kept] = yp
+            if code := call(evaluation.RESIDUAL, t, self._wide(y), left, lines):
+                raise Ended(ENDS[code], e.active)
+            out[:] = left[kept]
+
         own = self._tolerances()
         atol = np.concatenate([own[:ny], self._watched(start), np.full(nb, UNWATCHED), own[ny:]])
+        algebraic = np.flatnonzero((kept >= ny) & (kept < ny + nc + nb)).tolist()
         solver = IDA(
-            residual, atol=atol, algebraic_idx=list(range(ny, ny + nc + nb)), first_step=self._first_step(),
-            **self.common,
+            all_of_them if len(kept) == len(whole) else some, atol=atol[kept], algebraic_idx=algebraic,
+            first_step=self._first_step(), **self.common,
         )  # fmt: skip
         powers = e.powers(start.t, start.q, start.v, view.lam) if nz else np.zeros(0)
-        zero = np.zeros(nb)
-        y = np.concatenate([start.q, start.v, view.alone, zero, start.z])
         qd = e.system.rates(start.q, start.v, start.t, e.p)
-        solver.init_step(start.t, y, np.concatenate([qd, view.vd, np.zeros(nc), zero, powers]))
-        return solver, y
+        rates = np.concatenate([qd, view.vd, np.zeros(nc), zero, powers])
+        solver.init_step(start.t, whole[kept], rates[kept])
+        return solver, whole[kept]
 
     def _masses(self, start: State) -> Floats:
         """What a row moves, 1 / (H M^-1 H^T)_ii, of the active rows: its equation is one of forces then."""
@@ -369,7 +414,7 @@ class IdaArc(Arc):
         return float(CAUTIOUS * np.sqrt(SHARE * self.options.rtol) / fastest)
 
     def _state(self, t: float, y: Floats) -> State:
-        nq, ny = self.nq, self.ny
+        nq, ny, y = self.nq, self.ny, self._wide(y)
         # At index 1 lam follows from the state.
         if not self.rigid:
             return State(t, y[:nq], y[nq:ny], y[self.work])

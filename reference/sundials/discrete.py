@@ -7,12 +7,12 @@ import numpy as np
 from crossbody.cases import Mode, Outcome, Switch
 from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
-from crossbody.reference.kernels import CHANGED, LOST, START, TOUCHED
+from crossbody.reference.kernels import CHANGED, GIVEN, LOST, START, TOUCHED
 from crossbody.reference.sundials.compiled.evaluation import Kind
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import Guard, Term
 
-__all__ = ["START", "TOUCHED", "Discrete"]
+__all__ = ["GIVEN", "START", "TOUCHED", "Discrete"]
 
 
 class Discrete:
@@ -30,6 +30,12 @@ class Discrete:
         end = len(self.p) - system.latched
         self._values = self.p[end - np.size(system.discrete) : end]
 
+    def give(self, rtol: float, u: Floats) -> bool:
+        """Write tolerance and inputs (nu,) where the mechanism looks for them; whether it does."""
+        if self.system.kinks:
+            self.p[len(self.p) - len(u) - 1 :] = [rtol, *u]
+        return self.system.kinks > 0
+
     def watched(self) -> list[Guard]:
         """The mechanism's own guards."""
         return [Guard(i, None, [Term(Kind.WATCH, i)]) for i in range(self.guards)]
@@ -44,8 +50,11 @@ class Discrete:
             return False, modes
         before, wanted = self._values.copy(), np.array(modes, dtype=np.int8)
         code = int(self.system.switch(t, q, v, self.p, wanted, int(fired)))
+        jumping = len(before) - self.system.kinks
         for k in np.flatnonzero(self._values != before).tolist():
-            self.switches.append(Switch(t=t, variable=k, before=int(before[k]), after=int(self._values[k])))
+            old, new = int(before[k]), int(self._values[k])
+            if k < jumping or old * new != 0:
+                self.switches.append(Switch(t=t, variable=k, before=old, after=new, smooth=k >= jumping))
         if code == LOST:
             raise Ended(Outcome.LOST)
         return code == CHANGED, [Mode(m) for m in wanted.tolist()]

@@ -330,7 +330,7 @@ class LevelMachine:
         active = list(self.equations.active)
         M, H = self.equations.held(t, q, v, [*active, *open_])
         A = np.linalg.solve(np.linalg.cholesky(M), H.T).T
-        A /= np.linalg.norm(A, axis=1)[:, None]
+        A /= np.maximum(np.linalg.norm(A, axis=1), np.finfo(float).tiny)[:, None]  # one that moves nothing is 0
         held = A[: len(active)]
         self.tied = {
             i: self._lifted.get(i, -np.inf)

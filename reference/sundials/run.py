@@ -18,14 +18,14 @@ import numpy as np
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
 from crossbody.cases._control import Control, NotFinite
 from crossbody.reference._activations import Live
-from crossbody.reference._blame import dependence, not_finite
+from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import Options
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
 from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
 from crossbody.reference.sundials.compiled.evaluation import entry, linear_arc
-from crossbody.reference.sundials.discrete import START, TOUCHED, Discrete
+from crossbody.reference.sundials.discrete import GIVEN, START, TOUCHED, Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.folds import Folds
 from crossbody.reference.sundials.frozen_machine import FrozenMachine
@@ -111,6 +111,10 @@ class SundialsRun:
                 self._drive(began, progress)
         except Ended as end:
             outcome, self.ended_rows = end.outcome, end.rows
+            if outcome is Outcome.STEP_TOO_SMALL:
+                active = np.array(self.equations.active, dtype=np.int64)
+                gone = vanished(self.system, active, self.q0, self.state.q, self.state.v)
+                outcome, self.ended_rows = (Outcome.ILL_POSED, gone) if gone else (outcome, self.ended_rows)
         except KeyboardInterrupt:
             outcome = Outcome.INTERRUPTED
         return outcome, time.perf_counter() - began
@@ -119,6 +123,7 @@ class SundialsRun:
         t_end = self.options.t_end
         stop = self._take_inputs()
         self._discretely(START)
+        self._give()
         view = self._settle(switched=True)
         self._sample(view.lam)
         self.folds.begin(self.state.t, self.state.q, self.state.v)
@@ -134,6 +139,7 @@ class SundialsRun:
             at_stop = self.state.t >= stop
             if at_stop and stop < t_end:
                 stop = self._take_inputs()
+                self._give()
             if switched or (at_stop and self.state.t < t_end):
                 view = self._settle(switched)
                 arc = self._arc(view)
@@ -306,6 +312,11 @@ class SundialsRun:
         if system.control is not None:
             stops.append(self.next_tick * system.tick)
         return float(min(stops))
+
+    def _give(self) -> None:
+        """Let a mechanism that looks at its inputs see those that hold from now on."""
+        if self.discrete.give(self.options.rtol, self.equations.u):
+            self._discretely(GIVEN)
 
     def _control(self, s: State) -> None:
         """Let the sampled controller set the inputs.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
+from crossbody.reference._cache import inlined
 from crossbody.reference._kinds import Array
 from crossbody.reference.tree import layout, strings
 
@@ -17,6 +18,24 @@ def clamped(x: Any, low: Any, high: Any) -> Any:
     if x.real < low.real:
         return low + 0.0 * x
     return high + 0.0 * x if x.real > high.real else x
+
+
+@inlined
+def side(p: Array, bend: int) -> int:
+    """Return on which side of the kink whose number stands at p[bend] a run is."""
+    k = int(p[bend].real)
+    return int(p[int(p[layout.AT_BEND].real) + k].real) if k >= 0 else layout.OPEN
+
+
+@inlined
+def held(x: Any, p: Array, o: int) -> Any:
+    """Return x within the bounds at p[o:], as it is on the side of its kink that holds."""
+    now = side(p, o + layout.BOUNDS_BEND)
+    if now == layout.OPEN:
+        return clamped(x, p[o], p[o + 1])
+    if now == layout.INSIDE:
+        return x
+    return p[o + now - layout.LOW] + 0.0 * x
 
 
 @kernels.helper
@@ -49,7 +68,8 @@ def stored(p: Array, k: int, x: Any) -> Any:
 @kernels.helper
 def damper(p: Array, b: int, v: Any) -> Any:
     """Return b0 v + b1 v |v| + b2 v^3 by the constants at p[b:]."""
-    size = v if v.real > 0.0 else -v
+    now = side(p, b + layout.DAMPER_BEND)
+    size = v if now == layout.HIGH or (now == layout.OPEN and v.real > 0.0) else -v
     return v * (p[b] + size * p[b + 1] + v * v * p[b + 2])
 
 
@@ -76,9 +96,7 @@ def rate(v: Array, p: Array, o: int) -> Any:
 @kernels.helper
 def slack(p: Array, o: int, x: Any) -> Any:
     """Return how far a length is outside the dead band of the tendon at p[o:]."""
-    if x.real > p[o + layout.BAND + 1].real:
-        return x - p[o + layout.BAND + 1]
-    return x - p[o + layout.BAND] if x.real < p[o + layout.BAND].real else 0.0 * x
+    return x - held(x, p, o + layout.BAND)
 
 
 @kernels.helper
@@ -155,43 +173,65 @@ def actuated(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, sums: A
     """Add the actuators' forces to sums (n,), each within its own bounds; w holds poses if one acts between points."""
     for i in range(int(p[layout.ACTUATORS].real)):
         o = int(p[layout.AT_ACTUATOR].real) + layout.ACTUATOR * i
-        which, a = int(p[o + layout.WHICH].real), activation(t, u, p, o, i)
-        if p[o + layout.TARGET].real == layout.ON_TENDON:
-            at = tendon(p, which)
-            x, speed = measured(q, v, p, w, at)
-            force = p[o + layout.GEAR] * actuator(p, o, a, p[o + layout.GEAR] * x, p[o + layout.GEAR] * speed)
-            if p[at + layout.COUNT].real < 0.0:
-                strings.along(p, at + layout.FIRST, w, force, sums)
-            else:
-                pull(p, at, force, sums)
-            continue
-        width, speed = 0, 0.0 * v[0]
-        for k in range(6):
-            if p[o + layout.GEAR + k] != 0.0 and which + k < len(v):
-                speed += p[o + layout.GEAR + k] * v[which + k]
-                width = k + 1
-        x = p[o + layout.GEAR] * q[int(p[o + layout.ANGLE].real)] if width == 1 else 0.0 * speed
-        force = actuator(p, o, a, x, speed)
-        for k in range(width):
-            sums[which + k] += p[o + layout.GEAR + k] * force
+        exert(p, w, o, held(unbounded(t, q, v, u, p, w, i), p, o + layout.FORCE), sums)
 
 
 @kernels.helper
-def activation(t: float, u: Array, p: Array, o: int, i: int) -> Any:
-    """Return what drives actuator i at p[o:]: its control, or the activation that follows it from an instant on."""
+def exert(p: Array, w: Array, o: int, force: Any, sums: Array) -> None:
+    """Add what the force of the actuator at p[o:] does to the joints."""
+    which = int(p[o + layout.WHICH].real)
+    if p[o + layout.TARGET].real == layout.ON_JOINT:
+        for k in range(6):
+            if p[o + layout.GEAR + k] != 0.0 and which + k < len(sums):
+                sums[which + k] += p[o + layout.GEAR + k] * force
+        return
+    at, force = tendon(p, which), p[o + layout.GEAR] * force
+    if p[at + layout.COUNT].real < 0.0:
+        strings.along(p, at + layout.FIRST, w, force, sums)
+    else:
+        pull(p, at, force, sums)
+
+
+@inlined
+def moved(q: Array, v: Array, p: Array, w: Array, o: int) -> tuple[Any, Any]:
+    """Return the length of the actuator at p[o:], 0 where its joint has none, and the rate of it."""
+    which = int(p[o + layout.WHICH].real)
+    if p[o + layout.TARGET].real == layout.ON_TENDON:
+        x, speed = measured(q, v, p, w, tendon(p, which))
+        return p[o + layout.GEAR] * x, p[o + layout.GEAR] * speed
+    width, speed = 0, 0.0 * v[0]
+    for k in range(6):
+        if p[o + layout.GEAR + k] != 0.0 and which + k < len(v):
+            speed += p[o + layout.GEAR + k] * v[which + k]
+            width = k + 1
+    return p[o + layout.GEAR] * q[int(p[o + layout.ANGLE].real)] if width == 1 else 0.0 * speed, speed
+
+
+@inlined
+def unheld(t: float, u: Array, p: Array, o: int, i: int) -> Any:
+    """Return what drives actuator i at p[o:], but for the range of an activation, which follows from an instant on."""
     c = clamped(u[i], p[o + layout.CONTROL], p[o + layout.CONTROL + 1])
     kind = p[o + layout.ACTIVATION].real
     if kind == layout.DIRECT:
         return c
     k = int(p[o + layout.SINCE].real)
     since, a = t - u[k], u[k + 1]
-    a = a + c * since if kind == layout.INTEGRATOR else c + (a - c) * np.exp(-since / p[o + layout.TAU])
-    return clamped(a, p[o + layout.SPAN], p[o + layout.SPAN + 1])
+    return a + c * since if kind == layout.INTEGRATOR else c + (a - c) * np.exp(-since / p[o + layout.TAU])
+
+
+@inlined
+def unbounded(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, i: int) -> Any:
+    """Return the force of actuator i before its bounds."""
+    o = int(p[layout.AT_ACTUATOR].real) + layout.ACTUATOR * i
+    a = unheld(t, u, p, o, i)
+    if p[o + layout.ACTIVATION].real != layout.DIRECT:
+        a = held(a, p, o + layout.SPAN)
+    x, speed = moved(q, v, p, w, o)
+    gain = p[o + layout.GAIN] + p[o + layout.GAIN + 1] * x + p[o + layout.GAIN + 2] * speed
+    return gain * a + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
 
 
 @kernels.helper
-def actuator(p: Array, o: int, a: Any, x: Any, speed: Any) -> Any:
-    """Return the force of the actuator at p[o:] at a length and its rate, driven by a."""
-    gain = p[o + layout.GAIN] + p[o + layout.GAIN + 1] * x + p[o + layout.GAIN + 2] * speed
-    force = gain * a + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
-    return clamped(force, p[o + layout.FORCE], p[o + layout.FORCE + 1])
+def bounded(p: Array, sums: Array, j: int) -> Any:
+    """Return the sum (n,) of the actuators' forces on velocity j within its bounds."""
+    return held(sums[j], p, int(p[layout.AT_DOF].real) + layout.DOF * j + layout.SUM)

@@ -9,27 +9,37 @@ FREE, BALL, SLIDE, HINGE = range(4)
 NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, AT_ROW, AT_NODE, AT_PAIR = (
     0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13,
 )  # fmt: skip
-# Last, how many pairs of shapes lie to each other in more than one way.
-RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, LYING, HEAD = 14, 15, 16, 17, 18, 19, 20, 21
+# Then how many pairs of shapes lie to each other in more than one way; how many kinks forces have, where these, the
+# sides on which they are, and their bands stand, and the tolerance that is in force: the inputs follow it.
+RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, LYING, KINKS, AT_KINK, AT_BEND, AT_BAND, AT_TOLD = range(14, 26)
+SUMMED, GAPPED, HEAD = 26, 27, 28  # how many of the kinks are those of sums of forces, and of gaps
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (
     0, 1, 2, 3, 4, 5, 6, 42, 45, 48, 49, 52, 58, 62, 65, 69,
 )  # fmt: skip
+# Behind two bounds, and behind the constants of a damper, stands the number of the kink there; -1 where there is none.
+BOUNDS_BEND, DAMPER_BEND = 2, 3
 # A degree of freedom: the one before it on the way to the world, armature, damping, bounds of its actuators' sum.
-BEFORE, ARMATURE, DAMPING, FORCE_LOW, FORCE_HIGH, DOF = 0, 1, 2, 5, 6, 7
+BEFORE, ARMATURE, DAMPING, SUM, DOF = 0, 1, 2, 6, 9
 # An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds; of its
 # activation what it is, its time constant and bounds, and where in u the instant and the value stand that it goes from.
 TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTIVATION, TAU, SPAN, SINCE, ACTUATOR = (
-    0, 1, 2, 3, 9, 12, 15, 17, 19, 20, 21, 23, 24,
+    0, 1, 2, 3, 9, 12, 15, 17, 20, 21, 22, 25, 26,
 )  # fmt: skip
 ON_JOINT, ON_TENDON = 0, 1
 DIRECT, INTEGRATOR, FILTER = range(3)
 # A push: the node that it acts on, and where in its frame.
 PUSHED, PUSH = 0, 4
-# A tendon: its spring, damper and bounds; then joint by joint the coordinate, the velocity and the coefficient. One
+# A kink: what bends there, of which actuator, degree of freedom, tendon or pair; of a pair which of its kinks, and the
+# row that it matters to while that is in contact.
+BEND, OF, BENDS, BENT_ROW, KINK = 0, 1, 2, 3, 4
+FORCE_BENDS, SUM_BENDS, ACTIVATION_BENDS, SPRING_BENDS, DRAG_BENDS, TENDON_DRAG_BENDS, GAP_BENDS = range(7)
+# On which side of a kink a value is: not held, so that the value itself tells; between both bounds; below; above.
+OPEN, INSIDE, LOW, HIGH = range(4)
+# A tendon: its spring, damper and dead band; then joint by joint the coordinate, the velocity and the coefficient. One
 # between two points has -3 joints, and in their room a node and a point in its frame, twice.
-COUNT, STIFF, DAMP, BAND, FIRST, POINTS = 0, 1, 4, 7, 9, -3
+COUNT, STIFF, DAMP, BAND, FIRST, POINTS = 0, 1, 4, 8, 11, -3
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
 LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING, BALL_LIMIT = range(9)

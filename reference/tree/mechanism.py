@@ -31,13 +31,11 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
     forces.passive(q, v, p, f)
     sweeps.outwards(q, v, p, w)
     if len(u) > 0:
-        n, at_dof = len(f), int(p[layout.AT_DOF].real)
-        sums = w[len(w) - n :]
+        sums = w[len(w) - len(f) :]
         sums[:] = 0.0
         forces.actuated(t, q, v, u, p, w, sums)
-        for j in range(n):
-            o = at_dof + layout.DOF * j
-            f[j] += forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
+        for j in range(len(f)):
+            f[j] += forces.bounded(p, sums, j)
     if p[layout.SPANNED].real > 0.0:
         forces.stretched(p, w, f)
     sweeps.inwards(p, w, M, f)
@@ -217,8 +215,7 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
         sums = np.zeros(n, dtype=q.dtype)
         forces.actuated(t, q, v, u, p, w, sums)
         for j in range(n):
-            o = at_dof + layout.DOF * j
-            given += v[j] * forces.clamped(sums[j], p[o + layout.FORCE_LOW], p[o + layout.FORCE_HIGH])
+            given += v[j] * forces.bounded(p, sums, j)
     for j in range(n):
         taken += v[j] * forces.damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
     for i in range(int(p[layout.TENDONS].real)):

@@ -1,4 +1,4 @@
-"""What a scene's rows are branched on: which side a ball joint's angle counts from, how two shapes lie to each other.
+"""What a scene is branched on: how two shapes lie, from which side a ball joint's angle counts, where forces bend.
 
 Each is a variable that holds from one instant to the next: inside a step the rows go on as smooth as the motion.
 """
@@ -9,10 +9,10 @@ import numpy as np
 
 from crossbody.reference import kernels
 from crossbody.reference._kinds import Bytes, Floats
-from crossbody.reference.kernels import CHANGED, START, UNCHANGED
+from crossbody.reference.kernels import CHANGED, GIVEN, START, TOUCHED, UNCHANGED
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import chosen, lowest, touch, turn, upside_down
-from crossbody.reference.tree import balls, layout, sweeps
+from crossbody.reference.tree import balls, kinks, layout, sweeps
 
 FREE, CONTACT = 0, 1  # modes, as in crossbody.cases.Mode
 
@@ -27,10 +27,22 @@ def _pair(p: Floats, i: int) -> int:
     return o if p[o + pairs.LIES] >= 0.0 else -1
 
 
+@kernels.helper
+def _posed(q: Floats, v: Floats, p: Floats) -> Floats:
+    """Return the scratch of the outward sweep, if something looks at poses."""
+    return sweeps.posed(q, v, p) if p[layout.LYING] > 0.0 or p[layout.SPANNED] > 0.0 or kinks.held(p) else q
+
+
 @kernels.watch
 def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
-    """Of every bound of a ball joint how far it is from half a turn, of every pair from lying otherwise."""
-    w = sweeps.posed(q, v, p) if p[layout.LYING] > 0.0 else q
+    """Of every bound of a ball joint how far it is from half a turn, of pairs from lying otherwise, of kinks."""
+    w = _posed(q, v, p)
+    bends = int(p[layout.KINKS])
+    first = len(g) - bends
+    if bends > 0:
+        kinks.look(t, q, v, p, w, g[first:])
+    if first == 0:
+        return
     for i in range(int(p[layout.ROWS])):
         o = int(p[layout.AT_ROW]) + layout.ROW * i
         if int(p[o]) == layout.BALL_LIMIT:
@@ -88,13 +100,31 @@ def _lie(p: Floats, w: Floats, o: int, i: int, mode: Bytes) -> None:
         mode[i], mode[i + 1] = mode[i + 1], mode[i]
 
 
+@kernels.helper
+def _bend(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> None:
+    """Choose the sides of kinks that are to be chosen, and change the one that has come to its end."""
+    sides, looked, w, total = int(p[layout.AT_BEND]) - int(p[layout.AT_SIDE]), False, q, q
+    for k in range(int(p[layout.KINKS])):
+        anew = kinks.wants(p, k, mode, fired == GIVEN)
+        if not anew and fired != sides + k:
+            continue
+        if not looked:
+            looked, w = True, sweeps.posed(q, v, p)
+            total = kinks.sums(t, q, v, kinks.inputs(p), p, w)
+        kinks.choose(t, q, v, p, w, total, k, not anew)
+
+
 @kernels.switch
 def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> int:
-    """Choose sides and ways at the start, and change the one that has come to its end."""
-    if fired < 0 and fired != START:
-        return int(UNCHANGED)
-    w = sweeps.posed(q, v, p) if p[layout.LYING] > 0.0 else q
-    first = int(p[layout.AT_SIDE])
+    """Choose sides and ways at the start, and change the one that has come to its end.
+
+    Sides of kinks are chosen whenever the inputs change.
+    """
+    first, sides = int(p[layout.AT_SIDE]), int(p[layout.AT_BEND]) - int(p[layout.AT_SIDE])
+    if fired in (TOUCHED, GIVEN) or fired >= sides:
+        _bend(t, q, v, p, mode, fired)
+        return int(UNCHANGED if fired == TOUCHED else CHANGED)
+    w = _posed(q, v, p)
     for i in range(int(p[layout.ROWS])):
         o, pair = int(p[layout.AT_ROW]) + layout.ROW * i, _pair(p, i)
         if int(p[o]) == layout.BALL_LIMIT:

@@ -53,17 +53,18 @@ def system(
     turning: dict[str, Any] = {}
     if table.quaternions:
         turning = {"velocity": velocity, "quaternions": table.quaternions}
-    if table.sides:
+    if table.sides or table.kinks:
         turning |= {
             "watch": switches.watch,
             "switch": switches.switch,
-            "guards": table.sides,
-            "discrete": np.zeros(table.sides),
-            "latched": table.phases,
+            "guards": table.sides + table.kinks,
+            "discrete": np.zeros(table.sides + table.kinks),
+            "latched": table.latched,
+            "kinks": table.kinks,
         }
     fields: dict[str, Any] = dict(
         n=scene.nv, nq=scene.nq, above=dof_parents(table),
-        parameters=table.p[: len(table.p) - table.sides - table.phases], **turning,
+        parameters=table.p[: table.constants], **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS,

@@ -69,7 +69,8 @@ class Table:
     """A scene for the kernels.
 
     Attributes:
-        p: the parameters of the kernels, `sides` discrete variables and `phases` angles at their end.
+        p: the parameters of the kernels; at their end `sides` and then `kinks` discrete variables, `phases` angles,
+            the kinks' bands, the tolerance and the inputs.
         places: body -> where it stands.
         nodes: number of nodes.
         dofs: joint -> its first velocity.
@@ -83,6 +84,18 @@ class Table:
     coordinates: dict[str, int]
     sides: int
     phases: int
+    kinks: int
+
+    @property
+    def latched(self) -> int:
+        """How many numbers follow the discrete variables."""
+        inputs = len(self.p) - int(self.p[layout.AT_TOLD])
+        return self.phases + (self.kinks + inputs if self.kinks else 0)
+
+    @property
+    def constants(self) -> int:
+        """How many numbers stand before the discrete variables."""
+        return int(self.p[layout.AT_SIDE])
 
     @property
     def quaternions(self) -> list[int]:
@@ -139,6 +152,7 @@ class _Builder:
         self.nq = 0
         self.resting = 0.0
         self.sides = self.phases = 0
+        self.kinks: list[tuple[int, ...]] = []
 
     def table(self) -> Table:
         for body in self.scene.bodies:
@@ -147,7 +161,7 @@ class _Builder:
             row[layout.MASS : layout.STIFFNESS] = inertia.row()
         return Table(
             p=self._packed(), places=self.places, nodes=len(self.rows), dofs=self.dofs, coordinates=self.coordinates,
-            sides=self.sides, phases=self.phases,
+            sides=self.sides, phases=self.phases, kinks=len(self.kinks),
         )  # fmt: skip
 
     def _place(self, body: Body) -> None:
@@ -188,18 +202,27 @@ class _Builder:
         previous = self.last_dof[before.node] if before.node >= 0 else -1
         for k in range(width_v):
             low, high = joint.force_range
-
-            self.dof_rows.append(np.array([previous, joint.armature, *joint.damping, low, high]))
+            drag = self._bend(layout.DRAG_BENDS, dof + k, joint.damping[1] != 0.0)
+            acted = any(_moves(one) and (one.joint == joint.name or one.tendon) for one in self.scene.actuators)
+            bend = self._bend(layout.SUM_BENDS, dof + k, acted and _bends(joint.force_range))
+            self.dof_rows.append(np.array([previous, joint.armature, *joint.damping, drag, low, high, bend]))
             previous = dof + k
         self.last_dof.append(previous)
         self.rows.append(row)
         self.inertias.append(Inertia())
         self.nq += width_q
 
+    def _bend(self, kind: int, of: int, there: bool, which: int = 0, row: int = 0) -> int:
+        """Return the number of a kink, -1 if it is not there."""
+        if not there:
+            return -1
+        self.kinks.append((kind, of, which, row))
+        return len(self.kinks) - 1
+
     def _packed(self) -> Floats:
         scene = self.scene
-        actuators = [self._actuator(actuator) for actuator in scene.actuators]
-        tendons = [self._tendon(tendon) for tendon in scene.tendons]
+        actuators = [self._actuator(i, actuator) for i, actuator in enumerate(scene.actuators)]
+        tendons = [self._tendon(i, tendon) for i, tendon in enumerate(scene.tendons)]
         rows = constraint_rows(scene, self)
         head = np.zeros(layout.HEAD)
         head[[layout.NODES, layout.DOFS, layout.ACTUATORS, layout.TENDONS, layout.ROWS]] = (
@@ -211,9 +234,9 @@ class _Builder:
         pushes = [self._push(push) for push in scene.pushes]
         head[layout.PUSHES] = len(pushes)
         head[layout.SPANNED] = sum(scene.acts_along(tendon) for tendon in scene.tendons if tendon.bodies)
-        pairs_ = pair_rows(scene, self)
+        pairs_ = pair_rows(scene, self, first=len(rows) - sum(contact.places for contact in contacts(scene)))
         for row in pairs_:
-            row[pairs.PHASE] += self.sides  # behind all that says how shapes lie
+            row[pairs.PHASE] += self.sides + len(self.kinks)  # behind all that says how shapes lie
         head[layout.LYING] = sum(row[pairs.LIES] >= 0.0 for row in pairs_)
         parts = [
             self.rows,
@@ -223,13 +246,21 @@ class _Builder:
             rows,
             pairs_,
             pushes,
-            [np.zeros(self.sides + self.phases)],
+            [np.array(kink, dtype=float) for kink in self.kinks],
+            [np.zeros(self.sides)],
+            [np.zeros(len(self.kinks) + self.phases)],
+            [np.zeros(len(self.kinks))],
+            [np.zeros(1 + len(scene.inputs) + 2 * len(scene.activated))] if self.kinks else [],
         ]
         starts = layout.HEAD + np.cumsum([0, *(sum(map(len, part)) for part in parts)])
         head[[
             layout.AT_NODE, layout.AT_DOF, layout.AT_ACTUATOR, layout.AT_TENDON, layout.AT_ROW, layout.AT_PAIR,
-            layout.AT_PUSH, layout.AT_SIDE,
+            layout.AT_PUSH, layout.AT_KINK, layout.AT_SIDE, layout.AT_BEND, layout.AT_BAND, layout.AT_TOLD,
         ]] = starts[:-1]  # fmt: skip
+        head[layout.KINKS] = len(self.kinks)
+        head[[layout.SUMMED, layout.GAPPED]] = [
+            sum(kink[0] == kind for kink in self.kinks) for kind in (layout.SUM_BENDS, layout.GAP_BENDS)
+        ]
         packed = np.concatenate([head, *(row for part in parts for row in part)])
         finite: Floats = np.clip(packed, -1e300, 1e300)
         return finite  # a bound that is not there: parameters are finite
@@ -245,7 +276,7 @@ class _Builder:
         com = next(body.com for body in self.scene.bodies if body.name == push.body)
         return np.array(self.placed(push.body, com))
 
-    def _actuator(self, actuator: Actuator) -> Floats:
+    def _actuator(self, i: int, actuator: Actuator) -> Floats:
         row = np.zeros(layout.ACTUATOR)
         if actuator.tendon:
             names = [tendon.name for tendon in self.scene.tendons]
@@ -271,33 +302,42 @@ class _Builder:
         else:
             raise SceneError(f"Actuator {actuator.name!r} acts on neither a joint nor a tendon.")
         row[layout.GAIN : layout.GAIN + 3], row[layout.BIAS : layout.BIAS + 3] = actuator.gain, actuator.bias
-        row[layout.CONTROL : layout.CONTROL + 2], row[layout.FORCE : layout.FORCE + 2] = (
-            actuator.control_range,
-            actuator.force_range,
-        )
+        bend = self._bend(layout.FORCE_BENDS, i, _moves(actuator) and _bends(actuator.force_range))
+        row[layout.CONTROL : layout.CONTROL + 2] = actuator.control_range
+        row[layout.FORCE : layout.FORCE + 3] = *actuator.force_range, bend
         if actuator.activation:
             kind = ("integrator", "filter").index(actuator.activation) + layout.INTEGRATOR
             place = [self.scene.actuators[i].name for i in self.scene.activated].index(actuator.name)
+            bend = self._bend(layout.ACTIVATION_BENDS, i, _bends(actuator.activation_range))
             row[layout.ACTIVATION : layout.SINCE + 1] = (
-                kind, actuator.time_constant, *actuator.activation_range, len(self.scene.inputs) + 2 * place,
+                kind, actuator.time_constant, *actuator.activation_range, bend, len(self.scene.inputs) + 2 * place,
             )  # fmt: skip
         return row
 
-    def _tendon(self, tendon: Tendon) -> Floats:
+    def _tendon(self, i: int, tendon: Tendon) -> Floats:
         b0, *others = tendon.damping
         b0 += sum(a.gear[0] ** 2 * a.damping for a in self.scene.actuators if a.tendon == tendon.name)
+        drag = self._bend(layout.TENDON_DRAG_BENDS, i, others[0] != 0.0)
+        bend = self._bend(layout.SPRING_BENDS, i, any(tendon.stiffness) and _bends(tendon.rest))
+        spring = *tendon.stiffness, b0, *others, drag, *tendon.rest, bend
         if tendon.bodies:
             ends = [self.placed(*end) for end in zip(tendon.bodies, tendon.positions, strict=True)]
-            return np.array([
-                layout.POINTS, *tendon.stiffness, b0, *others, *tendon.rest, *ends[0], *ends[1], 0.0,
-            ])  # fmt: skip
+            return np.array([layout.POINTS, *spring, *ends[0], *ends[1], 0.0])
         steps = [
             (self.coordinates[name], self.dofs[name], c)
             for name, c in zip(tendon.joints, tendon.coefficients, strict=True)
         ]
-        return np.array([
-            len(steps), *tendon.stiffness, b0, *others, *tendon.rest, *np.ravel(steps),
-        ])  # fmt: skip
+        return np.array([len(steps), *spring, *np.ravel(steps)])
+
+
+def _moves(actuator: Actuator) -> bool:
+    """Whether its force changes while its control holds."""
+    return bool(actuator.activation) or any(actuator.gain[1:]) or any(actuator.bias[1:])
+
+
+def _bends(bounds: Vector) -> bool:
+    """Whether there is room between bounds, and one of them is there."""
+    return bounds[0] < bounds[1] and bool(np.isfinite(bounds).any())
 
 
 def _pose(joint: Joint, before: Place) -> tuple[Floats, Floats, Floats]:
@@ -339,14 +379,14 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
     return rows
 
 
-def pair_rows(scene: Scene, builder: _Builder) -> list[Floats]:
+def pair_rows(scene: Scene, builder: _Builder, first: int) -> list[Floats]:
     """Return the pairs whose rows are contacts: two shapes, where the rows begin, and in how many ways they lie.
 
     Raises:
         SceneError: for shapes that do not move against each other.
     """
-    rows = []
-    for contact in contacts(scene):
+    rows, place = [], first
+    for i, contact in enumerate(contacts(scene)):
         one, two = (_shape(shape, builder.places) for shape in (contact.first, contact.second))
         if one[pairs.NODE] == two[pairs.NODE]:
             raise SceneError(f"Pair {contact.pair.name!r}: its shapes do not move against each other.")
@@ -355,7 +395,12 @@ def pair_rows(scene: Scene, builder: _Builder) -> list[Floats]:
             lies, builder.sides = builder.sides, builder.sides + 1
         if contact.first.type == "plane" and contact.parallel > 0.0:
             phase, builder.phases = builder.phases, builder.phases + 1
-        rows.append(np.concatenate([one, two, [contact.pair.margin, lies, contact.parallel, phase]]))
+        bends = pairs.BENDING.get(int(two[pairs.TYPE]), 0) if one[pairs.TYPE] == pairs.SPHERE else 0
+        bend = len(builder.kinks) if bends else -1
+        for which in range(bends):
+            builder._bend(layout.GAP_BENDS, i, True, which, place)
+        place += contact.places
+        rows.append(np.concatenate([one, two, [contact.pair.margin, lies, contact.parallel, phase, bend]]))
     return rows
 
 

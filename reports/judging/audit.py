@@ -76,23 +76,19 @@ def difference(mine: Any, theirs: Any) -> float:
     return worst / scale if scale else worst
 
 
-def states(case: Case, theirs: Mapping[str, Any] = MappingProxyType({})) -> list[tuple[Floats, Floats]]:
+def states(case: Case, theirs: Mapping[str, Any]) -> list[tuple[Floats, Floats]]:
     """Random states in which every contact is entered, the same for all engines; near the start if none can open.
 
     Args:
         case: the scene.
-        theirs: the reference's audit with gap(q) and H(q), by which contacts are entered; without them each coordinate
-            is taken for a gap of its own.
+        theirs: the reference's audit with gap(q) and H(q), by which contacts are entered.
     """
     draw = np.random.default_rng(SEED)
     n, nv = len(case.q0), len(case.v0)
-    if case.scene is not None or (len(case.law.a0) and not case.law.unilateral.any()):
+    if case.scene is not None or not case.law.unilateral.any() or "gap" not in theirs:
         near = [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, nv)) for _ in range(STATES)]
         return [(normalised(q, case.quaternions), v) for q, v in near]
-    if len(case.law.a0) and "gap" in theirs:
-        return [_entered(case, theirs["gap"], theirs["H"], draw) for _ in range(STATES)]
-    reach = 1e-2 * np.maximum(np.abs(case.q0), 1e-3)
-    return [(-reach * draw.uniform(0.01, 1.0, n), -draw.uniform(0.0, 1.0, n)) for _ in range(STATES)]
+    return [_entered(case, theirs["gap"], theirs["H"], draw) for _ in range(STATES)]
 
 
 def _entered(case: Case, gap: Any, H: Any, draw: np.random.Generator) -> tuple[Floats, Floats]:
@@ -129,10 +125,9 @@ def _function(
     worst = np.nan
     if key in mine:
         arguments = [(q,) if key in ("M", "H") else (q, v) for q, v in at]
-        values = [(mine[key](*a), theirs[key](*a)) for a in arguments]
-        known = [pair for pair in values if np.isfinite(_flat(pair[1])).all()]  # dependent rows have no one lam
-        if known:
-            a, b = (np.concatenate([_flat(pair[i]) for pair in known]) for i in (0, 1))
+        wanted = [(a, right) for a in arguments if np.isfinite(right := _flat(theirs[key](*a))).all()]
+        if wanted:  # dependent rows have no one lam
+            a, b = np.concatenate([_flat(mine[key](*a)) for a, _ in wanted]), np.concatenate([x for _, x in wanted])
             worst = difference(a, b)
     return _row(key, mine, f"{STATES} states", f"{STATES} states", worst, hidden)
 

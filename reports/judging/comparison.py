@@ -33,6 +33,8 @@ from crossbody.reports.judging.verdict import (
 if TYPE_CHECKING:
     from crossbody.engines import Run
 
+GROWING = frozenset({"position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path"})
+"""Metrics that compare a motion with the truth's."""
 TRUTH = "truth"
 """Engine and metric of the row that judges the truth itself."""
 LARGEST = "largest"
@@ -168,7 +170,7 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     until = case.t_end if case.chaos is None else min(case.chaos.until, case.t_end)
     value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
     short = truth.trusted < until
-    told = [truth.source] if case.chaos is None else [f"Chaos: {case.chaos.why}.", truth.source]
+    told = [f"{truth.source}."] if case.chaos is None else [f"Chaos: {case.chaos.why}.", f"{truth.source}."]
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
     return [Verdict(
@@ -204,8 +206,12 @@ class _Judge:
         self.command = f"{command} --engine {entry.engine}:{entry.profile}"
 
     def limit(self, metric: str) -> Limit | None:
-        """The limit that judges this run."""
-        return limit_for(self.limits, metric, self.entry.engine, self.entry.profile)
+        """The limit that judges this run, the wider the more errors grow."""
+        found, grows = limit_for(self.limits, metric, self.entry.engine, self.entry.profile), self.truth.grows
+        if found is None or metric not in GROWING or grows <= 1.0:
+            return found
+        why = f"{found.why}; the motion makes errors {grows:.2g} times as large as free flight does"
+        return replace(found, value=found.value * grows, why=why)
 
     def row(self, metric: str, value: float, unit: str, verdict: Word, why: str, **more: Any) -> Verdict:
         return Verdict(

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from time import process_time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Tier, Trajectory, _arguments
+from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Outcome, Tier, Trajectory, _arguments
 from crossbody.cases._arrays import Floats
 from crossbody.cases._rotations import differences
 from crossbody.cases._trajectory import Ledger
@@ -28,6 +28,13 @@ WITNESS = 100.0
 """Tolerance of the witness that shares nothing but the scene, likewise: a run in Python, whose steps cost 1e3 more."""
 WITNESS_S, SHARE = 40.0, 0.05
 """Time that this witness may take, s, by what it takes for the first part of the horizon, and that part."""
+COARSE, LEAST, MANY = 1e-9, 50, 20
+"""A scene is followed so tightly as takes up to so many times the steps of a coarse run, or of the least that counts:
+of a method of order 8 the tightest takes 3 times as many, unless rounding is what its errors are made of."""
+LADDER = (1.0, 10.0)
+"""Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
+NUDGE, DIRECTIONS, INSTANTS = 1e-7, 2, 201
+"""By how much of the largest velocity a start is put off, in how many directions, and when it is looked at."""
 METHODS = ("Adams", "BDF")
 """Of CVODE: the second costs less where rows, dampers or servos are stiff."""
 PARTED = 1e-6
@@ -54,6 +61,8 @@ class Truth:
         parted: when the two sources part, s; infinite if they never do.
         allowed: largest disagreement of the two sources, relative; NaN where there is one source alone.
         growth: rate at which the two part, 1/s; NaN unless they do.
+        grows: how many times more than in free flight an error of the start grows; 1 where it was not measured.
+        tight: tolerance of the compiled run; NaN of another source.
         joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
             each other and rest unloaded.
     """
@@ -67,6 +76,8 @@ class Truth:
     parted: float = math.inf
     allowed: float = math.nan
     growth: float = math.nan
+    tight: float = math.nan
+    grows: float = 1.0
     joined: bool = False
 
 
@@ -104,7 +115,8 @@ def truth_of(case: Case) -> Truth:
     _arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
-        return _integrated(case, _tight(case), "cvode" if case.fsm == "level" else "compiled")
+        case, first = tightened(case)
+        return _integrated(case, first, "cvode" if case.fsm == "level" else "compiled")
     motion = case.closed_form
     first = motion(np.zeros(1))
     truth = Truth(
@@ -154,11 +166,36 @@ def law_of(followed: Case) -> Truth | None:
     return replace(found, source=rule + found.source)
 
 
-def _tight(case: Case) -> Trajectory:
+def tightened(case: Case) -> tuple[Case, Trajectory]:
+    """Return a scene with the tightest tolerance that rounding leaves it, and its motion there.
+
+    Stiff rows on small masses reach theirs before.
+    """
+    if case.scene is None:
+        return case, _tight(case)
+    from crossbody.engines import load
+
+    coarse = _motion(load("reference").prepare(case, "compiled", rtol=COARSE))
+    most = MANY * max(coarse.steps, LEAST)
+    for followed in (replace(case, tight=times * case.tight) for times in LADDER):
+        motion = _tight(followed, max_steps=most)
+        if motion.outcome is not Outcome.STEP_LIMIT:
+            return followed, motion
+    last = replace(case, tight=10.0 * LADDER[-1] * case.tight)
+    return last, _tight(last)
+
+
+def _motion(prepared: Any) -> Trajectory:
+    """A run of the reference whose shapes nobody looks at: those of the truth's own run were seen."""
+    run: Trajectory = prepared.motion()
+    return run
+
+
+def _tight(case: Case, **bound: int) -> Trajectory:
     """The compiled integrator at the case's tightest tolerance."""
     from crossbody.engines import load
 
-    return load("reference").prepare(case, "compiled", rtol=case.tight).run()
+    return load("reference").prepare(case, "compiled", rtol=case.tight, **bound).run()
 
 
 def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
@@ -169,9 +206,10 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
 
     @cache_of_one
     def at(times: Floats) -> Trajectory:
-        run = reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)).run()
+        run = _motion(reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)))
         # A run that is asked for samples need not take the same steps: its events move by the tolerance.
-        return replace(with_both_sides(run, first), events=first.events, switches=first.switches)
+        run = replace(with_both_sides(run, first), events=first.events, switches=first.switches)
+        return run if first.outcome.ok else replace(run, outcome=first.outcome, message=first.message)
 
     dense = at(sample_times(first, case.t_end))
     tier = Tier.D if other == "compiled" else Tier.C
@@ -184,15 +222,20 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
         why = f" ({second})" if second else ""
         second = reference.prepare(case, other, rtol=loose).run()
     truth = _held_against(
-        Truth(tier=tier, source="", trajectory=dense, at=at, agreement={}, joined=case.scene is not None),
+        Truth(
+            tier=tier, source="", trajectory=dense, at=at, agreement={}, tight=case.tight,
+            grows=_growing(case, dense, at), joined=case.scene is not None,
+        ),
         second,
         case,
         loose,
-    )
+    )  # fmt: skip
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
     source = f"compiled reference at rtol {case.tight:g}, {who} at {loose:g} agrees: {said}; they share {shared}{why}"
     if truth.parted < case.t_end:
-        source += f"; they part at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
+        apart = f"they part at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
+        ended = f"{who} ends {second.outcome.value} at t = {truth.parted:.4g} s"
+        source += f"; {ended if math.isnan(truth.growth) else apart}"
     return _rechecked(replace(truth, source=source), case)
 
 
@@ -234,6 +277,27 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
         f"; row {first.contact} is {first.mode.name} at t = {first.t:.6g} s, but {first.reason}: not trusted from there"
     )
     return replace(truth, source=truth.source + told, trusted=min(truth.trusted, first.t))
+
+
+def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) -> float:
+    """By how much more than in free flight errors of a scene's start grow: its velocities are put off, on its rows."""
+    fastest = float(np.max(np.abs(truth.v), initial=0.0))
+    if case.scene is None or not truth.outcome.ok or not 0.0 < fastest < math.inf:
+        return 1.0
+    from crossbody.engines import load
+    from crossbody.engines._equations import system_of
+
+    rng, system, t = np.random.default_rng(0), system_of(case), np.linspace(0.0, case.t_end, INSTANTS)
+    held, exact, most = system.constraint(case.q0, case.v0)[0][~case.law.unilateral], at(t).q, 1.0
+    for _ in range(DIRECTIONS):
+        way = rng.choice([-1.0, 1.0], size=len(case.v0))
+        way -= np.linalg.lstsq(held, held @ way, rcond=None)[0] if len(held) else 0.0
+        off = NUDGE * fastest
+        nudged = replace(case, v0=case.v0 + off * way)
+        run = _motion(load("reference").prepare(nudged, "compiled", rtol=case.tight, samples=t))
+        if run.outcome.ok:
+            most = max(most, float(np.max(differences(run.q, exact, case.quaternions))) / (off * case.t_end))
+    return most
 
 
 def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:

@@ -18,7 +18,7 @@ ROUNDING = 1e-12
 """Below this, in the unit of a metric, numbers differ from one machine to the next."""
 
 IDENTITIES = frozenset(
-    {"start_error", "mode_residual", "largest position (importer)", "largest event_times (importer)"}
+    {"start_error", "mode_residual", "event_gap", "largest position (importer)", "largest event_times (importer)"}
 )
 """Metrics that hold a run against itself or the case's own numbers, and what a reader makes of a file: no known
 property of an engine explains them."""

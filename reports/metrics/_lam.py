@@ -6,14 +6,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.reports.judging._between import between
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from crossbody.cases import Trajectory
 
 PARTS = 16
 """Points looked at from each sample to the next."""
+
+
+def told(run: Trajectory) -> NDArray[np.bool_] | None:
+    """Which rows have multipliers (nc,); None if lam is not known.
+
+    Of rows that are always on and follow from others lam is NaN from the first sample to the last.
+    """
+    unknown = np.isnan(run.lam)
+    follow = unknown.all(axis=0) & np.all(run.mode == Mode.BILATERAL, axis=0)
+    known = not unknown[:, ~follow].any() and not (follow.any() and follow.all())
+    return ~follow if known else None
 
 
 def multipliers(run: Trajectory) -> Floats | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.reports.metrics._contacts import CLOSED
+from crossbody.reports.metrics._lam import told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +38,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     rows = case.law.unilateral
     if not rows.any():
         return None
-    if np.isnan(run.lam).any():
+    if told(run) is None:
         return math.nan
     lam = run.lam[:, rows]
     scale = float(np.max(np.abs(lam), initial=0.0))

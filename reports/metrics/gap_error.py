@@ -28,7 +28,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     inside, exact = aligned(truth, run)
     if not rows.any() or not inside.any():
         return None
-    smooth = away(exact, [switch.t for switch in truth.trajectory.switches], case.t_end)
+    smooth = away(exact, [switch.t for switch in truth.trajectory.switches if not switch.smooth], case.t_end)
     off = float(np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], initial=0.0))
     scale = float(np.max(np.abs(truth.trajectory.gap[:, rows])))
     scale = max(scale, ROUNDING * float(np.max(np.abs(truth.trajectory.q), initial=0.0)))

@@ -26,7 +26,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     None without rows, where gaps depend on discrete variables, and where the case has no equations.
     """
     system = equations(case)
-    if system is None or not run.gap.shape[1] or system.switch is not None:
+    if system is None or not run.gap.shape[1] or system.jumps:
         return None
     if not finite(run):
         return math.nan

@@ -19,6 +19,7 @@ from crossbody.cases import Mode
 from crossbody.cases._arrays import Floats
 from crossbody.reports.metrics._contacts import CLOSED
 from crossbody.reports.metrics._equations import equations, finite, spread
+from crossbody.reports.metrics._lam import told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,19 +68,20 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     None where nothing closes, and where a controller or discrete variables act that a row of the run does not show.
     """
     system = equations(case)
-    if system is None or (system.control is not None and run.inputs is None) or system.switch is not None:
+    if system is None or (system.control is not None and run.inputs is None) or system.jumps:
         return None
-    if np.isnan(run.lam).any() or not finite(run):
+    known = told(run)
+    if known is None or not finite(run):
         return math.nan
-    closed = np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0
-    told = np.asarray(closed.any(axis=1))
+    closed = known & (np.isin(run.mode, CLOSED) if (run.mode >= 0).all() else run.lam > 0.0)
+    looked = np.asarray(closed.any(axis=1))
     inputs = case.inputs if run.inputs is None else run.inputs
     if system.activations is not None and inputs is not None:
         inputs = system.activations.extended(inputs)
     if inputs is not None:  # where they jump, a sample does not say on which side it stands
-        told &= ~np.isin(run.t, inputs.times)
+        looked &= ~np.isin(run.t, inputs.times)
     worst, scale = 0.0, 0.0
-    for i in spread(run, told):
+    for i in spread(run, looked):
         rows = np.flatnonzero(closed[i])
         H, lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION, inputs)
         worst = max(worst, float(np.max(np.abs(moving_part(H, run.lam[i, rows] - lam)))))

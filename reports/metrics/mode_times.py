@@ -40,7 +40,7 @@ def _opened(truth: Trajectory, a: Contact, b: Contact) -> float:
     row's gap is another one: that instant is judged as a change of the variable.
     """
     first, last = sorted((a.free, b.free))
-    if any(first <= switch.t <= last for switch in truth.switches):
+    if any(first <= switch.t <= last and not switch.smooth for switch in truth.switches):
         return 0.0
     gap, (here, there) = truth.gap[:, a.row], np.interp([a.free, b.free], truth.t, truth.gap[:, a.row])
     dt = np.diff(truth.t)

@@ -41,7 +41,7 @@ TRUTHS = 3.0
 """A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
-STUDIES_S, DEARER = 30.0, 3.0
+STUDIES_S, DEARER = 10.0, 3.0
 """Time that all runs of a study of a scene may take, s, by what its own run took; one at a tight tolerance is taken to
 cost so many times as much."""
 READER = "reader"
@@ -174,6 +174,8 @@ def run_case(
     truth = truth_of(case) if truth is None else truth
     if case.file and truth.trajectory.outcome is Outcome.INCONSISTENT:
         raise CaseUnsupported(f"{case.label}: {truth.trajectory.message}")
+    if math.isfinite(truth.tight):
+        case = replace(case, tight=truth.tight)
     reference = _reference_audit(case)
     entries = []
     for pick in (of_case(one, case) for one in wanted):

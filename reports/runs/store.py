@@ -165,13 +165,18 @@ def load(path: Path) -> Trace:
         raise OutputError(f"{path} is not a motion of crossbody: {type(error).__name__}: {error}.") from None
 
 
+MOTION, PEAK = 4 << 30, 3
+"""Bytes that reading a motion may take in memory, a robot's on a thousand rows at 4e4 instants; and how many times its
+numbers Arrow has there at once."""
+
+
 def _table(path: Path) -> pa.Table:
-    """The table of a motion, within the memory that a log of its size may take."""
-    budget = Budget(path)
+    """The table of a motion, within the memory that one may take."""
+    budget = Budget(path, MOTION)
     with _opened(path) as file, opening(budget), plain_allocator(path):
         parquet = pq.ParquetFile(file, pre_buffer=False)
         size = 8 * parquet.metadata.num_rows * parquet.metadata.num_columns
-        if size > budget.memory:
+        if PEAK * size > budget.memory:
             raise ValueError(f"it needs {size / 1e6:.0f} MB in memory")
         return parquet.read(use_threads=False)
 

@@ -26,6 +26,8 @@ GRACE = 0.6
 LIMIT = 3660.0
 """Time that one engine may take for one scene, s: what the reference allows itself, and a minute."""
 TICK = 0.2
+SOON = 0.01
+"""Time after which an interrupt that was swallowed is raised again, s."""
 _ROOM = 1 << 16
 ENDED = (0, 1, 2)
 """Exit codes of a command that had come to its end before the interrupt reached it."""
@@ -219,7 +221,9 @@ def _obey(command: Callable[[], int]) -> None:
     try:
         _die_with_parent()
         signal.signal(signal.SIGINT, _stop_once)
+        signal.signal(signal.SIGALRM, _stop_again)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        sys.unraisablehook = _insist
         signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
         code = command()
     except Stopped:
@@ -249,6 +253,18 @@ def _stop_once(_number: int, _frame: FrameType | None) -> None:
     _stopping = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal tells parent and child, and users are impatient
     raise Stopped
+
+
+def _stop_again(_number: int, _frame: FrameType | None) -> None:
+    raise Stopped
+
+
+def _insist(swallowed: sys.UnraisableHookArgs) -> None:
+    """Raise an interrupt again soon that reached Python where nothing can be raised: in a callback or a finaliser."""
+    if isinstance(swallowed.exc_value, Stopped):
+        signal.setitimer(signal.ITIMER_REAL, SOON)
+    else:
+        sys.__unraisablehook__(swallowed)
 
 
 def _die_with_parent() -> None:

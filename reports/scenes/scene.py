@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import product
 from typing import Any
 
@@ -12,11 +12,11 @@ from crossbody.cases._arrays import Floats
 from crossbody.cases._rotations import matrices
 from crossbody.cases.scene import Body, Scene
 from crossbody.cases.scene import Shape as SceneShape
-from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.cases.scene_plain import scene_from
+from crossbody.engines._nearest import Places, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
-from crossbody.reports.scenes._kinematics import body_poses, placed
-from crossbody.reports.scenes._meetings import meeting
+from crossbody.reports.scenes._kinematics import Pose, body_poses, placed
 
 MOST = 500
 """Bodies that are drawn."""
@@ -71,14 +71,20 @@ def _arrows(scene: Scene, q: Floats, lam: Floats) -> Iterator[Floats]:
         row += loop.width
     row += sum(int(np.isfinite(part.range).sum()) for part in scene.bounded)
     for contact in contacts(scene):
-        first, second = (
-            (shape, placed(bodies[shape.body], shape.position, shape.orientation))
-            for shape in (contact.first, contact.second)
-        )
+        _, normals, points = _meeting(contact, bodies)
         for place in range(contact.places):
-            at, normal = meeting(first, second, place)
-            yield np.concatenate([at, normal * lam[:, [row]]], axis=1)
+            pushed = np.nan_to_num(normals[:, place]) * lam[:, [row]]
+            yield np.concatenate([points[:, place], pushed], axis=1)
             row += 1
+
+
+def _meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
+    """Return where two shapes would meet (n, places), by the poses of the bodies at n instants."""
+    shapes = (contact.first, contact.second)
+    stand = [placed(bodies[shape.body], shape.position, shape.orientation) for shape in shapes]
+    at, by = ((rotation, origin) for origin, rotation in stand)
+    kinds, sizes = (shapes[0].type, shapes[1].type), (np.array(shapes[0].size), np.array(shapes[1].size))
+    return meet(kinds, sizes, at, by, lying(kinds, sizes, at, by, np.full(len(at[1]), contact.parallel)))
 
 
 def _scene(p: Parameters) -> Scene:

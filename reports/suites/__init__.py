@@ -6,13 +6,15 @@ A suite is a module with a docstring whose first line says what it stresses, and
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from crossbody.cases import SceneError, UnknownName, _registry
+from crossbody.cases import InvalidValue, SceneError, UnknownName, _registry
 
 if TYPE_CHECKING:
+    from crossbody.cases import Value
     from crossbody.reports.suites._contract import Suite
 
 
@@ -26,18 +28,30 @@ def summary(name: str) -> str:
     return _registry.summary(__name__, list(__path__), name)
 
 
-def load(name: str) -> Suite:
-    """A suite by its name, or the one in a file of one's own (ends in .py).
+def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
+    """Return a suite by its name, the one in a file of one's own (ends in .py), or that of a case that is a file.
+
+    Args:
+        name: which.
+        fixed: parameters of a case that is a file, the same in every run.
 
     Raises:
         UnknownName: if there is none; the message lists the names.
-        InvalidValue: if its axes contradict each other.
-        SceneError: if a file defines no SUITE.
+        InvalidValue: if its axes contradict each other, or parameters are given to a suite that has its own.
+        SceneError: if a file defines neither SUITE nor a case.
     """
+    from crossbody.cases.files.reading import SUFFIXES
     from crossbody.reports.suites._contract import Suite
 
     own = name.endswith(".py")
-    module = _file(Path(name)) if own else _registry.load_plugin("suite", __name__, list(__path__), name)
+    module = _file(Path(name)) if own else None
+    if name.endswith(SUFFIXES) or (own and not hasattr(module, "SUITE") and hasattr(module, "build")):
+        from crossbody.reports.suites._of_case import suite_of
+
+        return suite_of(name, fixed or {})
+    if fixed:
+        raise InvalidValue(f"The suite {name!r} has parameters of its own: {', '.join(fixed)} cannot be given.")
+    module = module or _registry.load_plugin("suite", __name__, list(__path__), name)
     found = getattr(module, "SUITE", None)
     if not isinstance(found, Suite):
         raise SceneError(f"Suite file {module.__file__} does not define SUITE, a crossbody.reports.suites Suite.")

@@ -45,6 +45,7 @@ class Ask:
     scheduler: str | None = None
     tls: pools.Tls = field(default_factory=pools.Tls)
     resume: bool = False
+    pairs: Sequence[str] = ()
 
 
 def stress(ask: Ask, out: Path, command: str) -> int:
@@ -81,7 +82,8 @@ def plan(ask: Ask) -> list[Spec]:
     if ask.runs is not None and ask.runs < 1:
         raise InvalidValue(f"--runs is {ask.runs}; a sweep needs at least 1.")
     names = list(dict.fromkeys(ask.names or suites.names()))
-    chosen: list[tuple[str, Suite]] = [(name, suites.load(name)) for name in names]
+    fixed = jobs.parse_settings(ask.pairs, "--set")
+    chosen: list[tuple[str, Suite]] = [(name, suites.load(name, fixed)) for name in names]
     for name, suite in chosen:
         draw.check(name, suite)
     given = jobs.picks(ask.wanted) if ask.wanted else None

@@ -1,0 +1,48 @@
+"""MuJoCo's compiler, and what it warns of: else that goes to stderr and to MUJOCO_LOG.TXT in the working directory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from crossbody.cases._errors import SceneError
+
+NOT_A_NUMBER = "'NaN'"
+"""What MuJoCo's warning names; it takes such an entry as not given."""
+
+
+@contextmanager
+def captured() -> Iterator[list[str]]:
+    """Collect the warnings."""
+    import mujoco
+
+    messages: list[str] = []
+    previous = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(messages.append)
+    try:
+        yield messages
+    finally:
+        mujoco.set_mju_user_warning(previous)
+
+
+def compiled(path: Path, compiler: Callable[[], Any]) -> tuple[Any, list[str]]:
+    """Return what a compiler makes of a file, and what MuJoCo warns of meanwhile.
+
+    Raises:
+        SceneError: with MuJoCo's own sentence, and for a number that is none.
+    """
+    with captured() as warned:
+        try:
+            found = compiler()
+        except ValueError as error:
+            raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
+    if any(NOT_A_NUMBER in text for text in warned):
+        raise SceneError(f"{path}: an entry is NaN; valid: numbers. MuJoCo would take it as not given.")
+    return found, warned
+
+
+def sentences(warned: Sequence[str]) -> list[str]:
+    """Return warnings as sentences, each once."""
+    return [f"MuJoCo warns: {' '.join(text.split())}." for text in dict.fromkeys(warned)]

@@ -1,0 +1,160 @@
+"""The rows of a scene among those that MuJoCo has at a state: which is which, their law, gaps and multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from crossbody.cases import Mode
+from crossbody.cases._arrays import Floats
+from crossbody.cases.files import mjcf
+from crossbody.cases.scene import Scene
+from crossbody.cases.scene_contacts import Contact
+from crossbody.engines._contacts import Contacts, end_of
+from crossbody.engines._log import Modes, Observe
+from crossbody.engines._scene import Forces
+from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
+from crossbody.engines.mujoco._observe import numbers
+
+TOGETHER = 64
+"""Instants at which gaps of shapes are computed at once."""
+LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
+TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
+Present = tuple[int, int]
+"""Where a row stands in MuJoCo's arrays, and among the scene's."""
+
+
+class Rows:
+    """The rows of a scene among those that MuJoCo has at a state.
+
+    Attributes:
+        always: number of rows that are always on; they stand first in both.
+    """
+
+    def __init__(self, scene: Scene, model: Any, data: Any) -> None:
+        self.scene, self.model, self.data = scene, model, data
+        self.always = sum(loop.width for loop in scene.loops)
+        self.places: dict[tuple[int, int, bool], int] = {}
+        row = self.always
+        for j, part in enumerate(scene.bounded):  # in the model's order: a file need not name them
+            tendon = j - len(scene.joints)
+            kind, i = (int(LIMITS[0]), j) if tendon < 0 else (int(LIMITS[1]), tendon)
+            for upper, bound in enumerate(part.range):
+                if np.isfinite(bound):
+                    self.places[kind, i, bool(upper)] = row
+                    row += 1
+        self.touching = Contacts(scene)
+        self.nc = row + self.touching.count
+        named = mjcf.names(model, "geom")
+        self.geoms = {named(i): i for i in range(model.ngeom)}
+        self.touches: dict[frozenset[int], tuple[Contact, int]] = {}
+        for contact in self.touching.all:
+            both = frozenset((self.geoms[contact.first.name], self.geoms[contact.second.name]))
+            self.touches[both] = (contact, row)
+            row += contact.places
+
+    def constants(self) -> dict[str, Any]:
+        """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
+        model = self.model
+        solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
+        bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
+        solref += [bounds[kind][i] for kind, i, _ in self.places]
+        for contact in self.touching.all:  # by name: the compiler sorts pairs by the bodies that they join
+            solref += [model.pair(contact.pair.name).solref] * contact.places
+        pairs = np.array(solref).reshape(-1, 2)
+        if (pairs >= 0.0).any():
+            return {"solref": pairs}
+        return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), np.zeros(len(pairs))), strict=True))
+
+    def present(self) -> Iterator[Present]:
+        """Yield what MuJoCo has a row for now, of those that may open."""
+        data = self.data
+        for j in range(data.ne, data.nefc):
+            kind, part = int(data.efc_type[j]), int(data.efc_id[j])
+            if kind in LIMITS:
+                yield j, self._place(j, kind, part)
+            elif kind == TOUCH and self._geoms(part) in self.touches:
+                yield j, self._touch(part)
+
+    def lam(self) -> Floats:
+        """Return the multiplier of every row (nc,), 0 where it does not act."""
+        data, lam = self.data, np.zeros(self.nc)
+        lam[: self.always] = data.efc_force[: self.always]
+        for j, row in self.present():
+            lam[row] += data.efc_force[j]
+        return lam
+
+    def _geoms(self, part: int) -> frozenset[int]:
+        """Return the shapes of a contact; in a file as it stands some meet whose pairs have no rows."""
+        return frozenset(int(i) for i in self.data.contact[part].geom)
+
+    def _touch(self, part: int) -> int:
+        """Return which row a contact is: its place is told by the signs of its point in the second shape's axes."""
+        found = self.data.contact[part]
+        contact, row = self.touches[self._geoms(part)]
+        one, two = (
+            (self.data.geom_xmat[i].reshape(3, 3), self.data.geom_xpos[i])
+            for i in (self.geoms[contact.first.name], self.geoms[contact.second.name])
+        )
+        if contact.parallel > 0.0:
+            return row + end_of(contact, one, two, found.pos)
+        x = two[0].T @ (found.pos - two[1])
+        bits = {1: (), 2: (x[2] > 0.0,), 8: tuple(x > 0.0)}[contact.places]
+        return row + sum(int(bit) << k for k, bit in enumerate(bits))
+
+    def _place(self, j: int, kind: int, part: int) -> int:
+        """Return which bound an active row is: of a joint the upper one has a falling gap, of a tendon it is nearer."""
+        J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
+        if kind == LIMITS[0] and self.scene.joints[part].type == "ball":
+            return self.places[kind, part, True]
+        if kind == LIMITS[0]:
+            return self.places[kind, part, bool(J.sum() < 0.0)]
+        (low, high), length = self.scene.tendons[part].range, self.data.ten_length[part]
+        off = abs(self.data.efc_pos[j] - (length - low)), abs(self.data.efc_pos[j] - (high - length))
+        return self.places[kind, part, bool(off[1] < off[0])]
+
+    def modes(self) -> Modes:
+        """Return the mode of every row: a bound is in contact where it pushes."""
+        lam = self.lam()[self.always :]
+        return (int(Mode.BILATERAL),) * self.always + tuple(int(Mode.CONTACT if x > 0.0 else Mode.FREE) for x in lam)
+
+    def observe(self) -> Observe:
+        """Return what reads gaps and energies of recorded states."""
+        data = mujoco.MjData(self.model)
+        forces = Forces(self.scene)
+
+        def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
+            first = self.nc - self.touching.count
+            gaps, energy = np.empty((len(q), self.nc)), np.empty((len(q), 2))
+            gaps[:, first:] = self._apart(q, data)
+            for i in range(len(q)):
+                data.qpos[:], data.qvel[:] = q[i], v[i]
+                mujoco.mj_fwdPosition(self.model, data)
+                mujoco.mj_fwdVelocity(self.model, data)
+                mujoco.mj_energyPos(self.model, data)
+                mujoco.mj_energyVel(self.model, data)
+                gaps[i, :first] = [*data.efc_pos[: self.always], *forces.bounds(q[i], data.ten_length)]
+                spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
+                energy[i] = data.energy[1], data.energy[0] + spared.sum()
+            return gaps, energy
+
+        return observe
+
+    def _apart(self, q: Floats, data: Any) -> Floats:
+        """Return the gaps (n, contacts) of recorded positions (n, nq)."""
+        gaps, bodies, n = np.empty((len(q), self.touching.count)), numbers(self.scene), self.model.nbody
+        if not self.touching.count:
+            return gaps
+        R, p = np.empty((TOGETHER, n, 3, 3)), np.empty((TOGETHER, n, 3))
+        for first in range(0, len(q), TOGETHER):
+            part = q[first : first + TOGETHER]
+            for k, position in enumerate(part):
+                data.qpos[:] = position
+                mujoco.mj_kinematics(self.model, data)
+                R[k], p[k] = data.xmat.reshape(-1, 3, 3), data.xpos
+            met = self.touching.touches(lambda name: (R[:, bodies[name]], p[:, bodies[name]]))
+            gaps[first : first + TOGETHER] = met.gap[: len(part)]
+        return gaps

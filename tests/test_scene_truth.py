@@ -1,0 +1,71 @@
+"""How tightly a scene's truth is followed, and what an unstable motion makes of errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from four_bars import four_bar
+
+from crossbody import cases, engines
+from crossbody.cases import Case, Outcome
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene
+from crossbody.reports.judging.comparison import Entry, verdicts
+from crossbody.reports.judging.truth import LEAST, MANY, tightened, truth_of
+
+INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def one_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+    """CVODE alone: what is asked here does not depend on who the witness is."""
+    monkeypatch.setattr("crossbody.reports.judging.truth._witness", lambda case: "not asked")
+
+
+def pendulum(length: float, above: bool, q0: float, t_end: float = 1.0) -> Case:
+    """A point mass on a rod, as good as without inertia of its own, that stands or hangs at q = 0."""
+    rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, length if above else -length), inertia=INERTIA)
+    joint = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0))
+    return cases.from_scene(Scene(bodies=(rod,), joints=(joint,)), q0=[q0], t_end=t_end)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_errors_grow_as_the_closed_form_of_an_upright_pendulum_has_it(seed: int) -> None:
+    """q'' = k^2 q: an error dv of the start becomes dv sinh(k T)/k, that of free flight dv T."""
+    rng = np.random.default_rng(seed)
+    length, t_end = rng.uniform(0.3, 1.0), rng.uniform(0.5, 1.5)
+    k = np.sqrt(9.81 * length / (length**2 + INERTIA[0]))
+    truth = truth_of(pendulum(length, True, 1e-5, t_end))
+    assert truth.grows == pytest.approx(np.sinh(k * t_end) / (k * t_end), rel=1e-3)
+    assert truth_of(pendulum(length, False, 1e-5, t_end)).grows == 1.0
+
+
+def test_a_limit_is_as_wide_as_the_motion_makes_errors_large() -> None:
+    case = pendulum(0.4, True, 1e-5, 1.5)
+    truth = truth_of(case)
+    for size, word in ((0.5, "within"), (2.0, "outside")):
+        t = np.linspace(0.0, case.t_end, 301)
+        exact = truth.at(t)
+        off = size * 1e-6 * truth.grows * np.abs(exact.q).max()
+        run = engines.load("reference").prepare(case, "compiled", samples=t).run()
+        shifted = replace(run, q=exact.q + off)
+        rows = {row.metric: row for row in verdicts(case, Entry(engine="some", profile="one", run=shifted), truth, "")}
+        assert rows["position"].verdict == word
+        assert "free flight" in rows["position"].why or word == "within"
+        assert rows["position"].limit == pytest.approx(1e-6 * truth.grows)
+
+
+@pytest.mark.parametrize("a0", [1e4, 1e9])
+def test_a_truth_is_followed_no_tighter_than_rounding_allows(a0: float) -> None:
+    """At the tolerance that is chosen steps are those of the method; one that is chosen looser would stall tighter."""
+    case, reference = four_bar(0, RowLaw(a0=a0, a1=2.0 * np.sqrt(a0)), t_end=0.02), engines.load("reference")
+    found, _ = tightened(case)
+    coarse = reference.prepare(case, "compiled", rtol=1e-9).run().steps
+    most = MANY * max(coarse, LEAST)
+    assert (found.tight > case.tight) == (a0 > 1e6)
+    if found.tight <= 10.0 * case.tight:
+        assert reference.prepare(case, "compiled", rtol=found.tight).run().steps <= most
+    if found.tight > case.tight:
+        stalled = reference.prepare(case, "compiled", rtol=found.tight / 10.0, max_steps=most).run()
+        assert stalled.outcome is Outcome.STEP_LIMIT
