@@ -16,6 +16,7 @@ from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.cases._control import Control, NotFinite
 from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
+from crossbody.reference._interrupt import LONG_S, Interrupts
 from crossbody.reference._kinds import Floats
 from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
@@ -163,27 +164,34 @@ class CompiledRun:
         self.callback = Callback(system.control.begin(system.inputs), system.nq, system.n, end, live)
 
     def _slices(self, began: float, progress: Callable[[float], None] | None) -> Outcome:
-        limit, budget = self.options.max_steps, SLICE
         try:
-            while True:
-                steps, before = int(self.state["steps"][0]), time.perf_counter()
-                if steps >= limit:
-                    return Outcome.STEP_LIMIT
-                code = self.slice(min(budget, limit - steps))
-                if code == layout.DONE:
-                    return Outcome.FINISHED
-                if code < 0:
-                    return self._ended(code)
-                self._grow(code)
-                now = time.perf_counter()
-                if now - began > self.options.time_limit:
-                    return Outcome.TIME_LIMIT
-                if code == layout.MORE:
-                    budget = max(1, int(budget * min(4.0, SLICE_S / (now - before))))
-                if progress is not None:
-                    progress(float(self.state["t"][0]) / self.options.t_end)
+            with Interrupts() as interrupts:
+                return self._advance(began, progress, interrupts)
         except KeyboardInterrupt:
             return Outcome.INTERRUPTED
+
+    def _advance(self, began: float, progress: Callable[[float], None] | None, interrupts: Interrupts) -> Outcome:
+        limit, budget = self.options.max_steps, SLICE
+        while True:
+            steps, before = int(self.state["steps"][0]), time.perf_counter()
+            if steps >= limit:
+                return Outcome.STEP_LIMIT
+            code = self.slice(min(budget, limit - steps))
+            if code == layout.DONE:
+                return Outcome.FINISHED
+            if code < 0:
+                return self._ended(code)
+            self._grow(code)
+            interrupts.answer()
+            now = time.perf_counter()
+            if now - began > self.options.time_limit:
+                return Outcome.TIME_LIMIT
+            if now - before > LONG_S and self.callback is None:  # a controller in Python may hang
+                interrupts.hold()
+            if code == layout.MORE:
+                budget = max(1, int(budget * min(4.0, SLICE_S / (now - before))))
+            if progress is not None:
+                progress(float(self.state["t"][0]) / self.options.t_end)
 
     def _ended(self, code: int) -> Outcome:
         """The outcome of a code; an account or a pivot that a kernel spoilt by NaN is neither open nor vanished.

@@ -1,13 +1,16 @@
 """Faults that a hybrid integrator of this kind can have, each met once and kept out since."""
 
+import os
 import signal
 import subprocess
 import sys
 import time
+from itertools import count
 
 import numpy as np
 import pytest
 from mechanisms import ball, flyby, sliders
+from numba.experimental import function_type
 
 from crossbody.cases import Outcome
 from crossbody.reference import Options, System, kernels, prepare, simulate
@@ -195,3 +198,28 @@ def test_a_run_that_is_lost_at_its_start_still_shows_the_start():
     assert run.outcome is Outcome.LOST
     assert run.t.tolist() == [0.0]
     assert run.q.tolist() == [[0.3]]
+
+
+@pytest.mark.parametrize("call", [50, 100])
+def test_interrupt_that_meets_a_library_at_its_work_is_answered(call, monkeypatch):
+    """The library hands functions to compiled code by Python of its own, and swallows what is raised there."""
+    given, calls = function_type._get_jit_address, count(1)
+
+    def interrupted(function, signature):
+        if next(calls) == call:  # not in the first slice: a run as short as that is not worth the handler
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(0.0)
+            except KeyboardInterrupt:
+                raise TypeError("cannot be unboxed") from None
+        return given(function, signature)
+
+    monkeypatch.setattr(function_type, "_get_jit_address", interrupted)
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        run = simulate(ball(), [1.0], [0.0], 1e4, max_step=1e-5, max_steps=10**7, samples=[0.0])
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, former)
+    assert run.outcome is Outcome.INTERRUPTED
+    assert next(calls) > call
