@@ -15,9 +15,8 @@ from importlib import import_module
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-from crossbody.cases import _registry
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.cases._errors import (
+from crossbody.cases.entry_points import checked_arguments
+from crossbody.cases.errors import (
     CaseUnsupported,
     ColumnMapError,
     ControlError,
@@ -31,22 +30,22 @@ from crossbody.cases._errors import (
     SchedulerUnavailable,
     UnknownName,
 )
-from crossbody.cases._outcome import Outcome
+from crossbody.cases.outcome import Outcome
+from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
-    from crossbody.cases._case import Case, Chaos, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
-    from crossbody.cases._control import Control
-    from crossbody.cases._trajectory import Event, Ledger, Mode, Switch, Trajectory
+    from crossbody.cases.case import Case, Chaos, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
+    from crossbody.cases.control import Control
     from crossbody.cases.scene import Scene
+    from crossbody.cases.trajectory import Event, Ledger, Mode, Switch, Trajectory
 
-_VOCABULARY = ("files", "scene", "scene_contacts", "scene_plain")
-"""Modules of this folder that are no cases."""
+REGISTRY = Registry("case", "crossbody.cases.library", group=__name__)
 _LAZY = {
     **dict.fromkeys(
-        ("Case", "Chaos", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "_case"
+        ("Case", "Chaos", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "case"
     ),
-    "Control": "_control",
-    **dict.fromkeys(("Event", "Ledger", "Mode", "Switch", "Trajectory"), "_trajectory"),
+    "Control": "control",
+    **dict.fromkeys(("Event", "Ledger", "Mode", "Switch", "Trajectory"), "trajectory"),
 }
 
 __all__ = [
@@ -97,19 +96,19 @@ def __getattr__(name: str) -> Any:
 
 def names() -> tuple[str, ...]:
     """Names of all cases, those of other distributions too; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__), _VOCABULARY)
+    return REGISTRY.names()
 
 
 @checked_arguments
 def summary(name: str) -> str:
     """What a case is, in one line; imports nothing."""
-    return _registry.summary(__name__, list(__path__), name)
+    return REGISTRY.summary(name)
 
 
 @checked_arguments
 def variants(name: str) -> tuple[str, ...]:
     """The variants of a case, the default first."""
-    from crossbody.cases._load import module
+    from crossbody.cases.loading import module
 
     return tuple(module(name).VARIANTS)
 
@@ -126,7 +125,7 @@ def load(name: str, variant: str | None = None, **overrides: Value) -> Case:
         UnknownName: if there is no such case, variant or parameter; the valid ones are listed.
         InvalidValue: if a parameter lies outside what it admits.
     """
-    from crossbody.cases._load import build
+    from crossbody.cases.loading import build
 
     return build(name, variant, overrides)
 

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from crossbody.cases._arguments import shown
-from crossbody.cases._errors import SceneError
+from crossbody.cases.arguments import shown
+from crossbody.cases.errors import SceneError
 
 Vector = tuple[float, ...]
 ZERO: Vector = (0.0, 0.0, 0.0)

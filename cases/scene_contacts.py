@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import matrices
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Joint, Pair, Scene, Shape
 
 PLACES = {

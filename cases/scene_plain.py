@@ -8,7 +8,7 @@ import typing
 from collections.abc import Mapping
 from typing import Any
 
-from crossbody.cases._errors import SceneError
+from crossbody.cases.errors import SceneError
 from crossbody.cases.scene import RowLaw, Scene
 
 

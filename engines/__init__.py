@@ -5,22 +5,26 @@ An engine is a module here with one public name, `ENGINE`, an object that follow
 
 from __future__ import annotations
 
-from crossbody.cases import EngineUnavailable, _registry
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases import EngineUnavailable
+from crossbody.cases.entry_points import checked_arguments
+from crossbody.cases.registry import Registry
 from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden, interpreted
 
 __all__ = ["QUANTITIES", "Engine", "Run", "hidden", "interpreted", "load", "names", "summary"]
 
 
+_REGISTRY = Registry("engine", __name__, hidden=("equations", "linear", "nearest"))
+
+
 def names() -> tuple[str, ...]:
     """Names of all engines, installed or not; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _REGISTRY.names()
 
 
 @checked_arguments
 def summary(name: str) -> str:
     """What an engine is, in one line; imports nothing."""
-    return _registry.summary(__name__, list(__path__), name)
+    return _REGISTRY.summary(name)
 
 
 def load(name: str) -> Engine:
@@ -31,12 +35,12 @@ def load(name: str) -> Engine:
         EngineUnavailable: if its third-party package is not installed. A broken import of our own stays loud.
     """
     try:
-        module = _registry.load_plugin("engine", __name__, list(__path__), name)
+        module = _REGISTRY.load(name)
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package in ("", "crossbody"):
             raise
-        known = name in _registry.own_names(list(__path__))
+        known = name in _REGISTRY.own()
         brings = f"crossbody[{name}]" if known else package
         raise EngineUnavailable(
             f"Engine {name!r} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."

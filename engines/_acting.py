@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, Trajectory
-from crossbody.cases._arrays import Floats
-from crossbody.cases._control import Controller
+from crossbody.cases.arrays import Floats
+from crossbody.cases.control import Controller
 
 
 @dataclass(slots=True)

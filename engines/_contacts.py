@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import matrices
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact, contacts
-from crossbody.engines._nearest import Pose, crossing, lying, meet, overlap, tilt
+from crossbody.engines.nearest import Pose, crossing, lying, meet, overlap, tilt
 
 FAR = 1.0
 """m: the gap of a row that is none as its shapes lie."""

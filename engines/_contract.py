@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases.entry_points import checked_arguments
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -82,7 +82,7 @@ class Engine(Protocol):
     An engine may have `interpreted`, profile ("*" for all) -> what of its timed runs is Python, which the benchmark
     says beside its times; and its runs `native()`, the time in which its own loop makes the same steps without that, s.
 
-    An engine may have `linearise(case, spot) -> tuple[Tangent, ...]` (`crossbody.engines._linear`): its derivatives of
+    An engine may have `linearise(case, spot) -> tuple[Tangent, ...]` (`crossbody.engines.linear`): its derivatives of
     the accelerations at an equilibrium of the case, by each way that it has.
     """
 

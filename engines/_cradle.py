@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crossbody.cases import Case, Law
-from crossbody.cases._arrays import Floats
-from crossbody.cases._cradle.scene import masses
+from crossbody.cases.arrays import Floats
+from crossbody.cases.mechanisms.cradle.scene import masses
 from crossbody.engines import _scale
 
 

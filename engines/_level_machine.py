@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Passed, Rows, Settled, active, shared, switched
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Bytes, Floats
+from crossbody.cases.arrays import Bytes, Floats
 from crossbody.engines import _ball_scale
 from crossbody.engines._cradle import in_real_time, one_set, sliders
 from crossbody.engines._log import Observe

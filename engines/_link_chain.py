@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

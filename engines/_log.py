@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Event, Mode, Outcome, Switch, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 
 Observe = Callable[[Floats, Floats], tuple[Floats, Floats]]
 """(q (n, nq), v (n, nv)) of the engine -> gap (n, nc), energy (n, 2)."""

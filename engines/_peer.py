@@ -17,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from crossbody.cases import Case, Event, Mode, Outcome, Trajectory
-from crossbody.cases._arrays import Bytes, Floats
+from crossbody.cases.arrays import Bytes, Floats
 from crossbody.engines._line import FREE, MECHANISMS, Line
 
 ROUNDING = 1e-9

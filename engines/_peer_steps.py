@@ -13,8 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from crossbody.cases import Case, Outcome, Parameter, Trajectory
-from crossbody.cases import _closed_forms as cf
-from crossbody.cases._arrays import Floats
+from crossbody.cases import closed_forms as cf
+from crossbody.cases.arrays import Floats
 from crossbody.engines._line import CONTACT, FREE, Line
 from crossbody.engines._peer import PeerRun, ended, events
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import CaseUnsupported
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import turned
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import turned
 from crossbody.cases.scene import WIDTHS, Actuator, Joint, Scene, Tendon, Vector
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from crossbody.cases import Case, Parameter, UnknownName, Value
-from crossbody.cases._arguments import instance
+from crossbody.cases.arguments import instance
 
 MATCHED = "matched"
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
-from crossbody.cases._soft.scene import numbers
+from crossbody.cases.arrays import Floats
+from crossbody.cases.mechanisms.soft.scene import numbers
 
 NAMES = ("flange", "left pad", "right pad", "block", "error", "left sensor", "right sensor", "shift", "clock")
 CLOCK = len(NAMES) - 1

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, Law
-from crossbody.cases._arrays import Floats
-from crossbody.cases._soft.scene import numbers
+from crossbody.cases.arrays import Floats
+from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.engines import _soft_contact as soft
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces, table
 from crossbody.engines._delta.torque import gaps_and_energy, motor_torque, turns
 from crossbody.engines._delta.torque import numbers as torque_numbers
-from crossbody.engines._linear import Chart
+from crossbody.engines.linear import Chart
 from crossbody.reference.delta import Robot, scene
 
 SLIDERS = {

@@ -15,7 +15,7 @@ from exudyn import itemInterface as items  # noqa: N813 - a module
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines import _scale, _settings
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, SceneError, Trajectory
-from crossbody.cases._arrays import is_number
+from crossbody.cases.arrays import is_number
 from crossbody.engines import _settings
-from crossbody.engines._equations import known, module, system_of
 from crossbody.engines._reference_audit import audit, listed
 from crossbody.engines._rolling import determined
+from crossbody.engines.equations import known, module, system_of
 from crossbody.reference import Options, System, prepare
-from crossbody.reference._options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
-from crossbody.reference._start import NOT_FOUND, OffRowsError
+from crossbody.reference.options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
+from crossbody.reference.start import NOT_FOUND, OffRowsError
 
 OF_THE_CASE = "case"
 _ROBOT = (

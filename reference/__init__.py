@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from crossbody.reference import kernels
     from crossbody.reference._ensemble import Ensemble, ensemble
-    from crossbody.reference._options import Options
     from crossbody.reference._recheck import Violation, recheck
     from crossbody.reference._simulate import prepare, simulate
     from crossbody.reference._system import System
+    from crossbody.reference.options import Options
 
 __all__ = ["Ensemble", "Options", "System", "Violation", "ensemble", "kernels", "prepare", "recheck", "simulate"]
-_LAZY = {"Options": "_options", "System": "_system", "simulate": "_simulate", "prepare": "_simulate"} | dict.fromkeys(
+_LAZY = {"Options": "options", "System": "_system", "simulate": "_simulate", "prepare": "_simulate"} | dict.fromkeys(
     ("Ensemble", "ensemble"), "_ensemble"
 )
 _LAZY |= dict.fromkeys(("Violation", "recheck"), "_recheck")

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from crossbody.cases import Inputs
-from crossbody.reference._kinds import Floats, Index
+from crossbody.reference.kinds import Floats, Index
 
 Row = tuple[float, Floats, Floats]
 """An instant, and t0 and a0 (na,) from there on."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from crossbody.reference._check import ARGUMENTS
 from crossbody.reference._guarded import entry
-from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.systems import _none
 
 VANISHED = 1e-6  # part of H M^-1 H^T of a row at the start below which what moves the row is as good as nothing

@@ -15,10 +15,10 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-from crossbody.cases._control import Controller
+from crossbody.cases.control import Controller
 from crossbody.reference import kernels
 from crossbody.reference._activations import Live
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 
 MEMORY = 1
 """Length of the kernel's state: the address."""

@@ -19,9 +19,9 @@ import numpy as np
 from crossbody.cases import SceneError
 from crossbody.reference._differences import AGREE, closest, differs
 from crossbody.reference._guarded import GuardedCall, entry
-from crossbody.reference._kinds import Floats
 from crossbody.reference._state import NOISE, State, started
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems import _none
 
 EXACT = 1e-9  # part of the terms by which what is computed twice may differ

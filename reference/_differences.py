@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 
 WIDTHS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # of differences, in units of the coordinates
 AGREE = 1e-6  # part of the terms by which a difference may be off, beside what its widths tell

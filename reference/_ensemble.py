@@ -15,18 +15,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
-from crossbody.cases._arrays import frozen, numbers
-from crossbody.cases._control import Control
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._cache import embedding
+from crossbody.cases.arrays import frozen, numbers
+from crossbody.cases.control import Control
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._check import check_once
-from crossbody.reference._kinds import Floats, Index
-from crossbody.reference._options import Options, checked
 from crossbody.reference._program import address, kept_with_kernels
 from crossbody.reference._run import OUTCOMES, CompiledRun
-from crossbody.reference._start import check_starts
 from crossbody.reference._system import System, initial_modes
+from crossbody.reference.cache import embedding
 from crossbody.reference.core.layout import MORE, open_buffers, open_model, open_work
+from crossbody.reference.kinds import Floats, Index
+from crossbody.reference.options import Options, checked
+from crossbody.reference.start import check_starts
 
 CONSTANTS = ("a0", "a1", "a2", "b0", "b1", "b2")
 CHUNKS = 16  # parts a thread takes, so that none waits long for another

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import SceneError
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 
 GUARD = 64  # cells before and behind an array, beside as many as it has itself
 AROUND, INSIDE = (np.nan, 3.3), (1234567.25, -7654321.5)  # beyond the arrays and in what is to be filled, in two calls

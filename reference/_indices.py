@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crossbody.cases import SceneError
-from crossbody.reference._kinds import Index
+from crossbody.reference.kinds import Index
 
 
 def different(where: str, given: Sequence[int], below: int) -> Index:

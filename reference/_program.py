@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled, embedding
+from crossbody.reference.cache import compiled, embedding
 from crossbody.reference.core import advance as core
 from crossbody.reference.core._struct import TABLE
 from crossbody.reference.core.layout import STATE

@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crossbody.cases import Mode, Trajectory, _arguments
-from crossbody.cases._control import Control
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Floats
-from crossbody.reference._options import Options
+from crossbody.cases import Mode, Trajectory, arguments
+from crossbody.cases.control import Control
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
+from crossbody.reference.options import Options
 from crossbody.reference.sundials.compiled import evaluation
 from crossbody.reference.sundials.compiled.evaluation import Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
@@ -82,7 +82,7 @@ def recheck(
         The worst place of each row, mode and reason. Where a controller acts, `switch` keeps numbers that a motion
         does not record, or q' is not v, only the motion's own rows are looked at.
     """
-    rtol = _arguments.real("rtol", rtol)
+    rtol = arguments.real("rtol", rtol)
     rows = np.flatnonzero(np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
     if not rows or not len(run.t) or (run.mode < 0).any():
         return ()

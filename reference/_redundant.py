@@ -13,9 +13,9 @@ import numpy as np
 from scipy.linalg import qr
 
 from crossbody.cases import Mode, Outcome, SceneError, Trajectory
-from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._state import State, started
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats, Index
 
 INDEPENDENT = 1e-4  # pivot over the first from which on a row does not follow from the others
 ROUNDED = 1e-8  # below which it does, as far as rounding tells

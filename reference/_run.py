@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
-from crossbody.cases._control import Control, NotFinite
+from crossbody.cases.control import Control, NotFinite
 from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._interrupt import LONG_S, Interrupts
-from crossbody.reference._kinds import Floats
-from crossbody.reference._options import COLLISIONS, FSMS, Options
 from crossbody.reference._program import entry, program
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
 from crossbody.reference.core._struct import table
+from crossbody.reference.kinds import Floats
+from crossbody.reference.options import COLLISIONS, FSMS, Options
 from crossbody.reference.systems import _none
 
 SLICE, SLICE_S = 200, 0.05  # first steps between two looks at the clock, and the time aimed at, s

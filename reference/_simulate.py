@@ -8,11 +8,11 @@ import numba.core.config as numba_config
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, Trajectory
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._check import check_once
-from crossbody.reference._options import Options, checked
-from crossbody.reference._start import check_start
 from crossbody.reference._system import System
+from crossbody.reference.options import Options, checked
+from crossbody.reference.start import check_start
 
 
 def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **options: Any) -> Trajectory:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from crossbody.cases import SceneError
 from crossbody.reference import kernels as kernel_types
 from crossbody.reference._guarded import entry
-from crossbody.reference._kinds import Bytes, Floats, Index
 from crossbody.reference._system import System, initial_modes
+from crossbody.reference.kinds import Bytes, Floats, Index
 
 NOISE = 1e-3
 """Of the largest row's size: a row that no motion moves (the end of a capsule on its hinge) has no size of its own,

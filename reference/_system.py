@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import SceneError
-from crossbody.cases._arguments import flag, shown
-from crossbody.cases._arrays import frozen, full, is_number
-from crossbody.cases._control import Control
-from crossbody.cases._entry_points import checked_arguments, finite, wholes
+from crossbody.cases.arguments import flag, shown
+from crossbody.cases.arrays import frozen, full, is_number
+from crossbody.cases.control import Control
+from crossbody.cases.entry_points import checked_arguments, finite, wholes
 from crossbody.reference import kernels as kernel_types
 from crossbody.reference._activations import Activations
 from crossbody.reference._indices import different
-from crossbody.reference._kinds import Bytes, Floats, Index
+from crossbody.reference.kinds import Bytes, Floats, Index
 from crossbody.reference.systems import _none
 
 LARGEST = 1_000_000
@@ -415,7 +415,7 @@ class System:
         Raises:
             SceneError: if no state on the rows is found from there.
         """
-        from crossbody.reference._start import project
+        from crossbody.reference.start import project
 
         return project(self, *self._state(q, v))
 

@@ -46,7 +46,7 @@ import numpy as np
 from numba import types
 from numba.core import types as core_types
 
-from crossbody.reference._cache import compiled
+from crossbody.reference.cache import compiled
 
 START, TOUCHED, GIVEN = np.array([-1, -2, -3])
 UNCHANGED, CHANGED, LOST = np.arange(3)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 
-from crossbody.reference import _store
+from crossbody.reference import code_store
 from crossbody.reports import voice
 
 
 def show() -> int:
     """Print the folder, the number of its files and their size."""
-    where, store = _store.base(), _store.current()
+    where, store = code_store.base(), code_store.current()
     entries = store.entries() if store else []
     size = sum(found.st_size for _, found in entries)
     if voice.as_json():
@@ -22,7 +22,7 @@ def show() -> int:
 
 def clear() -> int:
     """Remove all compiled code; other files of the folder stay."""
-    store = _store.current()
+    store = code_store.current()
     removed = store.clear() if store else 0
     if voice.as_json():
         print(json.dumps({"removed": removed}))

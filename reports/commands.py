@@ -15,7 +15,7 @@ import click
 from crossbody import engines
 from crossbody.cases import Case, InvalidValue
 from crossbody.cases.files.reading import SUFFIXES
-from crossbody.engines._equations import known, system_of
+from crossbody.engines.equations import known, system_of
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.parts import PARTS, part_of

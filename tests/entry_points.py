@@ -16,7 +16,7 @@ import numpy as np
 from wrong_calls import WRONG, Call, ball, log, motion
 
 from crossbody import engines
-from crossbody.engines._equations import system_of
+from crossbody.engines.equations import system_of
 from crossbody.reference import Options, delta, linear
 
 PACKAGES = ("cases", "reference", "reference.linear", "reference.delta", "engines", "hw", "hw.models", "reports")

@@ -11,7 +11,7 @@ import numpy as np
 
 from crossbody import engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
-from crossbody.cases._delta import pose
+from crossbody.cases.mechanisms.delta import pose
 from crossbody.reports.judging.truth import Truth, from_run, sample_times
 from crossbody.reports.metrics._contacts import AT_REST, CLOSED
 

@@ -9,8 +9,8 @@ import numpy as np
 from known_errors import OFF, Known, Scene, changed, channel
 
 from crossbody.cases import Event, Mode, Switch, Trajectory
-from crossbody.cases._cradle.rules import answer
-from crossbody.cases._red_body.order import STAGES
+from crossbody.cases.mechanisms.cradle.rules import answer
+from crossbody.cases.mechanisms.red_body.order import STAGES
 from crossbody.reports.metrics._contacts import CLOSED
 from crossbody.reports.metrics._cradle import row
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody import engines
 from crossbody.cases import Case, Mode, Trajectory, load
-from crossbody.cases._red_body.order import STAGES, stages_in_order
+from crossbody.cases.mechanisms.red_body.order import STAGES, stages_in_order
 from crossbody.reference import System
 from crossbody.reference.systems import red_body as kernels
 

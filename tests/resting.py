@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome, Trajectory
-from crossbody.cases._rotations import differences
+from crossbody.cases.rotations import differences
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 
 LAW = RowLaw(a0=4e4, a1=60.0)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import System, kernels
-from crossbody.reference._kinds import Array, Index
+from crossbody.reference.kinds import Array, Index
 
 GRAVITY = 9.81
 PULL = 0.1

@@ -10,7 +10,7 @@ import numpy as np
 
 import crossbody.reports.suites
 from crossbody.cases import Law, load
-from crossbody.cases._load import module
+from crossbody.cases.loading import module
 
 CASE = str(Path(next(iter(crossbody.reports.suites.__path__))) / "_springs_and_walls.py")
 

@@ -11,8 +11,8 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported
-from crossbody.engines._linear import Chart
-from crossbody.reference.linear._differences import differences
+from crossbody.engines.linear import Chart
+from crossbody.reference.linear.differences import differences
 from crossbody.reports.analysis import counterparts as work
 from crossbody.reports.analysis.command import analyse
 from crossbody.reports.analysis.places import places

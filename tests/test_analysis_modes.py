@@ -11,7 +11,7 @@ from crossbody import cases, engines
 from crossbody.cases import Law, Mode, SceneError
 from crossbody.reference import System
 from crossbody.reference.linear import linearise
-from crossbody.reference.linear._differences import differences
+from crossbody.reference.linear.differences import differences
 from crossbody.reference.sundials.equations import Equations
 from crossbody.reference.systems import link_chain
 from crossbody.reports.analysis.places import ON, build

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from crossbody.reference import _store, kernels
-from crossbody.reference._store import CODE, LOCK, Store
+from crossbody.reference import code_store, kernels
+from crossbody.reference.code_store import CODE, LOCK, Store
 from crossbody.reports.cli import cli
 
 ROOT = os.name == "posix" and os.geteuid() == 0
@@ -39,8 +39,8 @@ PROGRAM = """
     z, e = np.zeros(1), np.zeros(2)
     if "DROP" in os.environ:  # to another user, once the interpreter has imported what compiling needs
         make(-1.0)
-        from crossbody.reference import _store
-        _store._opened.cache_clear()
+        from crossbody.reference import code_store
+        code_store._opened.cache_clear()
         for name in os.environ["FORGET"].split():
             os.environ.pop(name, None)
         os.setresuid(*[int(os.environ["DROP"])] * 3)
@@ -55,7 +55,7 @@ PROGRAM = """
 def folder(tmp_path, monkeypatch):
     """An empty cache of this test's own."""
     monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path / "cache"))
-    _store.tell.cache_clear()
+    code_store.tell.cache_clear()
     return tmp_path / "cache" / "compiled"
 
 
@@ -154,7 +154,7 @@ def test_damaged_files_are_dropped_told_and_compiled_again(folder, capsys):
         else:
             data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
         path.write_bytes(data)
-        _store.tell.cache_clear()
+        code_store.tell.cache_clear()
         assert _value(_kernel(5.0)) == 5.0
         assert f"{path} was damaged; it is compiled again." in capsys.readouterr().err
         assert path.read_bytes() != bytes(data)
@@ -199,7 +199,7 @@ def test_a_folder_and_a_file_of_another_user_are_refused(folder, capsys):
     assert "another user" in capsys.readouterr().err
     path.write_bytes(before)
     os.chown(folder, 12345, 12345)
-    _store._opened.cache_clear()
+    code_store._opened.cache_clear()
     kernel = _kernel(7.0)
     assert _value(kernel) == 7.0
     assert not kernel._cache_hits
@@ -224,7 +224,7 @@ def test_a_file_that_others_may_write_and_a_link_are_refused(folder):
 def test_a_folder_of_ours_is_closed_to_others(folder):
     folder.mkdir(parents=True)
     folder.chmod(0o777)
-    assert _store.current() is not None
+    assert code_store.current() is not None
     assert folder.stat().st_mode & 0o022 == 0
 
 
@@ -253,8 +253,8 @@ def test_a_user_without_a_home_runs(tmp_path):
 
 
 def test_a_stopped_holder_of_a_lock_is_told_and_not_waited_for(folder, monkeypatch, capsys):
-    monkeypatch.setattr(_store, "TELL_S", 0.1)
-    monkeypatch.setattr(_store, "WAIT_S", 0.4)
+    monkeypatch.setattr(code_store, "TELL_S", 0.1)
+    monkeypatch.setattr(code_store, "WAIT_S", 0.4)
     _value(_kernel(10.0))
     (path,) = folder.glob(f"*{CODE}")
     path.unlink()

@@ -11,7 +11,7 @@ from resting import LAW, apart, quaternion, run
 
 from crossbody import cases, engines
 from crossbody.cases import Case
-from crossbody.cases._rotations import matrices
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import SAG
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from crossbody.cases import _closed_forms as cf
+from crossbody.cases import closed_forms as cf
 
 ZETAS = [0.0, 1e-9, 0.02, 0.3, 0.9, 0.98, 1 - 1e-6, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-6, 1.02, 1.5, 2.0, 2.1, 3.0, 40.0]
 

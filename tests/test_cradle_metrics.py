@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
-from crossbody.cases._cradle.rules import answer
+from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import from_run
 from crossbody.reports.metrics._cradle import row

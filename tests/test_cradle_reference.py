@@ -15,9 +15,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from crossbody.cases import Case, Outcome, Tier, Trajectory, load
-from crossbody.cases import _closed_forms as cf
-from crossbody.cases._cradle.motion import Motion
-from crossbody.cases._cradle.rules import answer
+from crossbody.cases import closed_forms as cf
+from crossbody.cases.mechanisms.cradle.motion import Motion
+from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.engines import load as engine
 from crossbody.reference import Options, prepare
 from crossbody.reference.systems import sliders

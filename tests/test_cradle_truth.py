@@ -9,10 +9,10 @@ import pytest
 
 from crossbody import engines
 from crossbody.cases import Case, Outcome, Tier, Value, load
-from crossbody.cases._cradle.impact import delassus, pushes
-from crossbody.cases._cradle.motion import Motion
-from crossbody.cases._cradle.rules import RULES, answer, block, simultaneous
-from crossbody.cases._cradle.scene import Row
+from crossbody.cases.mechanisms.cradle.impact import delassus, pushes
+from crossbody.cases.mechanisms.cradle.motion import Motion
+from crossbody.cases.mechanisms.cradle.rules import RULES, answer, block, simultaneous
+from crossbody.cases.mechanisms.cradle.scene import Row
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.truth import from_run, sample_times
@@ -30,7 +30,7 @@ def heap(n: int, k: int, gap: float = 0.0) -> Motion:
 
 @pytest.mark.parametrize("most", [1, 1000])
 def test_a_motion_says_whether_it_holds_all_its_impacts(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("crossbody.cases._cradle.motion.MAX_IMPACTS", most)
+    monkeypatch.setattr("crossbody.cases.mechanisms.cradle.motion.MAX_IMPACTS", most)
     motion = heap(4, 2, 1e-3)
     assert (motion(np.zeros(1)).outcome is Outcome.FINISHED) == (most > 4)
     assert (motion(np.zeros(1)).message == "") == (most > 4)

@@ -9,7 +9,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, InvalidValue, Outcome, SceneError, Tier, Trajectory, load
-from crossbody.cases._delta import pose
+from crossbody.cases.mechanisms.delta import pose
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.kinematics import tips

@@ -10,7 +10,7 @@ from random_scenes import random_scene, random_state
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, Outcome
-from crossbody.cases._rotations import differences
+from crossbody.cases.rotations import differences
 from crossbody.cases.scene import UNBOUNDED, Actuator, Body, Joint, Scene, Shape
 
 pytest.importorskip("pydrake", reason="Drake is not installed: pip install 'crossbody[drake]' brings it.")

@@ -11,7 +11,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Outcome
-from crossbody.cases import _closed_forms as closed_forms
+from crossbody.cases import closed_forms as closed_forms
 
 pin = pytest.importorskip("pinocchio")
 from crossbody.engines._level_machine import LevelMachine  # noqa: E402 - they import the engine's package

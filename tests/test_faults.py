@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Mode, Outcome, Tier, Trajectory, UnknownName, load
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.truth import Truth, _held_against, truth_of

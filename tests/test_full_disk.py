@@ -19,8 +19,8 @@ from test_output_kills import MINE, content, expected, fresh, put
 
 from crossbody import hw
 from crossbody.cases import OutputError
-from crossbody.reference import _store
-from crossbody.reference._store import CODE, Store
+from crossbody.reference import code_store
+from crossbody.reference.code_store import CODE, Store
 from crossbody.reports.runs.output import MARKER, folder, recover
 from crossbody.reports.runs.parts import ABOUT, Parts
 
@@ -69,13 +69,13 @@ def test_compiled_code_that_finds_no_room_is_told_and_not_believed(
         if kept is not None:
             store.write("name", kept)
         for limit in (0, 1, 9000, *(draw.randrange(9000) for _ in range(12))):
-            _store.tell.cache_clear()
+            code_store.tell.cache_clear()
             with no_file_above(limit):
                 store.write("name", data)
             assert "it serves this process alone" in capsys.readouterr().err
             assert store.read("name") == kept
             assert names(tmp_path) == ([] if kept is None else [f"name{CODE}"])
-    _store.tell.cache_clear()
+    code_store.tell.cache_clear()
 
 
 KERNEL = """

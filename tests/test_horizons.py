@@ -9,9 +9,9 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Tier
-from crossbody.cases._defaults import limits_of
-from crossbody.cases._soft.claims import STEP
-from crossbody.cases._soft.scene import numbers
+from crossbody.cases.defaults import limits_of
+from crossbody.cases.mechanisms.soft.claims import STEP
+from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.engines._soft_contact import fastest
 from crossbody.engines.mujoco import soft_contact as axis
 from crossbody.engines.mujoco import soft_delta as robot

@@ -14,8 +14,8 @@ import pytest
 
 from crossbody import hw
 from crossbody.cases import ColumnMapError, InvalidValue
-from crossbody.cases._regular import open_regular
-from crossbody.reference._store import CODE, Store
+from crossbody.cases.regular import open_regular
+from crossbody.reference.code_store import CODE, Store
 from crossbody.reports.cli import main
 from crossbody.reports.testing._baseline import Baseline
 

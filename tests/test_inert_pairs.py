@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases.scene import UPRIGHT, Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import contacts, inert
-from crossbody.engines._nearest import meet
+from crossbody.engines.nearest import meet
 from crossbody.reports.scenes._kinematics import body_poses, placed
 
 INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)

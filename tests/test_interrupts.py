@@ -34,7 +34,7 @@ SECOND = 1.0
 """Within this a command has stopped, s; start-up of the interpreter is no part of it."""
 
 
-BALLS = """from crossbody.cases.bouncing_ball import PARAMETERS, build
+BALLS = """from crossbody.cases.library.bouncing_ball import PARAMETERS, build
 
 VARIANTS = {"linear": {"a0": 1e4, "a1": 20.0, "a2": 0.0}, "resting": {"a2": 0.0}}
 """

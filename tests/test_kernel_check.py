@@ -18,7 +18,9 @@ from crossbody.cases import SceneError
 from crossbody.reference import Options, System, _check, kernels, prepare, simulate
 from crossbody.reference._check import check_kernels
 
-VARIANTS = [(name, variant) for name in cases.names() for variant in import_module(f"crossbody.cases.{name}").VARIANTS]
+VARIANTS = [
+    (name, variant) for name in cases.names() for variant in import_module(f"crossbody.cases.library.{name}").VARIANTS
+]
 
 
 @pytest.mark.parametrize(("name", "variant"), VARIANTS)
@@ -270,7 +272,7 @@ SHIPPED = """
 
     count = 0
     for name in cases.names():
-        for variant in import_module(f"crossbody.cases.{name}").VARIANTS:
+        for variant in cases.variants(name):
             case = cases.load(name, variant)
             system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
             system.check(case.q0, case.v0, states=5, t_end=case.t_end)

@@ -20,19 +20,13 @@ BELOW = {
 HEAVY = ("numpy", "pandas", "numba", "scipy", "mujoco", "pinocchio", "plotly", "pyarrow", "sksundae")
 
 
-def imported(path: Path) -> set[str]:
-    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    names = {node.module for node in tree if isinstance(node, ast.ImportFrom) and node.module}
-    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    names |= {
-        f"{node.module}.{alias.name}"
-        for node in tree
-        if isinstance(node, ast.ImportFrom) and node.module == "crossbody"
-        for alias in node.names
-    }
-    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    names |= {alias.name for node in tree if isinstance(node, ast.Import) for alias in node.names}
-    return {name.split(".")[1] for name in names if name.startswith("crossbody.")}
+def imported(path: Path) -> set[tuple[str, ...]]:
+    """Return what a file imports of ours: the parts of each dotted name behind the first."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    of = [(node.module or "", alias) for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names]
+    names = [f"{module}.{alias.name}" for module, alias in of]
+    names += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    return {tuple(name.split(".")[1:]) for name in names if name.startswith("crossbody.")}
 
 
 @pytest.mark.parametrize("layer", BELOW)
@@ -40,12 +34,20 @@ def test_imports_go_one_way(layer: str) -> None:
     files = list((ROOT / layer).rglob("*.py"))
     assert files
     for path in files:
-        assert imported(path) <= BELOW[layer], f"{path.relative_to(ROOT)} imports from above"
+        layers = {name[0] for name in imported(path)}
+        assert layers <= BELOW[layer], f"{path.relative_to(ROOT)} imports from above"
+
+
+@pytest.mark.parametrize("layer", BELOW)
+def test_what_is_private_stays_in_its_package(layer: str) -> None:
+    for path in (ROOT / layer).rglob("*.py"):
+        private = {".".join(name) for name in imported(path) if name[0] != layer and any(p[0] == "_" for p in name)}
+        assert not private, f"{path.relative_to(ROOT)} takes {sorted(private)}"
 
 
 def test_only_the_reference_runs_the_kernels_of_the_reference() -> None:
     """An engine that borrows a kernel of what it is compared with agrees whatever that kernel says."""
-    own = {"reference.py", "_equations.py", "_reference_audit.py"}
+    own = {"reference.py", "equations.py", "_reference_audit.py"}
     for path in (ROOT / "engines").rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         borrowed = [name for name in ("reference.systems", "reference.core", "delta.kinematics") if name in text]

@@ -9,7 +9,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import Case, Limit
-from crossbody.cases._defaults import limits_of
+from crossbody.cases.defaults import limits_of
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.verdict import limit_for
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mechanisms import ball
 
-from crossbody.cases import Mode, _closed_forms
+from crossbody.cases import Mode, closed_forms
 from crossbody.reference import simulate
 
 SPEED, HEIGHT = 1.3, 0.01
@@ -17,7 +17,7 @@ GRID = list(itertools.product([0.02, 0.1, 0.5, 0.9, 0.999, 1.0, 1.001, 1.5, 3.0]
 def impact(a0, zeta, shortcuts):
     """Restitution, contact time, gap at separation, depth of one impact without gravity."""
     a1 = 2.0 * zeta * math.sqrt(a0)
-    time = _closed_forms.contact_time(a0, a1)
+    time = closed_forms.contact_time(a0, a1)
     end = HEIGHT / SPEED + time + 2.0 * a1 / a0 + time
     system = ball(a0=a0, a1=a1, a2=0.0, gravity=0.0)
     run = simulate(system, [HEIGHT], [-SPEED], end, rtol=1e-13, shortcuts=shortcuts)
@@ -30,7 +30,7 @@ def impact(a0, zeta, shortcuts):
 
 def closed(a0, zeta):
     a1 = 2.0 * zeta * math.sqrt(a0)
-    forms = _closed_forms
+    forms = closed_forms
     return np.array(
         [
             forms.restitution(zeta),
@@ -57,7 +57,7 @@ def test_shortcuts_agree_with_integration(a0, zeta):
 def test_threshold_speed_from_both_sides(zeta, part, shortcuts):
     a0 = 1e4
     a1 = 2.0 * zeta * math.sqrt(a0)
-    speed = part * _closed_forms.threshold_speed(a0, a1, 9.81)
+    speed = part * closed_forms.threshold_speed(a0, a1, 9.81)
     run = simulate(ball(a0=a0, a1=a1, a2=0.0), [0.0], [-speed], 1.0, rtol=1e-12, shortcuts=shortcuts)
     left = any(e.before is Mode.CONTACT for e in run.events)
     assert left == (part > 1.0)

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from wall_pendulum import wall_pendulum
 
 from crossbody.cases import Event, Mode, Outcome, Trajectory
-from crossbody.cases._closed_forms import damping_ratio, restitution, threshold_speed
+from crossbody.cases.closed_forms import damping_ratio, restitution, threshold_speed
 from crossbody.reference import System, simulate
 
 SOLVERS = ("compiled", "cvode", "ida")

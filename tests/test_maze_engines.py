@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import CaseUnsupported, Outcome, load
-from crossbody.cases._maze import closed_forms as cf
+from crossbody.cases.mechanisms.maze import closed_forms as cf
 from crossbody.engines import load as load_engine
 from crossbody.engines._maze.edges import SOLID, sector
 from crossbody.engines._maze.machine import MazeMachine

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import load
-from crossbody.cases._maze.geometry import maze_of
+from crossbody.cases.mechanisms.maze.geometry import maze_of
 from crossbody.reference.systems import _maze_layout as layout
 from crossbody.reference.systems import maze
 from crossbody.reference.systems._maze_control import sampled

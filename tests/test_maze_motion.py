@@ -10,11 +10,11 @@ import pytest
 from scipy.linalg import expm
 
 from crossbody.cases import Mode, Outcome, load
-from crossbody.cases._maze import closed_forms as cf
-from crossbody.cases._maze.geometry import Ring, maze_of
-from crossbody.cases.ball_maze import VARIANTS
+from crossbody.cases.library.ball_maze import VARIANTS
+from crossbody.cases.mechanisms.maze import closed_forms as cf
+from crossbody.cases.mechanisms.maze.geometry import Ring, maze_of
 from crossbody.reference import prepare, simulate
-from crossbody.reference._options import Options
+from crossbody.reference.options import Options
 from crossbody.reference.systems import _maze_layout as layout
 from crossbody.reference.systems import maze
 from crossbody.reports import metrics

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from crossbody.cases import CrossbodyError, Mode, Outcome, load
-from crossbody.cases import _closed_forms as cf
-from crossbody.cases._maze import closed_forms as maze_forms
+from crossbody.cases import closed_forms as cf
+from crossbody.cases.mechanisms.maze import closed_forms as maze_forms
 from crossbody.reference import simulate
 from crossbody.reference.systems import maze
 from crossbody.reports import commands, metrics

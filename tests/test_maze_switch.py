@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import load
-from crossbody.cases._maze.geometry import maze_of
+from crossbody.cases.mechanisms.maze.geometry import maze_of
 from crossbody.reference.kernels import CHANGED, LOST, START, TOUCHED, UNCHANGED
 from crossbody.reference.systems import _maze_layout as layout
 from crossbody.reference.systems import _maze_switch as machine

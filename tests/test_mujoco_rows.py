@@ -11,7 +11,7 @@ from crossbody.cases import Mode
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load
-from crossbody.engines._equations import system_of
+from crossbody.engines.equations import system_of
 from crossbody.engines.mujoco._globals import hooked
 
 STATES = 6

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES
 from crossbody.engines._contacts import FAR, Contacts
-from crossbody.engines._nearest import Pose
+from crossbody.engines.nearest import Pose
 from crossbody.reports.scenes.scene import _meeting
 
 TURN, DRAWS, POINTS = 1e-6, 40, 4000

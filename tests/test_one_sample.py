@@ -11,8 +11,8 @@ from known_values import VALUES
 
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
-from crossbody.cases._defaults import limits_of
-from crossbody.cases._delta import pose
+from crossbody.cases.defaults import limits_of
+from crossbody.cases.mechanisms.delta import pose
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.metrics._align import matched

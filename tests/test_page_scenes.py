@@ -14,7 +14,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Trajectory
-from crossbody.cases._maze.geometry import maze_of
+from crossbody.cases.mechanisms.maze.geometry import maze_of
 from crossbody.reports import scenes
 from crossbody.reports.metrics._impulse import with_collisions
 from crossbody.reports.pages.case_page import PLOTTED

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._parameters import NumberOrWord, Numbers, spread
+from crossbody.cases.parameters import NumberOrWord, Numbers, spread
 from crossbody.reports.runs.jobs import parse_settings
 
 MASSES = Numbers(default="0.1", unit="kg", low=0.0, open_low=True)

@@ -10,7 +10,7 @@ from red_body_scene import REFERENCE, instants, numbers, random_states, run, sys
 
 from crossbody import cases
 from crossbody.cases import InvalidValue, Mode, SceneError, Trajectory, load
-from crossbody.cases._red_body.order import LEFT, RIGHT, Fall
+from crossbody.cases.mechanisms.red_body.order import LEFT, RIGHT, Fall
 from crossbody.reference import System
 from crossbody.reports.judging.comparison import compare
 from crossbody.reports.judging.truth import from_run

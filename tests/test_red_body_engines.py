@@ -8,7 +8,7 @@ from red_body_scene import ALL, REFERENCE, random_states, run, system_of
 
 from crossbody import engines
 from crossbody.cases import Mode, load
-from crossbody.cases._red_body.order import LEFT, stages_in_order
+from crossbody.cases.mechanisms.red_body.order import LEFT, stages_in_order
 from crossbody.reports.judging.audit import audit
 
 

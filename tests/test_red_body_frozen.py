@@ -10,7 +10,7 @@ import pytest
 from red_body_scene import ALL, numbers, order, run, system_of
 
 from crossbody.cases import Case, Mode, Trajectory, load
-from crossbody.cases._red_body.order import LEFT, RIGHT, Fall, stages_in_order
+from crossbody.cases.mechanisms.red_body.order import LEFT, RIGHT, Fall, stages_in_order
 from crossbody.reference import System, simulate
 from crossbody.reference.systems import red_body as kernels
 from crossbody.reports.pages.figures import FIGURES

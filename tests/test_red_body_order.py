@@ -7,7 +7,7 @@ import pytest
 from red_body_scene import ALL, numbers, run
 
 from crossbody.cases import Mode, load
-from crossbody.cases._red_body.order import LEFT, RIGHT, Fall, inequalities, stages_in_order
+from crossbody.cases.mechanisms.red_body.order import LEFT, RIGHT, Fall, inequalities, stages_in_order
 
 ONE_AT_A_TIME = [
     *(("b0", value, True) for value in (3e5, 1e6, 3e6)),

@@ -12,7 +12,7 @@ from published import MJCF
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome, Trajectory
-from crossbody.cases._rotations import differences
+from crossbody.cases.rotations import differences
 
 ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 PUSHED = {

@@ -18,8 +18,8 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case
-from crossbody.cases._rotations import differences
 from crossbody.cases.files.warned import captured
+from crossbody.cases.rotations import differences
 from crossbody.engines.mujoco.scene import matched
 
 pytestmark = pytest.mark.bench

@@ -21,10 +21,10 @@ from scipy.spatial.transform import Rotation
 
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError
 from crossbody.reference import System, ensemble, kernels, prepare, simulate
-from crossbody.reference._kinds import Array, Floats
-from crossbody.reference._options import Options
 from crossbody.reference.core.exact import linear_arc
+from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear import poses, tangents
+from crossbody.reference.options import Options
 
 START = np.array([0.3, -0.2, 1.0, 0.8, 0.2, -0.4, 0.4])
 SPIN = np.array([0.5, -1.0, 2.0, 1.5, -2.5, 1.0])

@@ -12,8 +12,8 @@ from random_scenes import random_scene, random_state
 from scipy.spatial.transform import Rotation
 from test_tree import compiled, rows_at
 
-from crossbody.cases._rotations import rates
 from crossbody.cases.files.case import case_of, quaternions, rows_of
+from crossbody.cases.rotations import rates
 from crossbody.cases.scene import Body, Scene, Shape
 from crossbody.cases.scene_contacts import contacts
 from crossbody.cases.scene_plain import plain, scene_from

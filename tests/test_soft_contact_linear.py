@@ -9,8 +9,8 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome
-from crossbody.cases._soft import closed_forms as closed
-from crossbody.cases._soft.scene import numbers
+from crossbody.cases.mechanisms.soft import closed_forms as closed
+from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.reference import simulate
 from crossbody.reference.systems import soft_contact as mechanism
 from crossbody.reports.analysis import bode

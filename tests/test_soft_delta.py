@@ -7,7 +7,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import Mode, Outcome
-from crossbody.cases._delta import pose
+from crossbody.cases.mechanisms.delta import pose
 from crossbody.engines import load
 from crossbody.reference import delta
 from crossbody.reference.linear import linearise

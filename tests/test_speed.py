@@ -12,7 +12,7 @@ from sksundae.cvode import CVODE
 
 from crossbody import cases, engines
 from crossbody.reference import Options, kernels, prepare
-from crossbody.reference._cache import compiled
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import OWN, accelerate, activate
 from crossbody.reference.core.advance import Kernels
 from crossbody.reference.core.layout import CONTACT, STATE, open_buffers, open_model, open_work

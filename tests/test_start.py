@@ -121,7 +121,9 @@ def test_a_case_may_start_off_its_rows():
     assert abs(run.gap[-1, 0]) < 1e-6
 
 
-ALL = [(name, variant) for name in cases.names() for variant in import_module(f"crossbody.cases.{name}").VARIANTS]
+ALL = [
+    (name, variant) for name in cases.names() for variant in import_module(f"crossbody.cases.library.{name}").VARIANTS
+]
 
 
 @pytest.mark.parametrize(("name", "variant"), ALL)

@@ -381,7 +381,7 @@ def test_a_slow_touch_does_not_set_the_clock_of_what_moves_fast() -> None:
 )
 def test_a_ball_a_millionth_above_its_threshold_leaves_and_one_below_stays(a0: float, zeta: float, near: float) -> None:
     """The contact force dips below 0 by a millionth of the weight, between two nodes of a step or right behind one."""
-    from crossbody.cases import _closed_forms as cf
+    from crossbody.cases import closed_forms as cf
 
     a1 = 2.0 * zeta * math.sqrt(a0)
     speed = near * cf.threshold_speed(a0, a1, 9.81)

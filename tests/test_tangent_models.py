@@ -15,10 +15,10 @@ from crossbody import cases, engines
 from crossbody.cases import Law, Outcome, SceneError
 from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Body, Joint, Loop, Pair, RowLaw, Scene, Shape
-from crossbody.engines._linear import Spot
+from crossbody.engines.linear import Spot
 from crossbody.reference import System, kernels, simulate
 from crossbody.reference.linear import linearise, sensitivity, tangents, trim
-from crossbody.reference.linear._differences import differences
+from crossbody.reference.linear.differences import differences
 from crossbody.reference.tree.system import system
 
 SEEDS = (0, 2, 5, 7)

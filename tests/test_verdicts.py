@@ -12,7 +12,7 @@ import pytest
 from crossbody import cases as cases_
 from crossbody import engines
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
-from crossbody.cases._defaults import limits_of
+from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row

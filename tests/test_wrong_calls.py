@@ -15,7 +15,7 @@ from wrong_calls import Call, _logs, arguments_of_entry_points, calls, failure, 
 
 from crossbody import cases
 from crossbody.cases import CrossbodyError, InvalidValue, Outcome, SceneError, UnknownName
-from crossbody.engines._equations import system_of
+from crossbody.engines.equations import system_of
 from crossbody.reference import simulate
 from crossbody.reports import cli, commands
 from crossbody.reports.analysis import bode

@@ -14,8 +14,8 @@ import numpy as np
 
 from crossbody import cases, engines, hw, reports
 from crossbody.cases import Case, CrossbodyError, Parameter
-from crossbody.cases._arrays import is_number
-from crossbody.engines._equations import system_of
+from crossbody.cases.arrays import is_number
+from crossbody.engines.equations import system_of
 from crossbody.reference import Options, System, ensemble, linear, prepare, recheck, simulate
 from crossbody.reports import cli
 
@@ -78,7 +78,7 @@ def parameters(rng: random.Random, known: dict[str, Parameter], mistakes: float 
 
 @cache
 def scenes() -> dict[str, dict[str, Parameter]]:
-    from crossbody.cases._load import module
+    from crossbody.cases.loading import module
 
     return {name: dict(module(name).PARAMETERS) for name in cases.names()}
 

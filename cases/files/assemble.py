@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._errors import SceneError
+from crossbody.cases.arrays import Floats
+from crossbody.cases.errors import SceneError
 
 ROUNDS = 50
 CLOSED = 1e-13  # m or rad: rounding of a gap

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._case import Case, Coordinate, Inputs, Law, Limit, Parameter, Value
-from crossbody.cases._control import Control
-from crossbody.cases._errors import SceneError, UnknownName
-from crossbody.cases._rotations import normalised
+from crossbody.cases.arrays import Floats
+from crossbody.cases.case import Case, Coordinate, Inputs, Law, Limit, Parameter, Value
+from crossbody.cases.control import Control
+from crossbody.cases.errors import SceneError, UnknownName
 from crossbody.cases.files.assemble import assembled
 from crossbody.cases.files.controls import pushed, read_control, read_controls, under
 from crossbody.cases.files.reading import findings_of, model_of, scene_of
 from crossbody.cases.files.text import check_text
+from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import contacts
 

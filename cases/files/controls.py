@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arguments import shown
-from crossbody.cases._arrays import Floats
-from crossbody.cases._case import Case, Inputs
-from crossbody.cases._control import Control
-from crossbody.cases._errors import InvalidValue, UnknownName
-from crossbody.cases._own_file import from_file
-from crossbody.cases._regular import open_regular
+from crossbody.cases.arguments import shown
+from crossbody.cases.arrays import Floats
+from crossbody.cases.case import Case, Inputs
+from crossbody.cases.control import Control
+from crossbody.cases.errors import InvalidValue, UnknownName
+from crossbody.cases.own_file import from_file
+from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import Push, Scene
 
 LARGEST = 1 << 28  # bytes in memory: an hour of eight actuators at 1 kHz

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crossbody.cases._errors import SceneError
+from crossbody.cases.errors import SceneError
 from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
 from crossbody.cases.files.warned import compiled, sentences

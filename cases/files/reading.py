@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from crossbody.cases._regular import open_regular
 from crossbody.cases.files import mjcf, urdf
 from crossbody.cases.files.without import strip
+from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import Scene
 
 if TYPE_CHECKING:

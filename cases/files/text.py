@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-from crossbody.cases._errors import SceneError
-from crossbody.cases._regular import open_regular
+from crossbody.cases.errors import SceneError
+from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import LARGEST
 
 BYTES = 50_000_000

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._errors import SceneError
+from crossbody.cases.errors import SceneError
 
 READ = frozenset(
     """

@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._errors import SceneError
+from crossbody.cases.arrays import Floats
+from crossbody.cases.errors import SceneError
 from crossbody.cases.files.warned import compiled, sentences
 from crossbody.cases.scene import Body, Loop, Scene
 

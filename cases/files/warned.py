@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from crossbody.cases._errors import SceneError
+from crossbody.cases.errors import SceneError
 
 NOT_A_NUMBER = "'NaN'"
 """What MuJoCo's warning names; it takes such an entry as not given."""

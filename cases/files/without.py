@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from crossbody.cases._errors import InvalidValue
+from crossbody.cases.errors import InvalidValue
 
 ALL = ("friction", "contacts", "limits", "actuators", "loops", "tendons")
 

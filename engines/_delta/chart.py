@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.engines._linear import Chart
+from crossbody.engines.linear import Chart
 
 Floats = NDArray[np.float64]
 

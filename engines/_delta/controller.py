@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reference.delta import Robot
 from crossbody.reference.delta.control import Path, Sampling
 

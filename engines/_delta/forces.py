@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from crossbody.cases._arrays import Floats
-from crossbody.reference._cache import compiled
+from crossbody.cases.arrays import Floats
+from crossbody.reference.cache import compiled
 from crossbody.reference.delta import Robot, Servo
 
 _V = types.float64[::1]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.controller import Controller, controller
 from crossbody.engines._delta.forces import table
-from crossbody.engines._linear import Spot
+from crossbody.engines.linear import Spot
 from crossbody.reference.delta import Robot, scene
 
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._delta.forces import _COS, _SIN
-from crossbody.reference._cache import compiled
+from crossbody.reference.cache import compiled
 from crossbody.reference.delta import Robot
 
 _V = types.float64[::1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from crossbody.cases._maze.geometry import Maze, Ring
+from crossbody.cases.mechanisms.maze.geometry import Maze, Ring
 
 SOLID = -1
 """The sector of a ring where its wall is solid; a gap's sector is its number."""

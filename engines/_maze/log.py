@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Log
 from crossbody.engines._maze.machine import Settled
 from crossbody.engines._maze.memory import Memory

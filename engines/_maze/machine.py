@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 from crossbody.cases import Event, Mode, Switch
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.edges import DEAD_BAND, SOLID, to_edge, wrapped
 from crossbody.engines._maze.memory import (
     BALANCE,

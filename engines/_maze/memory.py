@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from crossbody.cases import Mode
-from crossbody.cases._maze.geometry import Ring
+from crossbody.cases.mechanisms.maze.geometry import Ring
 from crossbody.engines._log import Modes
 from crossbody.engines._maze.edges import SOLID, nearest_gap, sector, wrapped
 from crossbody.engines._maze.rows import ABOVE, BELOW, SLIP_OF, Place

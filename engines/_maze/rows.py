@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from crossbody.cases._maze.geometry import Ring
+from crossbody.cases.mechanisms.maze.geometry import Ring
 from crossbody.engines._maze.edges import SOLID
 
 BELOW, ABOVE, SLIP_BELOW, SLIP_ABOVE = 0, 3, 6, 7

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
-from crossbody.cases._maze.geometry import Ring, maze_of
+from crossbody.cases.arrays import Floats
+from crossbody.cases.mechanisms.maze.geometry import Ring, maze_of
 from crossbody.engines._log import Observe
 from crossbody.engines._maze.controller import Limits, Plant, at_bottom, balance, on_top, snatch
 from crossbody.engines._maze.edges import walls

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines import _settings
 from crossbody.engines._contract import Run
 from crossbody.engines._line import Line, followed, law_name, line

@@ -16,15 +16,15 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, DiagramBuilder, LeafSystem
 
 from crossbody.cases import Case, CaseUnsupported, Mode, Outcome, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene, Tendon
 from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Log
-from crossbody.engines._nearest import Pose
 from crossbody.engines._scene import Forces, Stretch
 from crossbody.engines.drake._simulate import Sim
 from crossbody.engines.drake._tree import Tree
+from crossbody.engines.nearest import Pose
 
 NO_ROWS = "a MultibodyPlant in continuous time has no rows."
 FIRST = 1e-5

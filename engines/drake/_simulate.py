@@ -8,7 +8,7 @@ from typing import Any
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import EventStatus
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 
 LONGEST = 0.1  # s, Drake's own bound on a step
 SHORTEST = 1e-14  # s

@@ -25,8 +25,8 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import matrices
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines._scene import places
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import hooked

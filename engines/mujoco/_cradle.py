@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Law
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._cradle import Chain, one_set
 from crossbody.engines.mujoco._audit import audit
 from crossbody.engines.mujoco._direct import without_regularisation

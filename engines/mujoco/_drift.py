@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Joint, Scene, Tendon
 from crossbody.engines._contacts import TURN, Contacts, Indices, closing, drift
 from crossbody.engines._scene import angle_of, places

@@ -6,22 +6,22 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
-from types import ModuleType
 from typing import Any
 
 import mujoco
 
-from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory, _registry
+from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory
 from crossbody.cases.files.warned import captured
+from crossbody.cases.registry import Registry
 from crossbody.engines import _settings
 from crossbody.engines._contract import Run
-from crossbody.engines._linear import Spot, Tangent
+from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.mujoco._globals import hooked
 from crossbody.engines.mujoco._march import March
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._tape import Tape
 
-PACKAGE = "crossbody.engines.mujoco"
+MECHANISMS = Registry("mechanism of MuJoCo", "crossbody.engines.mujoco")
 
 
 @dataclass(slots=True, kw_only=True)
@@ -106,11 +106,11 @@ class Mujoco:
         """Mechanisms without a model here cannot be run."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
-        known = _mechanisms()
+        known = MECHANISMS.names()
         if profile == "as_is" and case.scene is None:
             return f"The profile as_is runs a robot file as it stands, and {case.name} is none; its own is default."
         if case.mechanism in known:
-            own = getattr(_mechanism(case.mechanism), "why_not", None)
+            own = getattr(MECHANISMS.load(case.mechanism), "why_not", None)
             return own(case, profile) if own else None
         return f"MuJoCo has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
 
@@ -131,7 +131,7 @@ class Mujoco:
         reason = self.why_not(case, profile)
         if reason is not None:
             raise CaseUnsupported(reason)
-        mechanism = _mechanism(case.mechanism)
+        mechanism = MECHANISMS.load(case.mechanism)
         known = _known(case, mechanism.default_step(case, profile))
         known |= getattr(mechanism, "settings", lambda *_: {})(case, profile)
         used = _settings.chosen(self.name, profile, known, settings)
@@ -166,7 +166,7 @@ class Mujoco:
         reason = self.why_not(case, "matched")
         if reason is not None:
             raise CaseUnsupported(reason)
-        return linearise(_mechanism(case.mechanism), case, spot)
+        return linearise(MECHANISMS.load(case.mechanism), case, spot)
 
 
 def _dividing(case: Case, dt: float) -> tuple[float, str]:
@@ -199,15 +199,3 @@ def _options(scene: Scene) -> dict[str, Any]:
         "located_events": scene.arm is not None,
         "law": scene.machine,
     }
-
-
-def _mechanisms() -> tuple[str, ...]:
-    from crossbody.engines import mujoco as package
-
-    return _registry.plugin_names(PACKAGE, list(package.__path__))
-
-
-def _mechanism(name: str) -> ModuleType:
-    from crossbody.engines import mujoco as package
-
-    return _registry.load_plugin("mechanism of MuJoCo", PACKAGE, list(package.__path__), name)

@@ -27,9 +27,9 @@ import numpy as np
 from scipy.linalg import logm
 
 from crossbody.cases import Case, CaseUnsupported
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
-from crossbody.engines._linear import Chart, Spot, Tangent, in_contact, same
+from crossbody.engines.linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix
 

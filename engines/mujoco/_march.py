@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Mode, Outcome
-from crossbody.cases._control import NotFinite
+from crossbody.cases.control import NotFinite
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._locate import Locator
 from crossbody.engines.mujoco._scene import Scene

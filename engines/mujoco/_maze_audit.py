@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.rows import SLIP_BELOW

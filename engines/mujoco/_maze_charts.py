@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
-from crossbody.engines._linear import Chart
+from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.memory import CONTACT, Memory
 from crossbody.engines._maze.rows import ABOVE, BELOW, INNER, OUTER, SLIP_ABOVE, SLIP_BELOW, Place
 from crossbody.engines._maze.scene import BallMaze
+from crossbody.engines.linear import Chart
 from crossbody.engines.mujoco._maze_model import (
     FAR,
     PHI,

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.edges import SOLID, wrapped
 from crossbody.engines._maze.memory import angle
 from crossbody.engines._maze.rows import ABOVE, BELOW, SLIP_OF, Place

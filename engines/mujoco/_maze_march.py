@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from crossbody.cases import Outcome
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine, Settled
 from crossbody.engines._maze.memory import CONTACT, FREE

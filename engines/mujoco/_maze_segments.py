@@ -10,8 +10,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._maze.geometry import THICKNESS, Ring
+from crossbody.cases.arrays import Floats
+from crossbody.cases.mechanisms.maze.geometry import THICKNESS, Ring
 from crossbody.engines._maze.scene import BallMaze
 
 ANGLE = math.radians(5.0)

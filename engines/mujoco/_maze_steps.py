@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Event, Mode, Outcome
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine, Settled, switches
 from crossbody.engines._maze.memory import CONTACT, FREE, Memory

@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.engines._contacts import Poses
 from crossbody.engines._log import Observe

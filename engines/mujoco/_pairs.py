@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Law, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._direct import IMPEDANCE, direct_solref
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._drift import Drift

@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Log, Modes
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Law, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._cradle import one_set
 from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines import _ball_scale, _scale
 from crossbody.engines._log import Modes
 from crossbody.engines.mujoco._audit import audit

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Mode, Outcome, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines._cube import Cube, cube, quaternion, rotation_vector
 from crossbody.engines._log import Log, charted

@@ -13,12 +13,12 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces
 from crossbody.engines._delta.scene import Delta, delta, in_absolute, steady
-from crossbody.engines._linear import Spot
+from crossbody.engines.linear import Spot
 from crossbody.engines.mujoco._delta_model import compiled
 from crossbody.engines.mujoco._direct import law_of
 from crossbody.engines.mujoco._globals import Hook, hooked

@@ -12,12 +12,12 @@ from typing import Any, Protocol
 import mujoco
 
 from crossbody.cases import Case, Outcome, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
-from crossbody.engines._linear import Spot
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.scene import ONLY_CONTINUOUS, BallMaze, ball_maze
+from crossbody.engines.linear import Spot
 from crossbody.engines.mujoco import _maze_audit as audits
 from crossbody.engines.mujoco import _maze_segments as segments
 from crossbody.engines.mujoco._globals import hooked

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines import _red_body
 from crossbody.engines._cradle import one_set
 from crossbody.engines._log import Modes

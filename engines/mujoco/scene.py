@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Parameter, SceneError
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene

@@ -14,12 +14,12 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines import _soft_contact as soft
-from crossbody.engines._linear import Spot, same
 from crossbody.engines._log import Chart, Modes, charted
 from crossbody.engines._soft_contact import NAMES, SoftContact
+from crossbody.engines.linear import Spot, same
 from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._linear import Stand

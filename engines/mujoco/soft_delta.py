@@ -13,10 +13,9 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines import _soft_contact as soft
-from crossbody.engines._linear import Spot
 from crossbody.engines._log import charted
 from crossbody.engines._soft_delta import (
     AXES,
@@ -32,6 +31,7 @@ from crossbody.engines._soft_delta import (
     small_motions,
     soft_delta,
 )
+from crossbody.engines.linear import Spot
 from crossbody.engines.mujoco._delta_model import FLAGS, text
 from crossbody.engines.mujoco._direct import law_of, without_regularisation
 from crossbody.engines.mujoco._globals import Hook, hooked

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Mode, Outcome
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Log, Modes
 from crossbody.engines._machines import first_modes
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix

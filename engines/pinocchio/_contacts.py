@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.engines._contacts import Contacts, Indices, Poses, closing, drift
-from crossbody.engines._nearest import Pose, cross
+from crossbody.engines.nearest import Pose, cross
 
 WORLD = pin.LOCAL_WORLD_ALIGNED
 

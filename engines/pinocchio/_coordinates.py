@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import matrices
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Scene
 from crossbody.engines._scene import places
 

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Law, SceneError
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._delta.mjcf import mjcf
 from crossbody.reference.delta import Robot
 from crossbody.reference.delta.kinematics import rotations

@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
-from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
 import sksundae
 
-from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory, _registry
-from crossbody.cases._arrays import Floats
+from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.cases.registry import Registry
 from crossbody.engines import _settings
 from crossbody.engines._contract import Run
 from crossbody.engines._level_machine import LevelMachine
-from crossbody.engines._linear import Spot, Tangent
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
+from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.pinocchio._admm import TimeStepper
 from crossbody.engines.pinocchio._audit import audit
 from crossbody.engines.pinocchio._flow import Flow
@@ -28,7 +28,7 @@ from crossbody.engines.pinocchio._rows import ALGEBRA
 from crossbody.engines.pinocchio._scene import Scene
 from crossbody.engines.pinocchio._smooth import Smooth, SmoothFlow
 
-PACKAGE = "crossbody.engines.pinocchio"
+MECHANISMS = Registry("mechanism of Pinocchio", "crossbody.engines.pinocchio")
 STEPS = Parameter(default=200_000, doc="bound on the number of steps", low=1, high=1e9)
 RTOL = Parameter(default=1e-10, doc="relative tolerance", low=1e-14, high=1e-1)
 METHOD = Parameter(default="Adams", doc="linear multistep method of CVODE", choices=("Adams", "BDF"))
@@ -126,13 +126,13 @@ class Pinocchio:
         """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""
         _settings.check_case(case)
         profile = _settings.profile_of(self.name, self.profiles, profile)
-        known = _registry.plugin_names(PACKAGE, _path())
+        known = MECHANISMS.names()
         if case.mechanism not in known:
             return f"Pinocchio has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
-        if hasattr(_mechanism(case), "why_not"):
-            own: str | None = _mechanism(case).why_not(case, profile)
+        if hasattr(MECHANISMS.load(case.mechanism), "why_not"):
+            own: str | None = MECHANISMS.load(case.mechanism).why_not(case, profile)
             return own
-        if profile == "admm" and not hasattr(_mechanism(case), "build"):
+        if profile == "admm" and not hasattr(MECHANISMS.load(case.mechanism), "build"):
             return "The profile admm steps contacts in time: the loops of this mechanism never open."
         if profile in RULES and not case.law.unilateral.all():
             return "An impact needs a contact that opens: a row that is always on has none."
@@ -162,7 +162,7 @@ class Pinocchio:
         if reason is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
-        mechanism = _mechanism(case)
+        mechanism = MECHANISMS.load(case.mechanism)
         if hasattr(mechanism, "prepare"):
             run: Run = mechanism.prepare(case, used)
             return run
@@ -190,25 +190,15 @@ class Pinocchio:
         reason = self.why_not(case, "law")
         if reason is not None:
             raise CaseUnsupported(reason)
-        return linearise(_mechanism(case), case, spot)
-
-
-def _path() -> list[str]:
-    from crossbody.engines import pinocchio as package
-
-    return list(package.__path__)
-
-
-def _mechanism(case: Case) -> ModuleType:
-    return _registry.load_plugin("mechanism of Pinocchio", PACKAGE, _path(), case.mechanism)
+        return linearise(MECHANISMS.load(case.mechanism), case, spot)
 
 
 def _known(case: Case, profile: str) -> dict[str, Parameter]:
     """The settings of a profile."""
-    if hasattr(_mechanism(case), "SETTINGS"):
-        own: dict[str, Parameter] = _mechanism(case).SETTINGS
+    if hasattr(MECHANISMS.load(case.mechanism), "SETTINGS"):
+        own: dict[str, Parameter] = MECHANISMS.load(case.mechanism).SETTINGS
         return own
-    models = getattr(_mechanism(case), "MODELS", None)
+    models = getattr(MECHANISMS.load(case.mechanism), "MODELS", None)
     if models is not None:
         model = Parameter(default=next(iter(models)), doc="source of the model", choices=tuple(models))
         return {"rtol": RTOL, "method": METHOD, "model": model, "max_steps": STEPS}

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from sksundae.cvode import CVODE
 
 from crossbody.cases import Mode, Outcome
-from crossbody.cases._arrays import Floats
-from crossbody.cases._control import NotFinite
+from crossbody.cases.arrays import Floats
+from crossbody.cases.control import NotFinite
 from crossbody.engines._log import Log
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Settled, first_modes
 from crossbody.engines.pinocchio._coordinates import Coordinates

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Law, Mode
-from crossbody.cases._arrays import Floats
-from crossbody.cases._closed_forms import damping_ratio
-from crossbody.cases._closed_forms import restitution as restitution_at
+from crossbody.cases.arrays import Floats
+from crossbody.cases.closed_forms import damping_ratio
+from crossbody.cases.closed_forms import restitution as restitution_at
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import WATCHED, Fired, Passed, Settled, active, switched
 from crossbody.engines.pinocchio._rows import ULP, PinRows

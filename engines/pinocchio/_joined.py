@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import nnls
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
 from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian, pose
 

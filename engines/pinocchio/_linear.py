@@ -20,10 +20,10 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case, CaseUnsupported
-from crossbody.cases._arrays import Floats
-from crossbody.engines._linear import Chart, Spot, Tangent, in_contact, same
+from crossbody.cases.arrays import Floats
+from crossbody.engines.linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
-from crossbody.reference.linear._differences import differences
+from crossbody.reference.linear.differences import differences
 
 STEP = 1e-3
 """Of the differences, as a part of the coordinates' sizes."""

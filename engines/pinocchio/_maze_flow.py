@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sksundae.cvode import CVODE
 
 from crossbody.cases import Mode, Outcome
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import NG, MazeMachine, Settled
 from crossbody.engines._maze.memory import Memory

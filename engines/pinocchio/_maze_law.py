@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.memory import Memory
 from crossbody.engines._maze.scene import BallMaze

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Law, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import active, elastic_part
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._acting import Acting
 from crossbody.engines._log import Chart, Observe
 from crossbody.engines.pinocchio._coordinates import Coordinates

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sksundae.cvode import CVODE
 
 from crossbody.cases import Mode, Outcome
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Chart, Log, Modes, Observe
 from crossbody.reference.sundials.quiet import quiet
 

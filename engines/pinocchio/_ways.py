@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import ACTIVE
 from crossbody.engines.pinocchio._contacts import ContactRows

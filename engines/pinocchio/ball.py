@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines import _ball_scale
 from crossbody.engines.pinocchio._rows import PinRows
 from crossbody.engines.pinocchio._scene import Scene

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case, Mode, Outcome, Parameter, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._cube import CORNERS, Cube, cube, quaternion, rotation_vector
 from crossbody.engines._log import Log, charted
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._delta import chart
 from crossbody.engines._delta.forces import forces
 from crossbody.engines._delta.scene import Delta, delta, in_absolute, steady
-from crossbody.engines._linear import Spot, Tangent
+from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.pinocchio._delta_model import Closed, by_hand, imported
 from crossbody.engines.pinocchio._linear import Stand
 from crossbody.engines.pinocchio._smooth import Smooth

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines._link_chain import LinkChain, link_chain
 from crossbody.engines._log import charted
 from crossbody.engines.pinocchio._smooth import Smooth

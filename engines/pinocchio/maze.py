@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case, Parameter, Trajectory, Value
-from crossbody.engines._linear import Spot, same
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.scene import ONLY_CONTINUOUS, ball_maze
+from crossbody.engines.linear import Spot, same
 from crossbody.engines.pinocchio._linear import Stand
 from crossbody.engines.pinocchio._maze_flow import MazeFlow
 from crossbody.engines.pinocchio._maze_law import MazeLaw, audit

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines import _red_body
 from crossbody.engines._red_body import ROWS, RedBody
 from crossbody.engines.pinocchio._rows import PinRows

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case, CaseUnsupported, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting

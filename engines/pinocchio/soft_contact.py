@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.engines import _soft_contact as soft
-from crossbody.engines._linear import Spot
 from crossbody.engines._log import charted
+from crossbody.engines.linear import Spot
 from crossbody.engines.pinocchio._linear import Stand, of_rows
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 from crossbody.engines.pinocchio._scene import Scene

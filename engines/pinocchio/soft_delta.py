@@ -13,8 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from crossbody.cases import Case, Mode
-from crossbody.cases._arrays import Floats
-from crossbody.engines._linear import Spot
+from crossbody.cases.arrays import Floats
 from crossbody.engines._log import charted
 from crossbody.engines._soft_delta import (
     CLOCK,
@@ -30,6 +29,7 @@ from crossbody.engines._soft_delta import (
     small_motions,
     soft_delta,
 )
+from crossbody.engines.linear import Spot
 from crossbody.engines.pinocchio._delta_model import Closed, by_hand
 from crossbody.engines.pinocchio._linear import Stand, of_rows
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import UnknownName, Value
-from crossbody.engines._equations import system_of
+from crossbody.engines.equations import system_of
 from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.rk4 import march

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import InvalidValue, SceneError, Value, _arguments
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases import InvalidValue, SceneError, Value, arguments
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.hw import models
 from crossbody.hw.fitting.deadline import Deadline, TimeOver
 from crossbody.hw.fitting.derivative import DELAY, Exact
@@ -67,7 +67,7 @@ def identify(
     """
     chosen = models.chosen(model)
     numbers = chosen.numbers(parameters)
-    hold, stride = _arguments.whole("hold", hold, 0), _arguments.whole("stride", stride)
+    hold, stride = arguments.whole("hold", hold, 0), arguments.whole("stride", stride)
     if not time_limit > 0.0:
         raise InvalidValue(f"time_limit is {time_limit!r} s; it must be above 0.")
     deadline = Deadline(time_limit)

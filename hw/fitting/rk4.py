@@ -13,8 +13,8 @@ from numba import types
 from numba.core import types as core_types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled
-from crossbody.reference._kinds import Array, Floats
+from crossbody.reference.cache import compiled
+from crossbody.reference.kinds import Array, Floats
 
 _C, _CM = types.complex128[::1], types.complex128[:, ::1]
 FUNCTIONS = tuple(core_types.FunctionType(kernels.COMPLEX[name]) for name in ("dynamics", "rows"))

@@ -16,10 +16,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from crossbody.cases import ColumnMapError, FormatUnavailable, LogFormatError, _registry
-from crossbody.cases._regular import open_regular
+from crossbody.cases import ColumnMapError, FormatUnavailable, LogFormatError
+from crossbody.cases.registry import Registry
+from crossbody.cases.regular import open_regular
+from crossbody.hw.budget import MEMORY, Budget, opening
 from crossbody.hw.formats._bounded import Bounded
-from crossbody.hw.formats._budget import MEMORY, Budget, opening
 from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group, Reader
 
 __all__ = [
@@ -40,14 +41,17 @@ __all__ = [
 HEAD = 4096
 
 
+_REGISTRY = Registry("log format", __name__)
+
+
 def names() -> tuple[str, ...]:
     """Names of all formats, readable here or not; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _REGISTRY.names()
 
 
 def summary(name: str) -> str:
     """What a format is, in one line; imports nothing."""
-    return _registry.summary(__name__, list(__path__), name)
+    return _REGISTRY.summary(name)
 
 
 def load(name: str) -> ModuleType:
@@ -58,7 +62,7 @@ def load(name: str) -> ModuleType:
         FormatUnavailable: if a package is not installed.
     """
     try:
-        return _registry.load_plugin("log format", __name__, list(__path__), name)
+        return _REGISTRY.load(name)
     except ModuleNotFoundError as error:
         raise unavailable(f"Log format {name!r}", error) from None
 

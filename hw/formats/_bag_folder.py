@@ -7,9 +7,9 @@ import sqlite3
 from pathlib import Path
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import Budget, current
-from crossbody.hw.formats._guard import fault, parsing
+from crossbody.hw.budget import Budget, current
 from crossbody.hw.formats.mcap import records
+from crossbody.hw.guard import fault, parsing
 
 LARGEST_YAML = 1 << 19  # bytes of metadata.yaml, which is read at some 400 kB/s: a topic takes 300
 DEEPEST_YAML = 32  # levels

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import MOST_COLUMNS, Budget
+from crossbody.hw.budget import MOST_COLUMNS, Budget
 from crossbody.hw.formats._contract import Block, Group, Reader
 
 WIDTH = 8  # bytes that every number takes once it is a float64, whatever the file stores

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._guard import words
+from crossbody.hw.guard import words
 
 if TYPE_CHECKING:
     from crossbody.hw.formats.csv import Options

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import current
+from crossbody.hw.budget import current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._grouping import Table, grouped, layout, places, spans
-from crossbody.hw.formats._guard import library, parsing
+from crossbody.hw.guard import library, parsing
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MOST_LINKS = 20_000  # of a file, whatever they lead to: each takes some 70 us

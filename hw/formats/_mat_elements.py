@@ -8,7 +8,7 @@ import zlib
 from pathlib import Path
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import MOST_COLUMNS, Budget
+from crossbody.hw.budget import MOST_COLUMNS, Budget
 
 HEADER, TAG = 128, 8  # bytes of the file's own header, and of what stands before every element
 MATRIX, COMPRESSED = 14, 15  # types of elements

@@ -12,8 +12,8 @@ import numpy as np
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats._contract import Block, Column, Group
-from crossbody.hw.formats._guard import fault
 from crossbody.hw.formats._names import WIDEST
+from crossbody.hw.guard import fault
 
 BLOCK_MESSAGES = 8192
 DEEPEST = 12  # levels of nesting

@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import Budget
+from crossbody.hw.budget import Budget
 
 ROUNDS = 8  # times the file's size that its structure may cost to read: parsers do look at a block more than once
 FREE = 1 << 22  # bytes that are never counted against it

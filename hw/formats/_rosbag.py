@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from crossbody.hw.formats._budget import current
+from crossbody.hw.budget import current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._definitions import fault_of
-from crossbody.hw.formats._guard import library, parsing, words
 from crossbody.hw.formats._messages import Leaf, crowded, refuse_large, rows_of, too_large, topic_group
 from crossbody.hw.formats._unfold import Chunks
+from crossbody.hw.guard import library, parsing, words
 
 CLOCKS = ("log_time",)
 

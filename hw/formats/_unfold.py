@@ -8,7 +8,7 @@ from io import BytesIO
 from pathlib import Path
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import Budget
+from crossbody.hw.budget import Budget
 
 KEPT = 4  # of the memory, one part in so many holds unfolded chunks
 WINDOW = 1 << 27  # bytes that a zstd frame may look back

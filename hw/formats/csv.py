@@ -12,11 +12,11 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import MOST_COLUMNS, current
+from crossbody.hw.budget import MOST_COLUMNS, current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._csv_fault import find_fault
-from crossbody.hw.formats._guard import library, parsing, plain_allocator
 from crossbody.hw.formats._names import header_unit
+from crossbody.hw.guard import library, parsing, plain_allocator
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
 DELIMITERS = ",;\t|"

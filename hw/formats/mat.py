@@ -10,11 +10,11 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import current
+from crossbody.hw.budget import current
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._grouping import HINT, Table, cut, grouped, layout, places
-from crossbody.hw.formats._guard import library, parsing
 from crossbody.hw.formats._mat_elements import described, starts, whole_variable
+from crossbody.hw.guard import library, parsing
 
 SUFFIXES = (".mat",)
 NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}

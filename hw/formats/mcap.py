@@ -13,12 +13,12 @@ from typing import Any
 import msgspec
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import Budget, current
+from crossbody.hw.budget import Budget, current
 from crossbody.hw.formats._contract import Block, Group
-from crossbody.hw.formats._guard import library, parsing
 from crossbody.hw.formats._messages import Leaf, crowded, refuse_large, rows_of, too_large, topic_group
 from crossbody.hw.formats._metered import MeteredFile
 from crossbody.hw.formats._unfold import Chunks
+from crossbody.hw.guard import library, parsing
 
 SUFFIXES = (".mcap",)
 MAGIC = b"\x89MCAP0\r\n"

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import current
+from crossbody.hw.budget import current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._grouping import spans
-from crossbody.hw.formats._guard import library, parsing
 from crossbody.hw.formats._metered import MeteredFile
+from crossbody.hw.guard import library, parsing
 
 SUFFIXES = (".mf4", ".mdf", ".dat")
 WHAT = "MDF file"

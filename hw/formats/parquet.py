@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group
-from crossbody.hw.formats._guard import library, parsing, plain_allocator
 from crossbody.hw.formats._names import header_unit
+from crossbody.hw.guard import library, parsing, plain_allocator
 
 SUFFIXES = (".parquet", ".pq")
 BUFFER = 1 << 20  # bytes of a column chunk that are in memory at once

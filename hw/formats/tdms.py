@@ -10,11 +10,11 @@ import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
-from crossbody.hw.formats._budget import current
+from crossbody.hw.budget import current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._grouping import spans
-from crossbody.hw.formats._guard import library, parsing
 from crossbody.hw.formats._metered import MeteredFile
+from crossbody.hw.guard import library, parsing
 
 SUFFIXES = (".tdms",)
 WHAT = "TDMS file"

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from crossbody.cases import _arguments, _registry
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases import arguments
+from crossbody.cases.entry_points import checked_arguments
+from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
     from crossbody.hw.models._contract import Model
@@ -16,15 +17,18 @@ if TYPE_CHECKING:
 __all__ = ["chosen", "load", "names", "summary"]
 
 
+_REGISTRY = Registry("model", __name__)
+
+
 def names() -> tuple[str, ...]:
     """Names of all models; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _REGISTRY.names()
 
 
 @checked_arguments
 def summary(name: str) -> str:
     """What a model is, in one line; imports nothing."""
-    return _registry.summary(__name__, list(__path__), name)
+    return _REGISTRY.summary(name)
 
 
 def load(name: str) -> Model:
@@ -33,7 +37,7 @@ def load(name: str) -> Model:
     Raises:
         UnknownName: if there is no such model; the message lists the names.
     """
-    model: Model = _registry.load_plugin("model", __name__, list(__path__), name).MODEL
+    model: Model = _REGISTRY.load(name).MODEL
     return model
 
 
@@ -46,4 +50,4 @@ def chosen(model: str | Model) -> Model:
     """
     from crossbody.hw.models._contract import Model
 
-    return load(model) if isinstance(model, str) else _arguments.instance("model", model, Model, "a model or its name")
+    return load(model) if isinstance(model, str) else arguments.instance("model", model, Model, "a model or its name")

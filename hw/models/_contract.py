@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from crossbody.cases import Case, Coordinate, Limit, Parameter, SceneError, Trajectory, UnknownName, Value, _arguments
+from crossbody.cases import Case, Coordinate, Limit, Parameter, SceneError, Trajectory, UnknownName, Value, arguments
 
 if TYPE_CHECKING:
     from crossbody.hw.reading.log import Log
@@ -137,7 +137,7 @@ class Model:
             InvalidValue: for one outside its bounds.
         """
         if given is not None:
-            _arguments.instance(f"{self.name}: parameters", given, Mapping, "a table of names and values")
+            arguments.instance(f"{self.name}: parameters", given, Mapping, "a table of names and values")
         found = {name: p.default for name, p in self.parameters.items()}
         for name, value in (given or {}).items():
             if name not in self.parameters:
@@ -158,7 +158,7 @@ class Model:
         """
         from crossbody.hw.reading.log import Log
 
-        have = _arguments.instance("log", log, Log, "a log that was read").names("coordinates")
+        have = arguments.instance("log", log, Log, "a log that was read").names("coordinates")
         lacking = [name for name in self.channels if name not in have]
         if lacking:
             raise SceneError(

@@ -7,8 +7,8 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import Case, Coordinate, Inputs, Law, Trajectory
-from crossbody.cases._delta.scene import JOINTS, LOOPS, NAMES, ROBOT
-from crossbody.cases.delta_tracking import PARAMETERS
+from crossbody.cases.library.delta_tracking import PARAMETERS
+from crossbody.cases.mechanisms.delta.scene import JOINTS, LOOPS, NAMES, ROBOT
 from crossbody.hw.models._contract import Floats, Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.reference import simulate
@@ -16,7 +16,7 @@ from crossbody.reference.delta import control, forward, jacobians, paths, scene
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS
 from crossbody.reference.delta.model import law_of, system
 from crossbody.reference.delta.robot import Robot
-from crossbody.reference.systems import _delta_arm as arm
+from crossbody.reference.systems import delta_arm as arm
 
 CONTROLLER = ("controller", "mass_matrix", "kp", "kd", "ki", "clamp", "period", "delay", "bits", "limit")
 TITLE = "Delta robot: recorded torques, or the recorded reference through the rig's controller"

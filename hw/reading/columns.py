@@ -27,8 +27,8 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from crossbody.cases import ColumnMapError, FormatUnavailable, InvalidValue, _arguments
-from crossbody.cases._regular import open_regular
+from crossbody.cases import ColumnMapError, FormatUnavailable, InvalidValue, arguments
+from crossbody.cases.regular import open_regular
 from crossbody.hw.reading.units import to_si
 
 LARGEST = 1 << 20  # bytes of a map
@@ -136,7 +136,7 @@ def load_columns(source: str | Path) -> Columns:
         ColumnMapError: with the path of the key, for what is no TOML, an unknown key, a wrong type, a number that is
             not finite or a unit that does not exist.
     """
-    path = Path(_arguments.path("columns", source))
+    path = Path(arguments.path("columns", source))
     if str(source) in maps():
         path = MAPS / f"{source}.toml"
     try:
@@ -153,9 +153,9 @@ def load_columns(source: str | Path) -> Columns:
 
 def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns:
     """A column map from TOML text; see `load_columns`."""
-    path = _arguments.path("path", path)
+    path = arguments.path("path", path)
     if not isinstance(text, (bytes, str)):
-        raise InvalidValue(f"text is {_arguments.shown(text)}; it must be TOML, as text or bytes.")
+        raise InvalidValue(f"text is {arguments.shown(text)}; it must be TOML, as text or bytes.")
     raw = text.encode("utf-8", "replace") if isinstance(text, str) else text
     if any(line.count(b".") > MOST_DOTS for line in raw.split(b"\n")):
         raise ColumnMapError(path, "$", f"has a line of more than {MOST_DOTS} dots: no key is so deep.")
@@ -181,7 +181,7 @@ def _check_numbers(value: Any, key: str, path: str | Path) -> None:
 
 def dump_columns(columns: Columns) -> str:
     """The TOML text of a map; it reads back as the same map."""
-    _arguments.instance("columns", columns, Columns, "a column map")
+    arguments.instance("columns", columns, Columns, "a column map")
     try:
         return msgspec.toml.encode(columns).decode()
     except ImportError as error:  # msgspec's own words do not name our extra

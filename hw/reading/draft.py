@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
-from crossbody.cases import InvalidValue, _arguments
+from crossbody.cases import InvalidValue, arguments
 from crossbody.hw.reading.clock_guess import last_word, looks_like_time
 from crossbody.hw.reading.columns import Columns, Role, Signal, Time, dump_columns, safe_name
 from crossbody.hw.reading.survey import GroupSurvey, Survey, largest
@@ -28,7 +28,7 @@ ADMITTED = {Role.COORDINATES: ("rad", "m", "1"), Role.VELOCITIES: ("rad/s", "m/s
 
 def draft(found: Survey) -> Columns:
     """A map that reads what was surveyed; see `Survey.draft`."""
-    main = largest(_arguments.instance("found", found, Survey, "what `survey` found").groups)
+    main = largest(arguments.instance("found", found, Survey, "what `survey` found").groups)
     unit = main.clock.unit if main.clock else None
     tables: dict[str, dict[str, Signal]] = {role.value: {} for role in Role}
     for group in (main, *(g for g in found.groups if g is not main and g.clock and g.clock.unit == unit)):

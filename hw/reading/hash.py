@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from crossbody.cases import LogFormatError
-from crossbody.cases._regular import open_regular
+from crossbody.cases.regular import open_regular
 from crossbody.hw.reading.rows import Floats
 
 CHUNK = 1 << 20

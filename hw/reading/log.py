@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import SceneError, UnknownName
-from crossbody.cases._entry_points import checked_arguments, checked_fields
+from crossbody.cases.entry_points import checked_arguments, checked_fields
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading.columns import Role
 

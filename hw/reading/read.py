@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crossbody.cases import InvalidValue, LogFormatError, _arguments
+from crossbody.cases import InvalidValue, LogFormatError, arguments
 from crossbody.hw import formats
 from crossbody.hw.checks.every import Checks
 from crossbody.hw.checks.finding import Finding
@@ -80,9 +80,9 @@ def scan(
 def _opened(
     log: str | Path, columns: Columns | str | Path | None, part: int | None, memory: int
 ) -> Iterator[Scan]:  # fmt: skip
-    path = Path(_arguments.path("log", log))
+    path = Path(arguments.path("log", log))
     if part is not None:
-        _arguments.instance("part", part, int, "a whole number")
+        arguments.instance("part", part, int, "a whole number")
     chosen = _store.columns_of(path) if columns is None else columns
     chosen = chosen if isinstance(chosen, Columns) else load_columns(chosen)
     if (part is None) != (not chosen.part):
@@ -128,13 +128,13 @@ def read(
         UnknownName: for a repair that does not exist.
         InvalidValue: if the map tells runs apart and none was named, or the reverse; for repairs of a stored log.
     """
-    path = Path(_arguments.path("log", path))
+    path = Path(arguments.path("log", path))
     if limit is not None:
-        _arguments.real("limit", limit)
+        arguments.real("limit", limit)
     if columns is not None and not isinstance(columns, Columns):
-        _arguments.path("columns", columns)
+        arguments.path("columns", columns)
     if isinstance(repair, np.ndarray) or not isinstance(repair, Collection):
-        raise InvalidValue(f"repair is {_arguments.shown(repair)}; it must be a list of repairs.")
+        raise InvalidValue(f"repair is {arguments.shown(repair)}; it must be a list of repairs.")
     _repair.check_names(repair)
     stored = _store.about(Path(path)) if columns is None else None
     if stored is not None and repair:

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from crossbody.cases import LogFormatError, OutputError, _arguments
+from crossbody.cases import LogFormatError, OutputError, arguments
 from crossbody.hw.reading.columns import Columns, Role, Signal, Time
 from crossbody.hw.reading.hash import ContentHash
 from crossbody.hw.reading.log import Log, Provenance
@@ -60,8 +60,8 @@ def store(log: Log, path: str | Path) -> str:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    _arguments.instance("log", log, Log, "a log that was read")
-    path = _arguments.path("path", path)
+    arguments.instance("log", log, Log, "a log that was read")
+    path = arguments.path("path", path)
     names = [TIME, *(f"{c.role.value}.{c.name}" for c in log.channels)]
     units = ["s", *(c.unit for c in log.channels)]
     columns = [log.time, *(c.values for c in log.channels)]
@@ -126,7 +126,7 @@ def about(path: Path) -> _About:
 def _metadata(path: Path) -> _About | None:
     import pyarrow.parquet as pq
 
-    from crossbody.hw.formats._guard import parsing
+    from crossbody.hw.guard import parsing
 
     with parsing(path, "Parquet file"):
         raw = (pq.read_schema(path).metadata or {}).get(KEY)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError
+from crossbody.hw.budget import current
 from crossbody.hw.formats import Group, Reader
-from crossbody.hw.formats._budget import current
 from crossbody.hw.reading.clock_guess import unit_of_ticks
 from crossbody.hw.reading.plan import Plan, Source
 from crossbody.hw.reading.rows import Floats, Rows

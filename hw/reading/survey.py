@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import LogFormatError, _arguments
+from crossbody.cases import LogFormatError, arguments
 from crossbody.hw import formats
 from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.checks.finding import Finding
@@ -116,7 +116,7 @@ def survey(path: str | Path, columns: Columns | str | Path | None = None, *, mem
         FormatUnavailable: if the format's package is not installed.
         ColumnMapError: for a map that cannot be followed.
     """
-    path = Path(_arguments.path("log", path))
+    path = Path(arguments.path("log", path))
     chosen = columns if columns is None or isinstance(columns, Columns) else load_columns(columns)
     name = (chosen.format if chosen else None) or formats.recognise(path)
     reader = formats.open_log(path, name, formats.options(name, chosen.options) if chosen else None, memory)

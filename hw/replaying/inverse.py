@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crossbody.cases import SceneError, Value, _arguments
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.engines._equations import system_of
+from crossbody.cases import SceneError, Value, arguments
+from crossbody.cases.entry_points import checked_arguments
+from crossbody.engines.equations import system_of
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
@@ -152,8 +152,8 @@ def _balance(
     log: Log, model: Model, parameters: Mapping[str, Value] | None, delay: float, half: int, degree: int, stride: int
 ) -> _Balance:
     model.check_log(log)
-    half, degree = _arguments.whole("half", half), _arguments.whole("degree", degree, 2)
-    stride = _arguments.whole("stride", stride)
+    half, degree = arguments.whole("half", half), arguments.whole("degree", degree, 2)
+    stride = arguments.whole("stride", stride)
     y, _ = model.read(model, log)
     rows = _rows(log, half, stride)
     smooth = derivatives(log.time, y, half, degree, rows)

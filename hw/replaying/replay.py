@@ -19,7 +19,7 @@ from crossbody.cases import (
     UnknownName,
     Value,
 )
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log

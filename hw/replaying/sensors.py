@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._arrays import frozen
-from crossbody.cases._entry_points import checked_arguments, checked_fields
+from crossbody.cases.arrays import frozen
+from crossbody.cases.entry_points import checked_arguments, checked_fields
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.cases import Case, Trajectory
-from crossbody.engines._equations import system_of
+from crossbody.engines.equations import system_of
 from crossbody.reference import simulate
 
 

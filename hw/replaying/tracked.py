@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from crossbody.cases import Value
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.engines._equations import system_of
+from crossbody.cases.entry_points import checked_arguments
+from crossbody.engines.equations import system_of
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.inverse import Inferred, noise_of, pushed, shift_of

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crossbody.cases import InvalidValue, SceneError, _arguments
+from crossbody.cases import InvalidValue, SceneError, arguments
 from crossbody.hw.models._contract import Floats, Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.impacts import impacts, least_of
@@ -64,11 +64,11 @@ def windows(
         InvalidValue: for a restart or a horizon outside its range.
     """
     model.check_log(log)
-    length = model.restart if restart is None else _arguments.real("restart", restart)
-    delay = _arguments.real("delay", delay)
+    length = model.restart if restart is None else arguments.real("restart", restart)
+    delay = arguments.real("delay", delay)
     if not 0.0 <= length < math.inf:
         raise InvalidValue(f"restart is {length!r} s; it must be at least 0 (0: one free run).")
-    reach = length if horizon is None else _arguments.real("horizon", horizon)
+    reach = length if horizon is None else arguments.real("horizon", horizon)
     if not 0.0 <= reach < math.inf or (length == 0.0 and reach > 0.0) or (length > 0.0 and reach == 0.0):
         raise InvalidValue(f"horizon is {reach!r} s; it must be above 0, and restart too.")
     y, yd = model.read(model, log)

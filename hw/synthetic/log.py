@@ -16,7 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import lfilter
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._entry_points import checked_arguments, checked_fields
+from crossbody.cases.entry_points import checked_arguments, checked_fields
 from crossbody.hw.checks.every import Checks
 from crossbody.hw.formats import Group
 from crossbody.hw.reading.columns import Role, Signal

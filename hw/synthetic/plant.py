@@ -9,7 +9,7 @@ import numpy as np
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Inputs, InvalidValue, SceneError, Trajectory
-from crossbody.cases._entry_points import checked_arguments, checked_fields
+from crossbody.cases.entry_points import checked_arguments, checked_fields
 from crossbody.hw.reading.rows import Floats
 from crossbody.reference.delta import scene
 

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Bytes, Floats
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 from crossbody.reference.core.shares import solve_dependent
+from crossbody.reference.kinds import Array, Bytes, Floats
 
 # numba compiles a function anew for every literal that it is called with; numpy's integers are values, not literals.
 OWN, GENERAL, SMOOTH = np.arange(3)

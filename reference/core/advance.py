@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Index
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import (
     audit,
     choice,
@@ -48,6 +47,7 @@ from crossbody.reference.core.layout import (
 )
 from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
+from crossbody.reference.kinds import Index
 
 
 class Kernels(NamedTuple):

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
+from crossbody.reference.kinds import Bytes
 
 CLOSE = 1e-9  # part of the terms behind a row's multiplier: rounding stays far below, and asks no further
 WRONG = 1e-6  # part of all terms of a row's law: more is no rounding, however ill-conditioned the rows are

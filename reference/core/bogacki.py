@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Floats
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.dop853 import begin_watch, derivative, keep_velocity, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.kinds import Array, Floats
 
 STAGES = 4
 LAST = np.int64(STAGES - 1)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import inlined
+from crossbody.reference.cache import inlined
 from crossbody.reference.core import dop853
 from crossbody.reference.core.dop853_table import STABILITY_LIMIT
 from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, add_row, assemble, is_active, push_rows
 from crossbody.reference.core.algebra import solve_schur
 from crossbody.reference.core.journal import full, move, write_event

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import bogacki, dop853, esdirk, exact
 from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
 from crossbody.reference.core.algebra import solve_schur
 from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, Model, Work
+from crossbody.reference.kinds import Array
 
 CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one's residue vanish in rounding
 RESOLVED = 2.0  # |p| h of the rows' fastest pole p, above which a step tells a gap worse than its law does

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Floats
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import OWN, accelerate
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.dop853_table import DENSE_STAGES, E3, E5, STAGES, A, C, D
 from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.kinds import Array, Floats
 
 # The columns that are not zero, row by row: most of A is.
 _COUNT = np.array([np.count_nonzero(row) for row in A])

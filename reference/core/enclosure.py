@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.layout import FUNCTIONS_MOST, NODES
+from crossbody.reference.kinds import Array
 
 _PLACES = np.linspace(0.0, 1.0, NODES)
 _POWERS = np.linalg.inv(np.vander(_PLACES, increasing=True))  # values to coefficients of P

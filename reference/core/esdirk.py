@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, OWN, SMOOTH, accelerate, push_rows
 from crossbody.reference.core.algebra import ULP, factor_lu, solve_lu, solve_schur
 from crossbody.reference.core.dop853 import (

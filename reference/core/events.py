@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
@@ -47,6 +46,7 @@ from crossbody.reference.core.layout import (
 )
 from crossbody.reference.core.machine import active_mode, released_mode
 from crossbody.reference.core.search import first_below, opens
+from crossbody.reference.kinds import Bytes
 
 
 @inlined

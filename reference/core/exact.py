@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Bytes
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
 from crossbody.reference.core.algebra import inverse_diagonal, solve_schur
 from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.kinds import Array, Bytes
 
 NEGLIGIBLE = 1e-3  # part of the tolerance that the cubic term may cost
 

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import inlined
-from crossbody.reference._kinds import Bytes
+from crossbody.reference.cache import inlined
 from crossbody.reference.core import bogacki, dop853_table, esdirk
 from crossbody.reference.core.algebra import inverse_diagonal
 from crossbody.reference.core.layout import (
@@ -24,6 +23,7 @@ from crossbody.reference.core.layout import (
     SHORT,
     Work,
 )
+from crossbody.reference.kinds import Bytes
 
 # What values at the stages say about the whole step (linear programming over all polynomials of a degree).
 STAGES_RANGE = 1.7  # degree 6 within a range at the stages of DOP853: how many times the range it may leave it by

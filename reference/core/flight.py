@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import inlined
+from crossbody.reference.cache import inlined
 from crossbody.reference.core.guards import TOUCH, TOUCH_INSIDE
 from crossbody.reference.core.layout import NEVER, NODES, Work
 from crossbody.reference.core.machine import slow

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference._cache import compiled, inlined
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate
 from crossbody.reference.core.algebra import factor_lu
 from crossbody.reference.core.layout import ILL_POSED, Buffers, Model, Work

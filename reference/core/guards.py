@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Bytes
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, slow
+from crossbody.reference.kinds import Array, Bytes
 
 # Guards: each fires where all of its functions are below zero.
 NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH = np.arange(9)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, assemble, free, is_active
 from crossbody.reference.core.algebra import DEPENDENT, RANK
 from crossbody.reference.core.journal import move

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.layout import Buffers, Model, Work
+from crossbody.reference.kinds import Bytes
 
 
 @inlined

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._kinds import Bytes, Bytes2, Floats, Floats2, Index, Index2
 from crossbody.reference.core._struct import bundle_type, opener
 from crossbody.reference.core.dop853_table import DENSE_STAGES, DENSE_TERMS
+from crossbody.reference.kinds import Bytes, Bytes2, Floats, Floats2, Index, Index2
 
 # Return codes of `advance`; the Python side turns them into outcomes.
 DONE, MORE, ROWS_FULL, EVENTS_FULL = 0, 1, 2, 3

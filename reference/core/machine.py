@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes, Floats
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, clear, is_active, scatter
 from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
@@ -36,6 +35,7 @@ from crossbody.reference.core.layout import (
     Work,
 )
 from crossbody.reference.core.shares import CONSISTENT
+from crossbody.reference.kinds import Bytes, Floats
 
 SLOW = 1e-9  # part of the largest rate seen
 DEEP = 1e-9  # m: a FREE gap below -DEEP was started in penetration

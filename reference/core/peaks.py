@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Bytes
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active
 from crossbody.reference.core.dop853 import START
 from crossbody.reference.core.filters import stage_place
 from crossbody.reference.core.layout import EXACT, EXPLICIT, NEVER, NODES, Model, Work
+from crossbody.reference.kinds import Bytes
 
 STRIDE = 0.12  # part of the step from a place of a search to the next
 CLOSER = 5  # parabolas that close in on a peak

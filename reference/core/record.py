@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Bytes, Floats
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense, peaks
 from crossbody.reference.core.acceleration import OWN, accelerate, scatter
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.layout import EXACT, NEVER, Model, Work
+from crossbody.reference.kinds import Array, Bytes, Floats
 
 ARC_POINTS = 16  # an arc in closed form is one step, however long: these points show its shape
 LEAST_POINTS = 2  # of a flight that is short against the longest: bounces that accumulate are many

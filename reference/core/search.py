@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Bytes
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import ULP, all_finite
 from crossbody.reference.core.enclosure import (
     ABOVE,
@@ -49,6 +48,7 @@ from crossbody.reference.core.guards import (
     root,
 )
 from crossbody.reference.core.layout import MEMORYLESS, NEVER, NODES, WINDOW_LEVELS, Model, Work
+from crossbody.reference.kinds import Array, Bytes
 
 FIRST = 0.125  # part of g that is left in the first halves; then what was left before, but at least
 LEFT = 0.5**NODES  # what is left of it where the function is smooth

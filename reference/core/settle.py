@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.collisions import collide

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array
+from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import ULP, solve_schur
 from crossbody.reference.core.layout import Work
+from crossbody.reference.kinds import Array
 
 CONSISTENT = 1e-9  # part of its terms by which a row that depends on others may be off its law, and at least rtol
 STATE = 64.0 * ULP  # part of the coordinates that rounding moves a gap by

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference._cache import inlined
+from crossbody.reference.cache import inlined
 from crossbody.reference.core import audit, bogacki, choice, dense, dop853, esdirk, exact, folds
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy

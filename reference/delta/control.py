@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.reference._kinds import Floats
 from crossbody.reference.delta.kinematics import MOTORS, inverse, jacobians
 from crossbody.reference.delta.robot import Robot, Servo
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems import _delta_control as compiled
 
 Path = Callable[[Floats], tuple[Floats, Floats, Floats]]

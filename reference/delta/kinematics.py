@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, SceneError
-from crossbody.cases._arguments import shown
-from crossbody.cases._arrays import frozen, numbers
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Floats
+from crossbody.cases.arguments import shown
+from crossbody.cases.arrays import frozen, numbers
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference.delta.robot import Robot
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems import _delta_kinematics as compiled
 
 MOTORS = np.array([0, 3, 6])

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, Law, SceneError
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Floats
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
 from crossbody.reference.delta.kinematics import vector
 from crossbody.reference.delta.robot import Robot, Servo
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems import delta as kernels
 
 if TYPE_CHECKING:

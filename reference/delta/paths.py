@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
 from crossbody.cases import InvalidValue
-from crossbody.reference._kinds import Floats
 from crossbody.reference.delta.control import Path
 from crossbody.reference.delta.kinematics import vector
+from crossbody.reference.kinds import Floats
 
 
 def _positive(name: str, value: float, unit: str) -> float:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crossbody.cases._arrays import frozen
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Floats
+from crossbody.cases.arrays import frozen
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference.delta.kinematics import rotations
 from crossbody.reference.delta.robot import Robot
+from crossbody.reference.kinds import Floats
 
 
 @checked_arguments

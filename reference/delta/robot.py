@@ -8,10 +8,10 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._entry_points import checked_arguments, checked_fields
-from crossbody.reference._kinds import Floats
-from crossbody.reference.systems import _delta_arm as arm
+from crossbody.cases.entry_points import checked_arguments, checked_fields
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems import delta as kernels
+from crossbody.reference.systems import delta_arm as arm
 
 
 @checked_fields

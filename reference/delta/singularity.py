@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Floats
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference.delta.kinematics import rotations, vector
 from crossbody.reference.delta.robot import Robot
+from crossbody.reference.kinds import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, SceneError
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Floats
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS, vector, virtual_jacobian
 from crossbody.reference.delta.robot import Robot
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems import _delta_kinematics as compiled
 
 

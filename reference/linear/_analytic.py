@@ -11,8 +11,8 @@ from numba.core.errors import NumbaError
 from crossbody.cases import SceneError
 from crossbody.reference import kernels
 from crossbody.reference._guarded import entry
-from crossbody.reference._kinds import Array, Floats
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Array, Floats
 
 STEP = 1e-30
 WIDTHS = (1e-4, 1e-5, 1e-6)  # of real differences, in units of the coordinates

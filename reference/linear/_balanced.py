@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._arrays import frozen, full
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Floats
+from crossbody.cases.arrays import frozen, full
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._derivatives import STEP, Point, dense, residual, terms
 from crossbody.reference.linear._unmeasured import LARGEST, Estimate, Record, Unknown, input_columns
 

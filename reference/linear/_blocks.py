@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.reference._cache import compiled, inlined
-from crossbody.reference._kinds import Array, Floats
+from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.kinds import Array, Floats
 
 RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
 

@@ -14,8 +14,8 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled
-from crossbody.reference._kinds import Array, Bytes, Floats, Index
+from crossbody.reference.cache import compiled
+from crossbody.reference.kinds import Array, Bytes, Floats, Index
 from crossbody.reference.linear._blocks import invert_mass, mobility, resolve
 
 STEP = 1e-30

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import SceneError
-from crossbody.cases._control import Control
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.cases.control import Control
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Array, Floats, Index
 
 STEP = 1e-30
 ILL_POSED = 1e10

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from crossbody.cases._arrays import frozen
+from crossbody.cases.arrays import frozen
 from crossbody.reference._activations import Activations
-from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._derivatives import Derivatives
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.reference._cache import compiled
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference.cache import compiled
+from crossbody.reference.kinds import Array, Floats, Index
 
 LOST = 1e-10  # a pivot below this part of the largest is a lost rank
 

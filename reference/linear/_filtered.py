@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._arrays import frozen, full
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases.arrays import frozen, full
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._indices import different
-from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._kalman import Filter
 from crossbody.reference.linear._linearise import point
 from crossbody.reference.linear._unmeasured import LARGEST, Estimate, Record, Unknown

@@ -16,8 +16,8 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled
-from crossbody.reference._kinds import Array, Bytes, Floats, Index
+from crossbody.reference.cache import compiled
+from crossbody.reference.kinds import Array, Bytes, Floats, Index
 from crossbody.reference.linear._compiled import FOUND, ILL_POSED, MISSED, STEP, agrees, spread, steps
 from crossbody.reference.linear._elimination import admitted, eliminate, first_order
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import null_space
 
-from crossbody.reference._kinds import Floats, Index
+from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.linear._derivatives import STEP, Point, dense, residual, terms
 from crossbody.reference.linear._unmeasured import Estimate, Record, input_columns
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError, UnknownName
-from crossbody.cases._arrays import frozen
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases.arrays import frozen
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._indices import different
-from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.linear._analytic import check_analytic
 from crossbody.reference.linear._derivatives import Derivatives, Point, check_held, derivatives, turning
 from crossbody.reference.linear._driven import driven

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._arrays import frozen
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.cases.arrays import frozen
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear import _compiled
 from crossbody.reference.linear._derivatives import Point, check_coordinates
 from crossbody.reference.linear._linearise import point

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import EngineUnavailable, InvalidValue, SceneError, UnknownName
-from crossbody.cases._arrays import frozen, numbers
-from crossbody.cases._entry_points import checked_arguments, checked_fields
-from crossbody.reference._kinds import Floats, Index
+from crossbody.cases.arrays import frozen, numbers
+from crossbody.cases.entry_points import checked_arguments, checked_fields
+from crossbody.reference.kinds import Floats, Index
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._arguments import instance
-from crossbody.cases._arrays import frozen, is_number
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Array, Floats
+from crossbody.cases.arguments import instance
+from crossbody.cases.arrays import frozen, is_number
+from crossbody.cases.entry_points import checked_arguments
+from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._model import Complex, LinearModel
 
 RANK = 1e-9

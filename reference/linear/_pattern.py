@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crossbody.cases._arrays import Bytes
-from crossbody.reference._kinds import Floats, Index
+from crossbody.cases.arrays import Bytes
+from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.linear._derivatives import STEP, Point, residual
 
 SEED = 20

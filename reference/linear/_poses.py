@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import SceneError
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear import _held
 from crossbody.reference.linear._compiled import FOUND, ILL_POSED, MISSED
 from crossbody.reference.linear._derivatives import Point

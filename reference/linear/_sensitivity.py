@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
-from crossbody.cases._entry_points import checked_arguments
-from crossbody.reference._kinds import Array, Floats
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
+from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._derivatives import Point, turning
 from crossbody.reference.linear._linearise import point
 from crossbody.reference.linear._variation import (

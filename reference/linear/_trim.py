@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import Outcome
-from crossbody.cases._entry_points import checked_arguments
+from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._indices import different
-from crossbody.reference._kinds import Array, Floats, Index
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear._derivatives import STEP, Point, directions, terms
 from crossbody.reference.linear._linearise import point
 

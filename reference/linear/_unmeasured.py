@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from crossbody.cases._arrays import frozen
-from crossbody.cases._entry_points import wholes
+from crossbody.cases.arrays import frozen
+from crossbody.cases.entry_points import wholes
 from crossbody.reference._indices import different
-from crossbody.reference._kinds import Floats, Index
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.linear._derivatives import STEP, Point, check_coordinates, terms
 
 LARGEST = 1e100  # of a deviation: its square is still a number

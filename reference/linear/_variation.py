@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crossbody.cases import UnknownName
-from crossbody.cases._closed_forms import damping_ratio, restitution
-from crossbody.reference._kinds import Array, Floats
+from crossbody.cases.closed_forms import damping_ratio, restitution
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._derivatives import STEP, Point, dense, directions, gaps, residual, saddle, terms
 
 HANDOVER = 0.01

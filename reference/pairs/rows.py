@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array
+from crossbody.reference.kinds import Array
 from crossbody.reference.pairs import layout, planes, solids
 from crossbody.reference.pairs.jets import apart, dot, moved, shifted, value
 from crossbody.reference.tree import layout as tree

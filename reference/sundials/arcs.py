@@ -22,8 +22,8 @@ from sksundae.cvode import CVODE
 from sksundae.ida import IDA
 
 from crossbody.cases import Outcome
-from crossbody.reference._kinds import Floats
-from crossbody.reference._options import Options
+from crossbody.reference.kinds import Floats
+from crossbody.reference.options import Options
 from crossbody.reference.sundials import roots
 from crossbody.reference.sundials.compiled import evaluation
 from crossbody.reference.sundials.discrete import Discrete

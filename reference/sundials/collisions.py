@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases._closed_forms import damping_ratio, restitution, threshold_speed
-from crossbody.reference._kinds import Floats
+from crossbody.cases.closed_forms import damping_ratio, restitution, threshold_speed
+from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.equations import Equations
 
 NONE = 1e-12  # part of the largest impulse below which there is none

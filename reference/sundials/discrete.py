@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.cases import Mode, Outcome, Switch
-from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
 from crossbody.reference.kernels import CHANGED, GIVEN, LOST, START, TOUCHED
+from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.compiled.evaluation import Kind
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import Guard, Term

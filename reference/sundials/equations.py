@@ -17,8 +17,8 @@ import numpy as np
 from scipy.linalg.lapack import dgesv
 
 from crossbody.cases import Mode, Outcome
-from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
 
 ACTIVE = frozenset({Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL})
 ROUNDING = 1e-13  # part of a sum's terms that rounding may make of the sum

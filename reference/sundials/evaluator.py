@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import Outcome
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.compiled import evaluation
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import Guard

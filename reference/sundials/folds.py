@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from crossbody.cases import Outcome
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.equations import DEPENDENT, Ended, Equations
 
 FLAT = 1e-3  # part of its value at the start below which a singular value has vanished

@@ -14,8 +14,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from crossbody.cases import Mode, Outcome
-from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.collisions import RULES, Jump, Touching
 from crossbody.reference.sundials.equations import ACTIVE, Ended, Equations
 from crossbody.reference.sundials.level_machine import DEEP, SLOW, LevelMachine, View, Watch

@@ -18,8 +18,8 @@ from enum import IntEnum
 import numpy as np
 
 from crossbody.cases import Event, Mode, Outcome
-from crossbody.reference._kinds import Floats
 from crossbody.reference._system import System, initial_modes
+from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.compiled.evaluation import LIFTED, Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 from crossbody.reference.sundials.sharing import CONSISTENT, Sharing, rank, share

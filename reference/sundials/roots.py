@@ -19,7 +19,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 
 COARSE, FINE = 8, 16  # degrees tried
 HALVINGS = 6

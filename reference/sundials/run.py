@@ -16,13 +16,13 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
-from crossbody.cases._control import Control, NotFinite
+from crossbody.cases.control import Control, NotFinite
 from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
-from crossbody.reference._kinds import Floats
-from crossbody.reference._options import Options
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
+from crossbody.reference.options import Options
 from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
 from crossbody.reference.sundials.compiled.evaluation import entry, linear_arc
 from crossbody.reference.sundials.discrete import GIVEN, START, TOUCHED, Discrete

@@ -17,7 +17,7 @@ from scipy.linalg import qr
 from scipy.optimize import nnls
 
 from crossbody.cases import Outcome
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 
 Flags = NDArray[np.bool_]

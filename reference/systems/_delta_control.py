@@ -13,9 +13,8 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled
-from crossbody.reference._kinds import Floats
-from crossbody.reference.systems._delta_arm import inertia
+from crossbody.reference.cache import compiled
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems._delta_kinematics import (
     SINGULAR,
     control_jacobian,
@@ -28,6 +27,7 @@ from crossbody.reference.systems._delta_kinematics import (
 )
 from crossbody.reference.systems._delta_linear import dot
 from crossbody.reference.systems._delta_servo import END as FIRST
+from crossbody.reference.systems.delta_arm import inertia
 
 HEADER = ("period", "quantum", "delay", "limit", "ticks", "knots", "clamp", "exact", "feedforward", "friction")
 _PERIOD, _QUANTUM, _DELAY, _LIMIT, _TICKS, _KNOTS, _CLAMP, _EXACT, _FORWARD, _FRICTION = range(

@@ -14,8 +14,9 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Floats, Index
-from crossbody.reference.systems._delta_arm import (
+from crossbody.reference.kinds import Floats, Index
+from crossbody.reference.systems._delta_linear import diagonal, factor6, ill_posed, outer, plus, scaled, solve6
+from crossbody.reference.systems.delta_arm import (
     curvature,
     geometry,
     inertia,
@@ -26,7 +27,6 @@ from crossbody.reference.systems._delta_arm import (
     tip,
     turn,
 )
-from crossbody.reference.systems._delta_linear import diagonal, factor6, ill_posed, outer, plus, scaled, solve6
 
 
 @kernels.helper

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._maze.closed_forms import INERTIA
+from crossbody.cases.mechanisms.maze.closed_forms import INERTIA
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Floats
+from crossbody.reference.kinds import Floats
 from crossbody.reference.systems._maze_layout import (
     A_MAX,
     BALANCE,

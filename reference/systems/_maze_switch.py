@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Bytes, Floats
 from crossbody.reference.kernels import CHANGED, LOST, START, TOUCHED, UNCHANGED
+from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.systems._maze_layout import (
     ABOVE,
     ANGLE,

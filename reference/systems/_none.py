@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array, Bytes, Floats, Index
+from crossbody.reference.kinds import Array, Bytes, Floats, Index
 
 
 @kernels.gaps

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array
+from crossbody.reference.kinds import Array
 
 NAMES = (
     "kp", "cp", "width", "jaw", "squeeze", "close_start", "close_end", "release", "release_time", "pad_mass",

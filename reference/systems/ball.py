@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from crossbody.reference import System, kernels
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference.kinds import Array, Floats, Index
 
 if TYPE_CHECKING:
     from crossbody.cases import Law

@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array, Floats, Index
-from crossbody.reference.systems import _delta_arm as _arm
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.systems import _delta_servo as _servo
-from crossbody.reference.systems._delta_arm import (
+from crossbody.reference.systems import delta_arm as _arm
+from crossbody.reference.systems._delta_servo import ramp, servo
+from crossbody.reference.systems._delta_solve import accelerate
+from crossbody.reference.systems.delta_arm import (
     centrifugal,
     curvature,
     dpsi,
@@ -34,8 +36,6 @@ from crossbody.reference.systems._delta_arm import (
     velocity,
     weights,
 )
-from crossbody.reference.systems._delta_servo import ramp, servo
-from crossbody.reference.systems._delta_solve import accelerate
 
 if TYPE_CHECKING:
     from crossbody.cases import Law

@@ -21,7 +21,7 @@ import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.reference import System, kernels
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference.kinds import Array, Floats, Index
 
 if TYPE_CHECKING:
     from crossbody.cases import Law

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crossbody.cases._maze import closed_forms as cf
-from crossbody.cases._maze import geometry
+from crossbody.cases.mechanisms.maze import closed_forms as cf
+from crossbody.cases.mechanisms.maze import geometry
 from crossbody.reference import System, kernels
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.systems import _maze_control as control
 from crossbody.reference.systems import _maze_layout as layout
 from crossbody.reference.systems._maze_control import torque

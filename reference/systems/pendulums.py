@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crossbody.cases import SceneError
-from crossbody.cases._cradle.scene import masses
+from crossbody.cases.mechanisms.cradle.scene import masses
 from crossbody.reference import System, kernels
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.systems.sliders import neighbours
 
 if TYPE_CHECKING:

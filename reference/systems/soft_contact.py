@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crossbody.reference import System, kernels
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.systems import _soft_fingers as _fingers
 from crossbody.reference.systems._soft_fingers import BLOCK_MASS, BT, KS, PAD_MASS, K, half_width, pads, pid, readings
 

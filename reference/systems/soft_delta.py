@@ -21,11 +21,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array, Floats, Index
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.systems import _delta_servo as _servo
 from crossbody.reference.systems import _soft_fingers as _fingers
 from crossbody.reference.systems import delta as _delta
-from crossbody.reference.systems._delta_arm import geometry, rotate, trig, turn, velocity
 from crossbody.reference.systems._delta_control import reflected
 from crossbody.reference.systems._delta_kinematics import control_jacobian, flange, frame, holding, spread
 from crossbody.reference.systems._delta_linear import dot
@@ -40,6 +39,7 @@ from crossbody.reference.systems._soft_fingers import (
     pid,
     smooth,
 )
+from crossbody.reference.systems.delta_arm import geometry, rotate, trig, turn, velocity
 
 if TYPE_CHECKING:
     from crossbody.cases import Law

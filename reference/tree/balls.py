@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array
+from crossbody.reference.kinds import Array
 from crossbody.reference.tree import layout
 
 AT_Q, AT_V, BOUND, WHICH = 1, 2, 3, 4  # in a row: where q and v begin, the largest angle, and which side is its own

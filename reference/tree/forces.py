@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import inlined
-from crossbody.reference._kinds import Array
+from crossbody.reference.cache import inlined
+from crossbody.reference.kinds import Array
 from crossbody.reference.tree import layout, strings
 
 

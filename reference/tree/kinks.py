@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Bytes, Floats
+from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import bend
 from crossbody.reference.tree import forces, layout

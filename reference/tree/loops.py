@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array
+from crossbody.reference.kinds import Array
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout
 from crossbody.reference.tree.points import apart, point, pull, twist

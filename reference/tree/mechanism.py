@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array, Index
+from crossbody.reference.kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.pairs.rows import gradient, touch

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array
+from crossbody.reference.kinds import Array
 from crossbody.reference.tree import layout
 from crossbody.reference.tree.sweeps import cross, turned
 

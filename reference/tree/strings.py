@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array
+from crossbody.reference.kinds import Array
 from crossbody.reference.pairs import solids
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import layout

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Array
+from crossbody.reference.kinds import Array
 from crossbody.reference.tree import layout
 
 

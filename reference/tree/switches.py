@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference._kinds import Bytes, Floats
 from crossbody.reference.kernels import CHANGED, GIVEN, START, TOUCHED, UNCHANGED
+from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import chosen, lowest, touch, turn, upside_down
 from crossbody.reference.tree import balls, kinks, layout, sweeps

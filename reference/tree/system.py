@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Law
-from crossbody.cases._control import Control
+from crossbody.cases.control import Control
 from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Scene
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
-from crossbody.reference._kinds import Floats
 from crossbody.reference._redundant import ranked
+from crossbody.reference.kinds import Floats
 from crossbody.reference.tree import switches
 from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import dof_parents, tabulate

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crossbody.cases import SceneError
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Push, Scene, Shape, Tendon, Vector
 from crossbody.cases.scene_contacts import contacts
-from crossbody.reference._kinds import Index
+from crossbody.reference.kinds import Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.tree import layout
 

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, Value
-from crossbody.cases._soft import closed_forms as closed
-from crossbody.cases._soft.scene import numbers
+from crossbody.cases.mechanisms.soft import closed_forms as closed
+from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.reference.linear import LinearModel, linearise
 
 CASE = "soft_contact"

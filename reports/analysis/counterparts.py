@@ -15,9 +15,9 @@ import pandas as pd
 
 from crossbody import engines
 from crossbody.cases import CaseUnsupported, CrossbodyError
-from crossbody.cases._arrays import Floats
-from crossbody.engines._linear import Tangent
-from crossbody.reference._kinds import Array
+from crossbody.cases.arrays import Floats
+from crossbody.engines.linear import Tangent
+from crossbody.reference.kinds import Array
 from crossbody.reports.analysis.places import Place
 from crossbody.reports.judging.verdict import Word
 

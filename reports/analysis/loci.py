@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from crossbody import cases
 from crossbody.cases import InvalidValue, Value
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reference.linear import LinearModel, locus
 from crossbody.reports.analysis.places import Place, places
 

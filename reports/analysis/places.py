@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from crossbody import cases
 from crossbody.cases import Case, Mode, UnknownName
-from crossbody.engines._equations import system_of
-from crossbody.engines._linear import Spot
+from crossbody.engines.equations import system_of
+from crossbody.engines.linear import Spot
 from crossbody.reference import System, delta
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.loop import closed_loop
@@ -177,8 +177,8 @@ def _solid(case: Case, ring: int) -> float:
 
 def _soft(case: Case, at: Mapping[str, float]) -> list[Place]:
     """Closed fingers in every mode set; positions, sensors and multipliers are found."""
-    from crossbody.cases._soft import closed_forms as closed
-    from crossbody.cases._soft.scene import numbers
+    from crossbody.cases.mechanisms.soft import closed_forms as closed
+    from crossbody.cases.mechanisms.soft.scene import numbers
 
     p, found = numbers(case.parameters), []
     for name, rows in (("grasp", [0, 1]), ("left finger", [0]), ("right finger", [1])):

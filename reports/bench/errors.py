@@ -10,7 +10,7 @@ import numpy as np
 
 from crossbody import engines
 from crossbody.cases import Case, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import Truth, law_of, truth_of
 from crossbody.reports.runs.jobs import Pick

@@ -17,7 +17,7 @@ import pandas as pd
 
 from crossbody import cases, engines
 from crossbody.cases import EngineUnavailable, Outcome
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reference import ensemble
 
 COLUMNS = ["what", "value", "unit", "limit", "held", "beside", "how"]

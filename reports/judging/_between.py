@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from crossbody.cases import Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 
 
 def between(run: Trajectory) -> Callable[[Floats], Trajectory]:

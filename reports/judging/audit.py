@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Case
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import normalised
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import normalised
 
 TOLERANCE = 1e-10
 LAM_TOLERANCE = 1e-8

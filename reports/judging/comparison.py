@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Trajectory, UnknownName
-from crossbody.cases._arguments import instance, shown
-from crossbody.cases._arrays import Floats
-from crossbody.cases._defaults import limits_of
+from crossbody.cases.arguments import instance, shown
+from crossbody.cases.arrays import Floats
+from crossbody.cases.defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
@@ -139,14 +139,13 @@ def check_names(case: Case) -> None:
         InvalidValue: for a limit that is negative or not a number.
     """
     from crossbody import engines
-    from crossbody.cases import _registry
 
     known = {*metrics.names(), "audit", "*", *LARGEST_PARTS}
     for kind, named in (("claims", case.claims), ("limits", case.limits)):
         for name in (each.metric for each in named):
             if name not in known:
                 raise UnknownName(f"metric (in {kind} of {case.label})", name, known)
-    installed = {*engines.names(), *_registry.own_names(list(engines.__path__))}
+    installed = set(engines.names())
     for limit in case.limits:
         if limit.engine not in ("*", *installed):
             raise UnknownName(f"engine (in limits of {case.label})", limit.engine, installed)

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import turned
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import turned
 from crossbody.reports.metrics._align import clock, matched
 from crossbody.reports.metrics.position import scale_of
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Outcome, Tier, Trajectory, _arguments
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import differences
-from crossbody.cases._trajectory import Ledger
+from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Outcome, Tier, Trajectory, arguments
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import differences
+from crossbody.cases.trajectory import Ledger
 from crossbody.reports.judging._between import between
 from crossbody.reports.judging.modes import violated
 
@@ -110,9 +110,9 @@ def truth_of(case: Case) -> Truth:
         CrossbodyError: if the reference cannot run the case.
     """
     from crossbody import engines
-    from crossbody.engines._equations import known
+    from crossbody.engines.equations import known
 
-    _arguments.instance("case", case, Case, "a case")
+    arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
         case, first = tightened(case)
@@ -285,7 +285,7 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) 
     if case.scene is None or not truth.outcome.ok or not 0.0 < fastest < math.inf:
         return 1.0
     from crossbody.engines import load
-    from crossbody.engines._equations import system_of
+    from crossbody.engines.equations import system_of
 
     rng, system, t = np.random.default_rng(0), system_of(case), np.linspace(0.0, case.t_end, INSTANTS)
     held, exact, most = system.constraint(case.q0, case.v0)[0][~case.law.unilateral], at(t).q, 1.0

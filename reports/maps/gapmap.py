@@ -16,7 +16,7 @@ import pandas as pd
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory
-from crossbody.cases._cradle.rules import RULES
+from crossbody.cases.mechanisms.cradle.rules import RULES
 from crossbody.reports.metrics._contacts import CLOSED
 from crossbody.reports.metrics._cradle import distance, row
 from crossbody.reports.metrics._switching import made

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, cast
 
-from crossbody.cases import _registry
+from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -32,14 +32,17 @@ class Metric(Protocol):
         ...
 
 
+_REGISTRY = Registry("metric", __name__)
+
+
 def names() -> tuple[str, ...]:
     """Names of all metrics; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _REGISTRY.names()
 
 
 def summary(name: str) -> str:
     """What a metric measures, in one line; imports nothing."""
-    return _registry.summary(__name__, list(__path__), name)
+    return _REGISTRY.summary(name)
 
 
 def load(name: str) -> Metric:
@@ -48,4 +51,4 @@ def load(name: str) -> Metric:
     Raises:
         UnknownName: if there is no such metric; the message lists the names.
     """
-    return cast("Metric", _registry.load_plugin("metric", __name__, list(__path__), name))
+    return cast("Metric", _REGISTRY.load(name))

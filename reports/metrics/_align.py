@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._trajectory import Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.cases.trajectory import Trajectory
 from crossbody.reports.metrics._contacts import Contact, contacts
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._trajectory import Event, Mode, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.cases.trajectory import Event, Mode, Trajectory
 
 CLOSED = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
 AT_REST = 1e-10

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
-from crossbody.cases._arrays import Floats
-from crossbody.cases._cradle import scene
-from crossbody.cases._cradle.rules import answer
+from crossbody.cases.arrays import Floats
+from crossbody.cases.mechanisms.cradle import scene
+from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.reports.metrics._contacts import CLOSED, contacts
 
 MECHANISMS = ("sliders", "pendulums")
@@ -67,7 +67,7 @@ def distance(rule: str, run: Trajectory, case: Case) -> float | None:
     """Max |v_i - v_i of the rule| / v_in; None where there is no such number.
 
     Args:
-        rule: one of `crossbody.cases._cradle.rules.RULES`.
+        rule: one of `crossbody.cases.mechanisms.cradle.rules.RULES`.
         run: the motion.
         case: of a cradle or not.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.metrics._align import aligned
 
 if TYPE_CHECKING:

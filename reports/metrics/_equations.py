@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import CaseUnsupported
-from crossbody.engines._equations import system_of
+from crossbody.engines.equations import system_of
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._trajectory import Event, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.cases.trajectory import Event, Trajectory
 
 SAME = 1e-7
 """Part of the horizon within which a sample and a collision are at one instant."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.judging._between import between
 
 if TYPE_CHECKING:

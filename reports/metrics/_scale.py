@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 
 if TYPE_CHECKING:
     from crossbody.cases import Coordinate, Trajectory

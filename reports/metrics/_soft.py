@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.metrics._contacts import contacts
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
-from crossbody.cases._arrays import Floats
-from crossbody.engines._equations import system_of
+from crossbody.cases.arrays import Floats
+from crossbody.engines.equations import system_of
 from crossbody.reports.metrics._contacts import CLOSED
 
 

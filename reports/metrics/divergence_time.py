@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases._rotations import differences
+from crossbody.cases.rotations import differences
 from crossbody.reports.metrics._align import aligned
 
 if TYPE_CHECKING:

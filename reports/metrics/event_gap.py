@@ -15,7 +15,7 @@ from crossbody.reports.metrics._equations import equations
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Event, Trajectory
-    from crossbody.cases._arrays import Floats
+    from crossbody.cases.arrays import Floats
     from crossbody.reports.judging.truth import Truth
 
 UNIT = "1"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.metrics._contacts import CLOSED
 from crossbody.reports.metrics._equations import equations, finite, spread
 from crossbody.reports.metrics._lam import told

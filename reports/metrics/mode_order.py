@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from crossbody.cases._red_body.order import stages_in_order
+from crossbody.cases.mechanisms.red_body.order import stages_in_order
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory

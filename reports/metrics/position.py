@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import differences
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import differences
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._scale import least, of_like
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._case import Coordinate
-from crossbody.cases._rotations import differences
+from crossbody.cases.arrays import Floats
+from crossbody.cases.case import Coordinate
+from crossbody.cases.rotations import differences
 from crossbody.reports.metrics._scale import least, of_like
 
 if TYPE_CHECKING:

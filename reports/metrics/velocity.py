@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._impulse import away
 from crossbody.reports.metrics._scale import least, of_like

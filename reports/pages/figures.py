@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.metrics._impulse import with_collisions
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.section import Figure

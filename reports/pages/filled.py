@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from crossbody.cases import Trajectory
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import rates
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import rates
 
 PIECES = 400
 """Into so many pieces a horizon is cut; shorter steps stay as they are."""

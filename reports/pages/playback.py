@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import CrossbodyError, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports import scenes
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.section import Section

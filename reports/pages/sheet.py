@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.pages.styles import TRUTH, label, style
 from crossbody.reports.pages.thin import AROUND, keep
 from crossbody.reports.runs.store import Trace

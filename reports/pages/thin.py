@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tsdownsample import MinMaxLTTBDownsampler
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 
 POINTS = 1500
 BEFORE, AROUND = 5, 12

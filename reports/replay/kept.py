@@ -7,16 +7,18 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import numpy as np
 
 from crossbody.cases import Outcome, OutputError
-from crossbody.hw.models._contract import Model
 from crossbody.hw.replaying.comparison import Prediction
 from crossbody.reports.runs import files
 from crossbody.reports.runs.parts import Parts
+
+if TYPE_CHECKING:
+    from crossbody.hw.models import Model
 
 ABOUT, ARRAYS = "prediction.json", "prediction.f8"
 

@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
 from crossbody.cases import OutputError
-from crossbody.cases._regular import open_regular
+from crossbody.cases.regular import open_regular
 
 NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.+ -]{0,200}")
 """One part of the name of a file of ours: it cannot climb out, and does not begin with a dot."""

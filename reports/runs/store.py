@@ -13,9 +13,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from crossbody.cases import Event, Ledger, LogFormatError, Mode, Outcome, OutputError, Trajectory
-from crossbody.cases._arrays import Floats
-from crossbody.hw.formats._budget import Budget, opening
-from crossbody.hw.formats._guard import plain_allocator
+from crossbody.cases.arrays import Floats
+from crossbody.hw.budget import Budget, opening
+from crossbody.hw.guard import plain_allocator
 from crossbody.reports.runs.files import decoded, open_inside
 
 _KEY = b"crossbody"

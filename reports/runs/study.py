@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from crossbody.cases import Case, OutputError, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import contacts
 from crossbody.cases.scene_plain import plain

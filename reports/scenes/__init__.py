@@ -17,8 +17,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
-from crossbody.cases import Value, _registry
-from crossbody.cases._arrays import Floats
+from crossbody.cases import Value
+from crossbody.cases.arrays import Floats
+from crossbody.cases.registry import Registry
 
 Parameters = Mapping[str, Value]
 Shape = Mapping[str, Any]
@@ -72,9 +73,12 @@ class Scene(Protocol):
         ...
 
 
+_REGISTRY = Registry("picture of a mechanism", __name__)
+
+
 def names() -> tuple[str, ...]:
     """Mechanisms that can be drawn; imports none."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _REGISTRY.names()
 
 
 def load(name: str) -> Scene:
@@ -83,7 +87,7 @@ def load(name: str) -> Scene:
     Raises:
         UnknownName: if there is none; the message lists the names.
     """
-    return cast("Scene", _registry.load_plugin("picture of a mechanism", __name__, list(__path__), name))
+    return cast("Scene", _REGISTRY.load(name))
 
 
 def circle(x: float, y: float, r: float, *, fill: bool = True) -> Shape:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import matrices
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import WIDTHS, Joint, Scene
 
 Pose = tuple[Floats, Floats]

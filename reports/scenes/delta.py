@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.scenes import Parameters, Shape, Stage, path
 
 # Points: hinge, elbow, wrist of each arm, one arm after another; then the flange.

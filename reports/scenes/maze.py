@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._maze.geometry import Maze, Ring, maze_of
+from crossbody.cases.arrays import Floats
+from crossbody.cases.mechanisms.maze.geometry import Maze, Ring, maze_of
 from crossbody.reports.scenes import Parameters, Shape, Stage, circle, path
 
 ARC = 0.06

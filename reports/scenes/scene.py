@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
-from crossbody.cases._rotations import matrices
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Scene
 from crossbody.cases.scene import Shape as SceneShape
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.cases.scene_plain import scene_from
-from crossbody.engines._nearest import Places, lying, meet
+from crossbody.engines.nearest import Places, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
 from crossbody.reports.scenes._kinematics import Pose, body_poses, placed
 

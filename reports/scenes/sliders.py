@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.scenes import Parameters, Stage, circle, path
 from crossbody.reports.scenes._rows import pushes
 

@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol, cast
 
-from crossbody.cases import _registry
+from crossbody.cases.registry import Registry
 from crossbody.reports.pages.section import Section
 
 
@@ -32,9 +32,12 @@ class Study(Protocol):
         ...
 
 
+_REGISTRY = Registry("study", __name__)
+
+
 def names() -> tuple[str, ...]:
     """Names of all studies; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _REGISTRY.names()
 
 
 def load(name: str) -> Study:
@@ -43,7 +46,7 @@ def load(name: str) -> Study:
     Raises:
         UnknownName: if there is no such study; the message lists the names.
     """
-    return cast("Study", _registry.load_plugin("study", __name__, list(__path__), name))
+    return cast("Study", _REGISTRY.load(name))
 
 
 def shown(name: str, out: Path) -> tuple[Section, ...]:

@@ -11,21 +11,25 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from crossbody.cases import InvalidValue, SceneError, UnknownName, _registry
+from crossbody.cases import InvalidValue, SceneError, UnknownName
+from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
     from crossbody.cases import Value
     from crossbody.reports.suites._contract import Suite
 
 
+_REGISTRY = Registry("suite", __name__)
+
+
 def names() -> tuple[str, ...]:
     """Names of all suites; imports none of them."""
-    return _registry.plugin_names(__name__, list(__path__))
+    return _REGISTRY.names()
 
 
 def summary(name: str) -> str:
     """What a suite stresses, in one line; imports nothing."""
-    return _registry.summary(__name__, list(__path__), name)
+    return _REGISTRY.summary(name)
 
 
 def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
@@ -51,7 +55,7 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
         return suite_of(name, fixed or {})
     if fixed:
         raise InvalidValue(f"The suite {name!r} has parameters of its own: {', '.join(fixed)} cannot be given.")
-    module = module or _registry.load_plugin("suite", __name__, list(__path__), name)
+    module = module or _REGISTRY.load(name)
     found = getattr(module, "SUITE", None)
     if not isinstance(found, Suite):
         raise SceneError(f"Suite file {module.__file__} does not define SUITE, a crossbody.reports.suites Suite.")

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from crossbody.cases import Event, Mode, Outcome, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 
 STEPS = 40.0  # places looked at in 1 / (fastest frequency)
 BLOCK = 256  # places at a time

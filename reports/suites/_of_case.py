@@ -10,7 +10,7 @@ import numpy as np
 
 from crossbody import cases
 from crossbody.cases import Case, Parameter, Value
-from crossbody.cases._load import module
+from crossbody.cases.loading import module
 from crossbody.reports.suites._axis import Axis, Levels, Linear, Log
 from crossbody.reports.suites._contract import Family, Suite
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crossbody.cases import Case, Coordinate, Law, Parameter, Value
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reference import System, kernels
 from crossbody.reports.suites._linear_arcs import LinearArcs
 

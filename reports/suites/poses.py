@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import CrossbodyError
-from crossbody.cases._delta.pose import pose
-from crossbody.cases._load import module
+from crossbody.cases.loading import module
+from crossbody.cases.mechanisms.delta.pose import pose
 from crossbody.reports.suites._axis import Linear, Log
 from crossbody.reports.suites._contract import Drawn, Family, Suite
 from crossbody.reports.suites._scenes import numbers

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from crossbody.cases import _closed_forms as cf
+from crossbody.cases import closed_forms as cf
 from crossbody.reports.suites._axis import Levels, Linear, Log
 from crossbody.reports.suites._contract import TIGHT, Drawn, Family, Suite
 from crossbody.reports.suites._scenes import damped, numbers

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from crossbody.cases import InvalidValue, UnknownName, Value
-from crossbody.cases._load import module
+from crossbody.cases.loading import module
 from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.suites._contract import Family, Suite
 from crossbody.reports.sweep.spec import Spec

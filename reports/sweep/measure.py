@@ -10,7 +10,7 @@ import numpy as np
 
 from crossbody import engines
 from crossbody.cases import Case, CrossbodyError, Event, Mode, Tier, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.metrics._align import matched

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from crossbody.cases import Outcome, Value
-from crossbody.cases._load import module
+from crossbody.cases.loading import module
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep import pools
 from crossbody.reports.sweep.execute import CRASHED, REFUSED, SKIPPED, execute

@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody import cases
 from crossbody.cases import Case, CrossbodyError, Outcome, Trajectory
-from crossbody.engines._equations import system_of
+from crossbody.engines.equations import system_of
 from crossbody.reference import System
 from crossbody.reports.sweep.execute import EXCEPTION, REFUSED, Tried, row
 from crossbody.reports.sweep.measure import Error, at_the_end

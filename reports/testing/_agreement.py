@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases import InvalidValue, Tier, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.metrics._align import aligned
 from crossbody.reports.metrics._contacts import contacts

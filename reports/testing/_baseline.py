@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import InvalidValue
-from crossbody.cases._regular import open_regular
+from crossbody.cases.regular import open_regular
 from crossbody.reports.runs.files import decoded
 from crossbody.reports.runs.output import replace_text
 

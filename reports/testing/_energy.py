@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases import InvalidValue, Trajectory
-from crossbody.cases._arrays import Floats
+from crossbody.cases.arrays import Floats
 from crossbody.reports.testing._agreement import _motion
 from crossbody.reports.testing._offence import Signal, fail_if_any
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from crossbody.cases import Case, CrossbodyError
-from crossbody.cases._defaults import limits_of
+from crossbody.cases.defaults import limits_of
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.testing import plugin

@@ -19,11 +19,11 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._cache import compiled, embedding, inlined
-from crossbody.reference._kinds import Array, Floats, Floats2, Index
 from crossbody.reference._program import Address, addresses, kept_with_kernels
 from crossbody.reference._system import System
+from crossbody.reference.cache import compiled, embedding, inlined
 from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
+from crossbody.reference.kinds import Array, Floats, Floats2, Index
 
 # What is asked of `evaluate`.
 DERIVATIVE, TERMS, FORCES, BEGIN, SCAN, GRID, WATCHED, RESIDUAL = range(8)

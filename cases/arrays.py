@@ -1,0 +1,53 @@
+"""Read-only, shape-checked float arrays for the frozen types."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from crossbody.cases.errors import SceneError
+
+Floats = NDArray[np.float64]
+Bytes = NDArray[np.int8]
+
+
+def frozen(owner: str, field: str, value: Any, shape: tuple[int | None, ...], dtype: DTypeLike = np.float64) -> Any:
+    """Copy `value` into a read-only array of the given shape (None admits any length).
+
+    Raises:
+        SceneError: naming the owner, the field, the shape found and the shape wanted.
+    """
+    array = numbers(owner, field, value, dtype)
+    if array.ndim != len(shape) or any(w is not None and g != w for g, w in zip(array.shape, shape, strict=True)):
+        wanted = str(tuple("any" if w is None else w for w in shape)).replace("'", "")
+        raise SceneError(f"{owner}.{field} has shape {array.shape}; it must have shape {wanted}.")
+    array.setflags(write=False)
+    return array
+
+
+def numbers(owner: str, field: str, value: Any, dtype: DTypeLike = np.float64) -> Any:
+    """Copy `value` into an array of whatever shape it has.
+
+    Raises:
+        SceneError: naming the owner and the field, if it holds anything but numbers.
+    """
+    try:
+        if np.iscomplexobj(value) or np.asarray(value).dtype.kind in "US":
+            raise TypeError("complex numbers and texts are not admitted")
+        with np.errstate(all="raise"):  # a number that is no integer is not cut to one in silence
+            return np.array(value, dtype=dtype, order="C")
+    except (TypeError, ValueError, OverflowError, FloatingPointError) as error:
+        raise SceneError(f"{owner}.{field} is not an array of {np.dtype(dtype).name}: {error}.") from None
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value stands alone, not in an array; what it is, is not looked at."""
+    return np.isscalar(value) or getattr(value, "shape", None) == ()
+
+
+def full(owner: str, field: str, value: Any, count: int, dtype: DTypeLike = np.float64) -> Any:
+    """As `frozen` for an array (count,), which a number alone fills."""
+    whole = [value] * count if is_number(value) else value
+    return frozen(owner, field, whole, (count,), dtype)

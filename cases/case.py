@@ -1,0 +1,360 @@
+"""A case: one scene with its numbers, what is true about it, and how far an engine may be from that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases.arguments import real, shown
+from crossbody.cases.arrays import Floats, frozen, numbers
+from crossbody.cases.entry_points import checked_arguments, checked_fields
+from crossbody.cases.errors import InvalidValue, SceneError, UnknownName
+from crossbody.cases.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from crossbody.cases.control import Control
+    from crossbody.cases.scene import Scene
+
+Value = float | int | str | bool
+
+
+class Tier(StrEnum):
+    """How a truth is known (spec 5.2)."""
+
+    A = "A closed form"
+    B = "B published digits"
+    C = "C two independent integrators that agree"
+    D = "D self-consistency"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """One number or word of a case that a user may change.
+
+    Attributes:
+        default: value when nothing is said.
+        unit: SI unit, empty for a word or a count.
+        doc: what it is.
+        low, high: bounds of a number.
+        open_low: whether `low` itself is excluded.
+        choices: the words admitted, for a word; any text if there are none.
+    """
+
+    default: Value
+    unit: str = ""
+    doc: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+    open_low: bool = False
+    choices: tuple[str, ...] = ()
+
+    def checked(self, where: str, value: Value) -> Value:
+        """Return `value` in the type of the default.
+
+        Raises:
+            InvalidValue: if it has another type, is not finite or lies outside the bounds.
+        """
+        if isinstance(self.default, str):
+            if not isinstance(value, str) or (self.choices and value not in self.choices):
+                raise InvalidValue(f"{where} is {shown(value)}; valid: {', '.join(self.choices)}.")
+            return value
+        try:
+            if not isinstance(value, (int, float, str, np.number, np.bool_)):
+                raise TypeError
+            number = float(value)
+        except (TypeError, ValueError, OverflowError):
+            raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].") from None
+        if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
+            bracket = "(" if self.open_low or math.isinf(self.low) else "["
+            close = ")" if math.isinf(self.high) else "]"
+            raise InvalidValue(
+                f"{where} is {number:g}; valid: {bracket}{self.low:g}, {self.high:g}{close} {self.unit}."
+            )
+        if isinstance(self.default, int) and not isinstance(self.default, bool):
+            if number != int(number):
+                raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")
+            return int(number)
+        return number
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coordinate:
+    """Name and unit of one generalised coordinate; its velocity has the unit per second.
+
+    Attributes:
+        name, unit: what it is called, and in which SI unit it counts.
+        size, rate: what it and its rate are at least when they do something, in that unit; a motion that stays below is
+            judged by these. 0 where the scene knows none.
+    """
+
+    name: str
+    unit: str
+    size: float = 0.0
+    rate: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law:
+    """Constants of h'' + a1 h' + a0 h + a2 h^3 = 0, one row a constraint (spec 1.1).
+
+    Attributes:
+        a0 (nc,): 1/s^2.
+        a1 (nc,): 1/s.
+        a2 (nc,): 1/(m^2 s^2).
+        b0, b1 (nc,): fast constants of COLLISION in the units of a0, a1; zero where a row has one set (spec 1.1).
+        unilateral (nc,): False for a constraint that is always on.
+    """
+
+    a0: Floats
+    a1: Floats
+    a2: Floats
+    unilateral: NDArray[np.bool_]
+    b0: Floats = field(default_factory=lambda: np.zeros(0))
+    b1: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        """Check shapes and signs."""
+        nc = np.size(numbers("Law", "a0", self.a0))
+        for name in ("a0", "a1", "a2", "b0", "b1"):
+            given = getattr(self, name)
+            array = frozen("Law", name, np.zeros(nc) if name[0] == "b" and np.size(given) == 0 else given, (nc,))
+            if not np.all(np.isfinite(array)) or np.any(array < 0):
+                raise SceneError(f"Law.{name} is {array.tolist()}; it must be finite and at least 0.")
+            object.__setattr__(self, name, array)
+        slower = (self.b0 > 0.0) & (self.b0 <= self.a0)
+        if np.any(slower):
+            i = int(np.flatnonzero(slower)[0])
+            raise SceneError(
+                f"Law.b0[{i}] is {self.b0[i]:g}, not above a0[{i}] = {self.a0[i]:g}: "
+                "the constants of COLLISION must be faster than those of CONTACT, or 0 for one set."
+            )
+        object.__setattr__(self, "unilateral", frozen("Law", "unilateral", self.unilateral, (nc,), np.bool_))
+
+    @property
+    def linear(self) -> bool:
+        """Whether every row is linear (a2 = 0)."""
+        return not self.a2.any()
+
+
+@checked_fields
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inputs:
+    """What acts on a mechanism from outside: each row of values holds from its time on, zero before the first.
+
+    Attributes:
+        names: names of the inputs, with their units, in the order of the mechanism's u.
+        times (m,): s, increasing.
+        values (m, nu): in the inputs' own units.
+    """
+
+    names: tuple[str, ...]
+    times: Floats
+    values: Floats
+
+    def __post_init__(self) -> None:
+        """Check shapes, and that times increase.
+
+        Raises:
+            SceneError: naming the field and what would be valid.
+        """
+        times = frozen("Inputs", "times", self.times, (None,))
+        values = frozen("Inputs", "values", self.values, (len(times), len(self.names)))
+        if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0) and np.all(times >= 0)):
+            raise SceneError(f"Inputs.times is {times.tolist()}; they must be finite, at least 0 and increasing.")
+        if not np.all(np.isfinite(values)):
+            raise SceneError("Inputs.values holds a value that is not finite.")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+    def at(self, t: float | Floats) -> Floats:
+        """Return the values (..., nu) that hold at instants t, s."""
+        last = np.asarray(np.searchsorted(self.times, t, side="right")) - 1
+        found: Floats = np.zeros((*last.shape, len(self.names)))
+        found[last >= 0] = self.values[last[last >= 0]]
+        return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """How large one metric may be for one engine and profile, and why.
+
+    Attributes:
+        metric: name of a metric in reports/metrics; "*" for a known property that shows in any of them, with no value
+            of its own.
+        value: the largest absolute value that is still within, in the metric's unit.
+        engine, profile: which runs it judges; "*" is any.
+        why: the reason for the number.
+        known: a known property of the engine that takes it outside; empty if it should be within.
+        known_size: how far that property may take it; beyond, it is outside like any other. Where it is infinite, the
+            size is that of a stored run; without one, what lies beyond the limit is not judged.
+        covers_none: whether the property explains too that a run has no such number where the truth has one.
+    """
+
+    metric: str
+    value: float = 0.0
+    engine: str = "*"
+    profile: str = "*"
+    why: str = ""
+    known: str = ""
+    known_size: float = math.inf
+    covers_none: bool = False
+
+    def covers(self, engine: str, profile: str) -> bool:
+        """Whether this limit judges that run."""
+        return self.engine in ("*", engine) and self.profile in ("*", profile)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """One number that must come out, for example 7 transitions.
+
+    Attributes:
+        metric: the metric that counts or measures it.
+        expected: the number, in the metric's unit.
+        tier: how it is known.
+        source: where it comes from.
+    """
+
+    metric: str
+    expected: float
+    tier: Tier
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chaos:
+    """That neighbouring motions of a case part, so that no integrator can be trusted to its horizon.
+
+    Attributes:
+        until: up to when two independent integrators must agree all the same, s.
+        why: what multiplies differences.
+    """
+
+    until: float
+    why: str
+
+
+@checked_fields
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A scene, complete: any engine can build its own model from it.
+
+    Attributes:
+        name, variant: which case; `title` says it in words.
+        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of one's own with them.
+        parameters: every parameter of the case, resolved, SI.
+        coordinates: names and units of q.
+        contacts: names of the constraint rows.
+        q0 (nq,), v0 (nv,): start.
+        velocities: names and units of v, as of positions; those of q where v = q'.
+        quaternions: index in q of the first of the four entries of every quaternion, w first.
+        t_end: horizon, s.
+        law: constants of every row.
+        fsm: machine that switches the rows: "level", "edge" or "memoryless".
+        collisions: rule for several contacts: "sequential", "simultaneous" or "resolved".
+        closed_form: the exact motion at given times, where one exists (tier A).
+        inputs: what acts from outside; None for nothing.
+        control: a callable of the user's own that gives a scene's controls at its ticks, beside the inputs.
+        claims: numbers that must come out.
+        limits: how far engines may be from the truth.
+        act0 (na,): activations at the start, of those actuators of the scene that have one; 0 if not given.
+        rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
+        scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
+            `findings` what is strange in it.
+        consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
+            show how the law brings it back.
+        discrete: names of the discrete variables that `Trajectory.switches` counts by index.
+        tight: tolerance at which the reference stands for the truth; larger where a stiff spring on a small mass makes
+            rounding count before that (kp eps |q|/m against the tolerance of a velocity).
+        chaos: declared where the truth cannot be trusted to the horizon; None where it must be.
+    """
+
+    name: str
+    variant: str
+    title: str
+    mechanism: str
+    parameters: Mapping[str, Value]
+    coordinates: tuple[Coordinate, ...]
+    contacts: tuple[str, ...]
+    q0: Floats
+    v0: Floats
+    t_end: float
+    law: Law
+    fsm: str = "level"
+    collisions: str = "sequential"
+    closed_form: Callable[[Floats], Trajectory] | None = None
+    inputs: Inputs | None = None
+    control: Control | None = None
+    claims: tuple[Claim, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    discrete: tuple[str, ...] = ()
+    tight: float = 1e-13
+    chaos: Chaos | None = None
+    consistent: bool = True
+    scene: Scene | None = None
+    rank: int = -1
+    act0: Floats = field(default_factory=lambda: np.zeros(0))
+    velocities: tuple[Coordinate, ...] = ()
+    quaternions: tuple[int, ...] = ()
+    file: str = ""
+    findings: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        """Check shapes against each other and freeze the mappings."""
+        object.__setattr__(self, "velocities", self.velocities or self.coordinates)
+        for name, of in (("q0", self.coordinates), ("v0", self.velocities)):
+            object.__setattr__(self, name, frozen(f"Case {self.name}", name, getattr(self, name), (len(of),)))
+        count = len(self.scene.activated) if self.scene is not None else 0
+        act0 = np.zeros(count) if np.size(self.act0) == 0 else self.act0
+        object.__setattr__(self, "act0", frozen(f"Case {self.name}", "act0", act0, (count,)))
+        if not np.isfinite(self.act0).all():
+            raise SceneError(f"Case {self.name}: act0 is {self.act0.tolist()}; it must be finite.")
+        if len(self.law.a0) != len(self.contacts):
+            raise SceneError(
+                f"Case {self.name} names {len(self.contacts)} contacts but its law has {len(self.law.a0)} rows."
+            )
+        if not (math.isfinite(self.t_end) and self.t_end > 0):
+            raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
+        self._put_control()
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+
+    def _put_control(self) -> None:
+        """Tell a controller its inputs, and bring its ticks to the horizon and to the instants of the other inputs."""
+        control, scene, inputs = self.control, self.scene, self.inputs
+        if control is None:
+            return
+        if scene is None or not scene.actuators:
+            what = "is no scene, for which alone there is one" if scene is None else "has no actuators"
+            raise SceneError(f"Case {self.name} has a control but {what}.")
+        if inputs is not None and inputs.values[:, : len(scene.actuators)].any():
+            raise SceneError(f"Case {self.name}: inputs hold controls, and there is a control; valid: one of them.")
+        control = replace(control, names=scene.inputs, width=len(scene.actuators)).fitted(self.t_end)
+        object.__setattr__(self, "control", control)
+        if inputs is not None:
+            object.__setattr__(self, "inputs", replace(inputs, times=control.on_ticks(inputs.times)))
+
+    @property
+    def label(self) -> str:
+        """Name and variant in one word."""
+        return f"{self.name}:{self.variant}"
+
+    @checked_arguments
+    def number(self, parameter: str) -> float:
+        """One parameter as a float.
+
+        Raises:
+            UnknownName: if the case does not have it.
+            InvalidValue: if it is a word.
+        """
+        if parameter not in self.parameters:
+            raise UnknownName(f"parameter of {self.label}", parameter, self.parameters)
+        return real(f"{self.label}: {parameter}", self.parameters[parameter])

@@ -1,0 +1,64 @@
+"""Limits that hold for every case: a case may widen one with its reason, none may leave one out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from crossbody.cases.case import Case, Limit
+
+_TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from event to event"
+_FASTER = "of the tolerance, times the ratio of the fastest rate to the motion's"
+_IDENTITY = "an identity at every sample: rounding"
+_COUNT = "a count"
+_ON_THE_GRID = "impacts on the grid of the steps: the way of one of them"
+_LOCATED = "located events: rounding, and the tolerance of a root by its rate"
+_LOCATING = (
+    ("reference", "*"), ("mujoco", "matched"), ("pinocchio", "law"), ("pinocchio", "impulse"),
+    ("pinocchio", "impulse_simultaneous"), ("exudyn", "*"),
+)  # fmt: skip
+"""Engines and profiles whose events are located between their steps."""
+_SAMPLED = "the trapezoidal rule between a run's own samples; an impact inside a step costs half its way"
+
+
+def default_limits(case: Case) -> tuple[Limit, ...]:
+    """Limits on position, velocity, force, energy, events and drift, as far as the case's rows have such numbers."""
+    everyone = tuple(Limit(metric=metric, value=value, why=why) for metric, value, why in _defaults(case))
+    if not case.law.unilateral.any():
+        return everyone
+    located = (
+        Limit(metric="event_gap", value=1e-6, engine=engine, profile=profile, why=_LOCATED)
+        for engine, profile in _LOCATING
+    )
+    return (*everyone, *located)
+
+
+def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
+    yield "start_error", 1e-12, "the case's own numbers, put into an engine's coordinates and back: rounding"
+    yield "position", 1e-6, _TOLERANCE
+    yield "velocity", 1e-5, _FASTER
+    yield "energy_drift", 1e-6, _TOLERANCE
+    yield "energy_integrator", 1e-6, "the account of all work closes to integration accuracy"
+    yield "energy_residual", 1e-9, _IDENTITY
+    yield "rate_residual", 2e-2, _SAMPLED
+    if not case.contacts:
+        return
+    yield "gap_residual", 1e-9, _IDENTITY
+    yield "mode_residual", 0.0, "an identity at every sample"
+    yield "law_residual", 1e-6, "the law's own equation at every state, with the rounding of stiff rows"
+    yield "lam_impulse_path", 1e-5, _FASTER
+    yield "contact_work", 1e-6, _TOLERANCE
+    if case.law.unilateral.any():
+        yield "gap_error", 1e-6, _TOLERANCE
+        yield "event_gap", 1.0, _ON_THE_GRID
+        yield "complementarity", 1e-6, "contacts push only, to the precision of the released instant"
+        yield "event_times", 1e-6, _TOLERANCE
+        yield "mode_times", 1e-6, _TOLERANCE
+        yield "touch_count", 0.0, _COUNT
+        yield "release_count", 0.0, _COUNT
+    if (~case.law.unilateral & (case.law.a0 > 0.0)).any():
+        yield "constraint_drift", 1e-8, "the law draws closures back at its own rate"
+
+
+def limits_of(case: Case) -> tuple[Limit, ...]:
+    """The limits of a case in full: its own behind the defaults, so that of equally precise ones its own speak."""
+    return (*default_limits(case), *case.limits)

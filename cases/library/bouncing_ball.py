@@ -1,0 +1,140 @@
+"""A ball dropped on a floor that pushes back as a spring and damper, with a ballistic state.
+
+q = height of the lowest point, h = q (spec 2.1; Bortoff, American Modelica Conference 2020).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from crossbody.cases import closed_forms as cf
+from crossbody.cases.case import Case, Claim, Coordinate, Law, Parameter, Tier, Value
+from crossbody.cases.mechanisms.ball.limits import limits
+from crossbody.cases.mechanisms.ball.truth import Ball, Motion
+
+PARAMETERS = {
+    "mass": Parameter(default=1.0, unit="kg", doc="mass of the ball", low=0.0, open_low=True),
+    "gravity": Parameter(default=9.81, unit="m/s^2", doc="towards the floor; 0 for one impact alone", low=0.0),
+    "height": Parameter(default=1.0, unit="m", doc="height of the lowest point at t = 0"),
+    "speed": Parameter(default=0.0, unit="m/s", doc="initial speed towards the floor"),
+    "a0": Parameter(default=100.0, unit="1/s^2", doc="stiffness of the floor over the mass", low=0.0),
+    "a1": Parameter(default=20.0, unit="1/s", doc="damping of the floor over the mass", low=0.0),
+    "a2": Parameter(default=1e6, unit="1/(m^2 s^2)", doc="cubic stiffness of the floor over the mass", low=0.0),
+    "t_end": Parameter(default=5.0, unit="s", doc="horizon", low=0.0, open_low=True),
+}
+
+VARIANTS: dict[str, dict[str, Value]] = {
+    "listing": {},
+    "elastic": {"a1": 0.0},
+    "linear": {"a0": 1e4, "a1": 20.0, "a2": 0.0},
+    "resting": {"a2": 0.0},
+    "bilateral": {"height": 1e-3},
+}
+
+_TITLES = {
+    "listing": "a ball bounces twice and comes to rest without penetration",
+    "elastic": "without damping the law makes energy at every bounce",
+    "linear": "a linear floor, where every arc has a closed form",
+    "resting": "a double pole below its threshold speed: the ball must never bounce",
+    "bilateral": "the floor is always on, as for linearisation",
+}
+
+
+def _impact_speed(p: Mapping[str, float]) -> float:
+    """Speed at the first touch, m/s; 0 if there is none."""
+    square = p["speed"] ** 2 + 2.0 * p["gravity"] * p["height"]
+    comes = p["height"] >= 0.0 and (p["gravity"] > 0.0 or p["speed"] > 0.0)
+    return max(square, 0.0) ** 0.5 if comes else 0.0
+
+
+def _first_touch(p: Mapping[str, float]) -> float:
+    """Instant of the first touch, s, for a ball that comes down."""
+    g = p["gravity"]
+    return (_impact_speed(p) - p["speed"]) / g if g > 0.0 else p["height"] / p["speed"]
+
+
+def _impact_claims(p: Mapping[str, float]) -> Iterator[Claim]:
+    """One impact without gravity on a linear floor: the closed forms of spec 1.3."""
+    v0 = _impact_speed(p)
+    if p["gravity"] or p["a2"] or not p["a0"] or not v0:
+        return
+    a0, a1 = p["a0"], p["a1"]
+    if _first_touch(p) + cf.contact_time(a0, a1) >= p["t_end"]:
+        return
+    for metric, value in (
+        ("restitution", cf.restitution(cf.damping_ratio(a0, a1))),
+        ("contact_time", cf.contact_time(a0, a1)),
+        ("penetration", cf.depth(a0, a1, v0)),
+        ("separation_gap", cf.separation_gap(a0, a1, v0)),
+    ):
+        yield Claim(metric=metric, expected=value, tier=Tier.A, source="closed form of one linear contact")
+
+
+def _undamped_claims(p: Mapping[str, float]) -> Iterator[Claim]:
+    """Without damping every bounce adds m (g h_e - a0 h_e^2/2 - a2 h_e^4/4), whatever the speed (spec 1.4)."""
+    v0 = _impact_speed(p)
+    if p["a1"] or not p["gravity"] or not (p["a0"] or p["a2"]) or not v0 or 2.0 * _first_touch(p) >= p["t_end"]:
+        return
+    h = cf.elastic_separation_gap(p["a0"], p["a2"], p["gravity"])
+    if v0**2 <= p["a0"] * h**2 + p["a2"] * h**4 / 2.0:
+        return
+    gain = cf.contact_work(p["mass"], p["gravity"], p["a0"], 0.0, p["a2"], 0.0, h, 0.0)
+    yield Claim(metric="separation_gap", expected=h, tier=Tier.A, source="a0 h + a2 h^3 = g")
+    yield Claim(metric="energy_per_bounce", expected=gain, tier=Tier.A, source="potential of the law at separation")
+
+
+def _counts(contacts: int, bounces: int, transitions: int, tier: Tier, source: str) -> Iterator[Claim]:
+    numbers = {"contacts": contacts, "bounces": bounces, "transitions": transitions}
+    for metric, value in numbers.items():
+        yield Claim(metric=metric, expected=float(value), tier=tier, source=source)
+
+
+def _rest(p: Mapping[str, float], tier: Tier, source: str) -> Iterator[Claim]:
+    yield Claim(metric="final_lam", expected=p["mass"] * p["gravity"], tier=tier, source=source)
+    yield Claim(metric="final_gap", expected=0.0, tier=tier, source=source)
+
+
+def _published_claims(variant: str, p: Mapping[str, float]) -> Iterator[Claim]:
+    """What the presentation of the law states for its own numbers; void once a parameter is changed."""
+    preset = {k: VARIANTS[variant].get(k, parameter.default) for k, parameter in PARAMETERS.items()}
+    if dict(p) != preset:
+        return
+    if variant == "listing":
+        yield from _counts(3, 2, 7, Tier.B, "listing and figure of the bouncing ball")
+        yield from _rest(p, Tier.B, "rests with h -> 0, lam -> m g")
+    elif variant == "resting":
+        yield from _counts(1, 0, 1, Tier.A, "impact below the threshold speed")
+        yield from _rest(p, Tier.A, "equilibrium of the law")
+    elif variant == "elastic":
+        yield Claim(metric="fifth_exit", expected=4.36, tier=Tier.B, source="zoomed figure, 4.35 s to 4.37 s")
+
+
+def build(variant: str, parameters: Mapping[str, Value]) -> Case:
+    """The scene with its truth; without a cubic term the motion is known in closed form."""
+    p = {k: float(value) for k, value in parameters.items()}
+    bilateral = variant == "bilateral"
+    ball = Ball(mass=p["mass"], gravity=p["gravity"], a0=p["a0"], a1=p["a1"], bilateral=bilateral)
+    claims = () if bilateral else (*_published_claims(variant, p), *_impact_claims(p), *_undamped_claims(p))
+    linear = p["a2"] == 0.0
+    return Case(
+        name="bouncing_ball",
+        variant=variant,
+        title=_TITLES[variant],
+        mechanism="ball",
+        parameters=parameters,
+        coordinates=(Coordinate(name="height", unit="m"),),
+        contacts=("floor",),
+        q0=np.array([p["height"]]),
+        v0=np.array([-p["speed"]]),
+        t_end=p["t_end"],
+        law=Law(
+            a0=np.array([p["a0"]]), a1=np.array([p["a1"]]), a2=np.array([p["a2"]]), unilateral=np.array([not bilateral])
+        ),
+        closed_form=Motion(ball, p["height"], -p["speed"], p["t_end"]) if linear else None,
+        claims=claims,
+        limits=limits(claims, bilateral, p["height"]),
+        consistent=not bilateral,  # its start is off the floor, and the law brings it down
+        units={k: parameter.unit for k, parameter in PARAMETERS.items()},
+    )

@@ -1,0 +1,86 @@
+"""Finding a case's module and building the case from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from crossbody import cases
+from crossbody.cases.arguments import path, shown
+from crossbody.cases.case import Case, Parameter, Value
+from crossbody.cases.errors import CrossbodyError, SceneError, UnknownName
+from crossbody.cases.files.case import UNNAMED, case_of, open_file
+from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
+from crossbody.cases.own_file import from_file
+from crossbody.cases.scene import Scene
+
+
+def module(name: str) -> Any:
+    """What defines a case: a plug-in or an installed one by its name, a user's own or a robot's file by its path."""
+    if name.endswith(ROBOT_FILES):
+        return open_file(name)
+    found = from_file("case", Path(name), cases.names()) if name.endswith(".py") else _named(name)
+    for wanted in ("PARAMETERS", "VARIANTS", "build"):
+        if not hasattr(found, wanted):
+            raise SceneError(f"Case file {found.__file__} does not define {wanted}.")
+    return found
+
+
+def _named(name: str) -> ModuleType:
+    return cases.REGISTRY.load(name)
+
+
+def resolve(
+    where: str, parameters: Mapping[str, Parameter], preset: Mapping[str, Value], overrides: Mapping[str, Value]
+) -> dict[str, Value]:
+    """Every parameter's value: default, then the variant's, then the user's."""
+    for name in overrides:
+        if name not in parameters:
+            raise UnknownName(f"parameter of {where}", name, parameters)
+    given = {**preset, **overrides}
+    return {k: p.checked(f"{where}: {k}", given.get(k, p.default)) for k, p in parameters.items()}
+
+
+def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Case:
+    """See `crossbody.cases.load`."""
+    name = path("case", name)
+    source = module(name)
+    chosen = next(iter(source.VARIANTS)) if variant is None else variant
+    if not isinstance(chosen, str) or chosen not in source.VARIANTS:
+        raise UnknownName(f"variant of {Path(name).stem}", chosen, source.VARIANTS)
+    label = f"{Path(name).stem}:{chosen}"
+    numbers = resolve(label, source.PARAMETERS, source.VARIANTS[chosen], overrides)
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            made = source.build(chosen, numbers)
+            return named(made, label, numbers)
+    except CrossbodyError:
+        raise
+    except (ArithmeticError, ValueError) as error:  # a root of what is below 0, a number beyond double precision
+        raise SceneError(f"{label}: no scene has these parameters ({error}).") from error
+
+
+def named(made: object, label: str, numbers: Mapping[str, Value]) -> Case:
+    """Return what a file's `build` has made as a case: a scene starts at rest in its reference pose.
+
+    Args:
+        made: a case, or a scene.
+        label: CASE:VARIANT, the name of a case that has none.
+        numbers: the parameters; t_end is a scene's horizon, s.
+
+    Raises:
+        SceneError: for anything else.
+    """
+    if isinstance(made, Scene):
+        made = case_of(made, t_end=float(numbers.get("t_end", 1.0)))
+    if not isinstance(made, Case):
+        raise SceneError(f"{label}: build returns {shown(made)}; valid: a Case or a Scene.")
+    if made.scene is not None and made.name == UNNAMED:
+        name, _, variant = label.partition(":")
+        return replace(made, name=name, variant=variant, parameters=numbers)
+    return made

@@ -1,0 +1,1 @@
+"""What the shipped cases of one mechanism share: geometry, closed forms, claims and limits."""

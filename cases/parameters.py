@@ -1,0 +1,78 @@
+"""Parameters of other kinds than one number or one word: a list of numbers, a number that a word may stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from crossbody.cases.arguments import shown
+from crossbody.cases.arrays import Floats
+from crossbody.cases.case import Parameter, Value
+from crossbody.cases.errors import InvalidValue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Numbers(Parameter):
+    """Numbers in one text, separated by commas ("4,2,1"); the bounds hold for each of them."""
+
+    def checked(self, where: str, value: Value | Iterable[float]) -> Value:
+        """The text of the numbers, each in its shortest form.
+
+        Args:
+            where: what is checked, for messages.
+            value: such a text, one number, or numbers in a sequence.
+
+        Raises:
+            InvalidValue: if a part is not a number inside the bounds.
+        """
+        if isinstance(value, (int, float)):
+            value = str(value)
+        try:
+            parts = value.split(",") if isinstance(value, str) else [str(part) for part in value]
+        except TypeError:
+            raise InvalidValue(f"{where} is {shown(value)}; it must be numbers, with commas between them.") from None
+        if not parts:
+            raise InvalidValue(f"{where} is empty; it must be one number or several separated by commas.")
+        each = Parameter(default=0.0, unit=self.unit, low=self.low, high=self.high, open_low=self.open_low)
+        return ",".join(_shortest(each.checked(_place(where, i, len(parts)), part)) for i, part in enumerate(parts))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NumberOrWord(Parameter):
+    """A number inside the bounds, or one of the words of `choices`."""
+
+    def checked(self, where: str, value: Value) -> Value:
+        """The number or the word.
+
+        Raises:
+            InvalidValue: if it is neither.
+        """
+        if isinstance(value, str) and value in self.choices:
+            return value
+        number = Parameter(default=0.0, unit=self.unit, low=self.low, high=self.high, open_low=self.open_low)
+        try:
+            return number.checked(where, value)
+        except InvalidValue as error:
+            raise InvalidValue(f"{str(error).removesuffix('.')}, or: {', '.join(self.choices)}.") from None
+
+
+def spread(where: str, text: Value, count: int) -> Floats:
+    """The numbers of a `Numbers` parameter (count,); one number serves all.
+
+    Raises:
+        InvalidValue: if there are neither one nor `count` of them.
+    """
+    found = np.array([float(part) for part in str(text).split(",")])
+    if len(found) not in (1, count):
+        raise InvalidValue(f"{where} lists {len(found)} numbers; valid: one for all, or {count} separated by commas.")
+    return np.repeat(found, count) if len(found) == 1 else found
+
+
+def _place(where: str, i: int, count: int) -> str:
+    return where if count == 1 else f"{where}[{i}]"
+
+
+def _shortest(number: Value) -> str:
+    return repr(float(number)).removesuffix(".0")

@@ -1,0 +1,82 @@
+"""Rotations as quaternions, w first, inside of positions: q and -q are the same one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from crossbody.cases.arrays import Floats
+
+
+def normalised(q: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return positions (..., nq) with quaternions of length 1; one that is zero becomes NaN.
+
+    Args:
+        q: positions.
+        quaternions: first index in q of each.
+    """
+    found = np.array(q, dtype=np.float64)
+    for at in quaternions:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found[..., at : at + 4] /= np.linalg.norm(found[..., at : at + 4], axis=-1, keepdims=True)
+    return found
+
+
+def turned(q: Floats, rest: Floats) -> Floats:
+    """Return the rotation vectors (..., 3), rad, in body axes, that lead from quaternions `rest` to q (..., 4)."""
+    a, b = rest[..., :1], -rest[..., 1:]
+    e, f = q[..., :1], q[..., 1:]
+    w, x = a * e - np.sum(b * f, axis=-1, keepdims=True), a * f + e * b + np.cross(b, f)
+    sine = np.linalg.norm(x, axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, np.abs(w))
+    scale = np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0)
+    vector: Floats = np.where(w < 0.0, -1.0, 1.0) * scale * x
+    return vector
+
+
+def rates(q: Floats, v: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return q' (n, nq) of velocities (n, nv) that have the angular velocity in body axes, rad/s, for a quaternion.
+
+    Args:
+        q: positions (n, nq).
+        v: velocities (n, nv).
+        quaternions: first index in q of each.
+    """
+    parts, at, row = [], 0, 0
+    for first in quaternions:
+        parts.append(v[:, row : row + first - at])
+        row += first - at
+        w, x, turn = q[:, first : first + 1], q[:, first + 1 : first + 4], 0.5 * v[:, row : row + 3]
+        parts += [-np.sum(x * turn, axis=1, keepdims=True), w * turn + np.cross(x, turn)]
+        at, row = first + 4, row + 3
+    return np.concatenate([*parts, v[:, row:]], axis=1)
+
+
+def differences(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return |q - other| (n, nq); in the first entry of a quaternion the angle between both, rad, and 0 in the others.
+
+    Args:
+        q: positions (n, nq).
+        other: positions (n, nq).
+        quaternions: first index in q of each.
+    """
+    found: Floats = np.abs(q - other)
+    for at in quaternions:
+        entries = slice(at, at + 4)
+        found[:, at] = np.linalg.norm(turned(q[:, entries], other[:, entries]), axis=1)
+        found[:, at + 1 : at + 4] = 0.0
+    return found
+
+
+def matrices(quaternions: Floats) -> Floats:
+    """Return the rotations (..., 3, 3) of quaternions (..., 4), w first, of any length but 0."""
+    q = np.asarray(quaternions)
+    w, x, y, z = (q[..., k] for k in range(4))
+    two = 2.0 / (w * w + x * x + y * y + z * z)
+    X, Y, Z = two * x, two * y, two * z
+    found: Floats = np.empty((*q.shape[:-1], 3, 3))
+    found[..., 0, 0], found[..., 0, 1], found[..., 0, 2] = 1.0 - Y * y - Z * z, X * y - Z * w, X * z + Y * w
+    found[..., 1, 0], found[..., 1, 1], found[..., 1, 2] = X * y + Z * w, 1.0 - X * x - Z * z, Y * z - X * w
+    found[..., 2, 0], found[..., 2, 1], found[..., 2, 2] = X * z - Y * w, Y * z + X * w, 1.0 - X * x - Y * y
+    return found

@@ -1,0 +1,150 @@
+"""The one type for a motion, whether an engine computed it or a rig measured it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.cases.arrays import Bytes, Floats, frozen
+from crossbody.cases.entry_points import checked_arguments
+from crossbody.cases.outcome import Outcome
+
+if TYPE_CHECKING:
+    from crossbody.cases.case import Inputs
+
+
+class Mode(IntEnum):
+    """State of one constraint row (spec 1.2)."""
+
+    FREE = 0
+    CONTACT = 1
+    BALLISTIC = 2
+    """Separated below the surface (CONTACT_SEPARATION of the general machine)."""
+    COLLISION = 3
+    COLLISION_SEPARATION = 4
+    BILATERAL = 5
+    """Always on."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """One transition of one contact.
+
+    Attributes:
+        t: instant, s.
+        contact: index of the constraint row.
+        before: mode before.
+        after: mode after.
+        impulse: impulse of a frozen collision (spec 1.2) at its end, N s; 0 where lam is finite.
+    """
+
+    t: float
+    contact: int
+    before: Mode
+    after: Mode
+    impulse: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Switch:
+    """One change of a discrete variable of the mechanism or of its controller (a ring change, a controller's mode).
+
+    Attributes:
+        t: instant, s.
+        variable: index in `Case.discrete`.
+        before, after: its values.
+        smooth: nothing jumps there, but the derivative of a force.
+    """
+
+    t: float
+    variable: int
+    before: int
+    after: int
+    smooth: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ledger:
+    """The energy account of spec 1.4: E(t) - E(0) = input - dissipated + sum of contact work + residual.
+
+    Attributes:
+        contact (n, nc): work done by each row's multiplier since the start, J.
+        input (n,): work of the inputs, J.
+        dissipated (n,): energy lost in the mechanism's own damping, J.
+    """
+
+    contact: Floats
+    input: Floats
+    dissipated: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """A motion in the case's own coordinates.
+
+    At an event the instant stands twice: before and after (q and v are continuous, lam jumps).
+
+    Attributes:
+        t (n,): time, s, never decreasing.
+        q (n, nq): positions.
+        v (n, nv): velocities.
+        gap (n, nc): signed gaps, m; negative penetrates.
+        lam (n, nc): multipliers, N; positive pushes apart. NaN where the engine cannot tell.
+        energy (n, 2): kinetic and potential energy, J.
+        mode (n, nc): `Mode` of every row; -1 where the engine has no such notion.
+        events: transitions in order of time.
+        switches: changes of the discrete variables in order of time.
+        outcome: how the run ended.
+        message: where and why, if it did not finish.
+        steps: steps accepted.
+        wall_s: time of the run itself, s (no preparation).
+        counts: further counters of the solver (right-hand sides, rejections, ...).
+        ledger: work of every row, if it was asked for.
+        inputs: what acted on it, where a controller of the user's own gave some of it; None where the case says it.
+        control_s: part of `wall_s` that was spent in that controller, s.
+    """
+
+    t: Floats
+    q: Floats
+    v: Floats
+    gap: Floats
+    lam: Floats
+    energy: Floats
+    mode: Bytes
+    events: tuple[Event, ...] = ()
+    switches: tuple[Switch, ...] = ()
+    outcome: Outcome = Outcome.FINISHED
+    message: str = ""
+    steps: int = 0
+    wall_s: float = 0.0
+    counts: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    ledger: Ledger | None = None
+    inputs: Inputs | None = None
+    control_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every shape once and make every array read-only."""
+        object.__setattr__(self, "t", frozen("Trajectory", "t", self.t, (None,)))
+        n = len(self.t)
+        object.__setattr__(self, "gap", frozen("Trajectory", "gap", self.gap, (n, None)))
+        nc = self.gap.shape[1]
+        shapes = {"q": (n, None), "v": (n, None), "lam": (n, nc), "energy": (n, 2)}
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen("Trajectory", name, getattr(self, name), shape))
+        object.__setattr__(self, "mode", frozen("Trajectory", "mode", self.mode, (n, nc), np.int8))
+
+    @property
+    def total_energy(self) -> Floats:
+        """Kinetic plus potential energy (n,), J."""
+        total: Floats = self.energy.sum(axis=1)
+        return total
+
+    @checked_arguments
+    def transitions(self, contact: int | None = None) -> tuple[Event, ...]:
+        """The events of one contact, or all."""
+        return tuple(e for e in self.events if contact is None or e.contact == contact)

@@ -1,0 +1,58 @@
+"""The reference's equations of a case: a module of reference/systems, or a file of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases.own_file import from_file
+from crossbody.reference import System
+
+SYSTEMS = "crossbody.reference.systems"
+
+
+def builder(mechanism: str) -> Callable[..., System] | None:
+    """What builds the equations of a mechanism from (parameters, law); None where there are none.
+
+    Args:
+        mechanism: a module of reference/systems with `build`, or the path of a file (ends in .py) with `system`.
+    """
+    if mechanism.endswith(".py"):
+        return getattr(module(mechanism), "system", None)
+    known = find_spec(f"{SYSTEMS}.{mechanism}") is not None
+    return getattr(module(mechanism), "build", None) if known else None
+
+
+@cache
+def module(mechanism: str) -> ModuleType | None:
+    """Return where the equations stand; None for a scene, whose equations are those of every scene."""
+    if mechanism == "scene":
+        return None
+    own = mechanism.endswith(".py")
+    return from_file("mechanism", Path(mechanism)) if own else import_module(f"{SYSTEMS}.{mechanism}")
+
+
+def known(case: Case) -> bool:
+    """Return whether the reference has equations of a case."""
+    return case.scene is not None or builder(case.mechanism) is not None
+
+
+def system_of(case: Case) -> System:
+    """The mechanism with the law of its rows.
+
+    Raises:
+        CaseUnsupported: if the reference has no equations of it.
+    """
+    if case.scene is not None:
+        from crossbody.reference.tree.system import system
+
+        return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank)
+    build = builder(case.mechanism)
+    if build is None:
+        raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")
+    return build(case.parameters, case.law)

@@ -1,0 +1,250 @@
+"""Where shapes are nearest: gaps, normals and points of any number of pairs, at any number of instants at once.
+
+Arrays have leading dimensions (...) that broadcast against each other: pairs, instants, or none. Nearest points are
+sought in each shape's own axes, and nothing here knows a derivative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases.arrays import Floats
+
+Pose = tuple[Floats, Floats]
+"""Rotations (..., 3, 3) and positions (..., 3) in the world."""
+Places = tuple[Floats, Floats, Floats]
+"""Gaps (..., places), m; unit normals from the first shape to the second, and points of the second (..., places, 3)."""
+Truths = NDArray[np.bool_]
+SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in range(8)])
+"""Of the corners of a box, in the order of their rows."""
+UP = np.array([0.0, 0.0, 1.0])
+ENDS = np.array([-1.0, 1.0])[:, None] * UP
+ROUND = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Points of a rim on which a cylinder stands, in the order of their rows."""
+
+
+def meet(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Pose, along: Truths) -> Places:
+    """Return where pairs of shapes of two types would meet, for every place of theirs.
+
+    Args:
+        kinds: types of the first and of the second shapes, as in `scene_contacts.PLACES`.
+        sizes: of both (..., 3), as of `Shape`.
+        at: poses of the first shapes.
+        by: poses of the second shapes.
+        along: whether capsules lie along each other, or cylinders stand (...), as `lying` says; else not looked at.
+    """
+    if kinds[0] == "plane":
+        return _over_plane(kinds[1], sizes[1], at, by, along)
+    if kinds[0] == "capsule":
+        return _capsules(sizes, at, by, along)
+    return _spheres(kinds[1], sizes, at, by)
+
+
+def lying(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Pose, sine: Floats) -> Truths:
+    """Return whether capsules lie along each other, or cylinders stand on their plane (...).
+
+    Args:
+        kinds: types of the first and of the second shapes.
+        sizes: of both (..., 3).
+        at: poses of the first shapes.
+        by: poses of the second shapes.
+        sine: of the angle up to which they do (...); 0 of other shapes, which never do.
+    """
+    if kinds == ("plane", "cylinder"):
+        return np.asarray(tilt(at, by) <= sine)
+    if kinds != ("capsule", "capsule"):
+        return np.zeros(np.shape(sine), dtype=bool)
+    low, high = overlap(at, sizes[0][..., 1], by, sizes[1][..., 1])
+    return np.asarray((low <= high) & (crossing(at, by) <= sine))
+
+
+def tilt(floor: Pose, at: Pose) -> Floats:
+    """Return the sine of the angle between a plane's normal and the axis of a cylinder over it (...)."""
+    own = _inside(at[0], floor[0][..., 2])
+    return np.hypot(own[..., 0], own[..., 1])
+
+
+def crossing(at: Pose, by: Pose) -> Floats:
+    """Return the sine of the angle at which axes of two capsules cross, seen along what is nearest between them."""
+    A, B, way = _axes(at, by)
+    apart = way - _dot(A, way)[..., None] * A
+    across, length = cross(A, B), np.sqrt(_dot(apart, apart))
+    seen = np.abs(_dot(across, apart)) / np.where(length > 0.0, length, 1.0)
+    return np.where(length > 0.0, seen, np.sqrt(_dot(across, across)))
+
+
+def overlap(at: Pose, half: Floats, by: Pose, other: Floats) -> tuple[Floats, Floats]:
+    """Return from where to where along the first of two capsules the second lies beside it (...)."""
+    A, B, way = _axes(at, by)
+    middle, reach = _dot(A, way), np.abs(_dot(A, B)) * other
+    return np.maximum(-half, middle - reach), np.minimum(half, middle + reach)
+
+
+def _over_plane(kind: str, size: Floats, floor: Pose, by: Pose, stands: Truths) -> Places:
+    n = floor[0][..., 2]
+    own = _inside(by[0], n)
+    local = _lowest(kind, size, own)
+    if kind == "cylinder":
+        local = np.where(np.asarray(stands)[..., None, None], _rim(size, own), local)
+    points = by[1][..., None, :] + local @ np.swapaxes(by[0], -1, -2)
+    gaps = _dot(points - floor[1][..., None, :], n[..., None, :])
+    return gaps, np.broadcast_to(n[..., None, :], points.shape), points
+
+
+def _lowest(kind: str, size: Floats, n: Floats) -> Floats:
+    """Return the lowest points (..., places, 3) along n (..., 3), all in the shapes' axes."""
+    radius, half = size[..., None, :1], size[..., None, 1:2]
+    if kind == "sphere":
+        return -radius * n[..., None, :]
+    if kind == "ellipsoid":
+        scaled = size * n
+        lowest: Floats = -size * scaled / np.sqrt(_dot(scaled, scaled))[..., None]
+        return lowest[..., None, :]
+    if kind in ("box", "capsule"):
+        points: Floats = SIGNS * size[..., None, :] if kind == "box" else half * ENDS - radius * n[..., None, :]
+        return points
+    with np.errstate(invalid="ignore"):  # caps that are level have no lowest point
+        side = radius * (n * (1.0 - UP) / np.hypot(n[..., 0], n[..., 1])[..., None])[..., None, :]
+    low, high = -half * UP, half * UP
+    return np.concatenate([low - side, low + side, high - side, high + side], axis=-2)
+
+
+def _rim(size: Floats, n: Floats) -> Floats:
+    """Return four points (..., 4, 3) of the rims on which cylinders stand along n (..., 3), in their axes."""
+    radius, half = size[..., None, :1], size[..., None, 1:2]
+    points: Floats = radius * ROUND - np.copysign(half, n[..., None, 2:]) * UP
+    return points
+
+
+def _spheres(kind: str, sizes: tuple[Floats, Floats], at: Pose, by: Pose) -> Places:
+    """Return the one place of spheres beside shapes of one type."""
+    radius, size = sizes[0][..., 0], sizes[1]
+    x = _inside(by[0], at[1] - by[1])
+    nearest, within = np.zeros_like(x), np.zeros(x.shape[:-1], dtype=bool)
+    if kind == "capsule":
+        nearest[..., 2] = np.clip(x[..., 2], -size[..., 1], size[..., 1])
+    elif kind != "sphere":
+        nearest, within = _on_box(size, x) if kind == "box" else _on_cylinder(size, x)
+    core = size[..., 0] if kind in ("sphere", "capsule") else np.zeros(size.shape[:-1])
+    way = np.where(within[..., None], x - nearest, nearest - x)
+    distance = np.sqrt(_dot(way, way))
+    with np.errstate(invalid="ignore"):  # a centre on a surface or an axis has no normal
+        n = way / distance[..., None]
+    gaps = np.where(within, -distance, distance) - radius - core
+    points = by[1] + _outside(by[0], nearest - core[..., None] * n)
+    return gaps[..., None], _outside(by[0], n)[..., None, :], points[..., None, :]
+
+
+def _on_box(half: Floats, x: Floats) -> tuple[Floats, Truths]:
+    """Return the nearest points (..., 3) of boxes' surfaces in their axes, and whether x is inside."""
+    held = np.clip(x, -half, half)
+    within = np.all(held == x, axis=-1)
+    face = np.arange(3) == np.argmin(half - np.abs(x), axis=-1)[..., None]
+    return np.where(within[..., None] & face, np.copysign(half, x), held), within
+
+
+def _on_cylinder(size: Floats, x: Floats) -> tuple[Floats, Truths]:
+    """Return the nearest points (..., 3) of cylinders' surfaces in their axes, and whether x is inside."""
+    radius, half, rho = size[..., 0], size[..., 1], np.hypot(x[..., 0], x[..., 1])
+    level = np.abs(x[..., 2])
+    within = (rho <= radius) & (level <= half)
+    side = ~within | (radius - rho < half - level)  # what is inside is nearest to the side, or to a cap
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out = np.where(within & side, radius / rho, np.minimum(1.0, radius / rho))
+    axis = np.where(within & side, radius, 0.0)[..., None] * UP[[2, 0]]  # as good as any other way out of the middle
+    with np.errstate(invalid="ignore"):
+        across = np.where((rho > 0.0)[..., None], x[..., :2] * out[..., None], axis)
+    cap = np.where(within & ~side, np.copysign(half, x[..., 2]), np.clip(x[..., 2], -half, half))
+    return np.concatenate([across, cap[..., None]], axis=-1), within
+
+
+def _capsules(sizes: tuple[Floats, Floats], at: Pose, by: Pose, along: Truths) -> Places:
+    """Return both places of pairs of capsules: where they end if they lie along each other, else one that is nearest.
+
+    A row that is none is infinitely far.
+    """
+    radius, width = sizes[0][..., 0], sizes[1][..., 0]
+    segments, none = (at, sizes[0][..., 1], by, sizes[1][..., 1]), ~np.asarray(along)
+    tried = [_nearest(*segments)] * 2
+    if not none.all():
+        chosen = none[..., None]
+        sides = [_end(*segments, sign) for sign in (-1.0, 1.0)]
+        tried = [(np.where(chosen, a, c), np.where(chosen, b, d)) for (a, b), (c, d) in zip(tried, sides, strict=True)]
+    starts, ends = (np.stack([pair[side] for pair in tried], axis=-2) for side in (0, 1))
+    apart = ends - starts
+    distance = np.sqrt(_dot(apart, apart))
+    with np.errstate(invalid="ignore"):  # axes that meet have no normal
+        normals = apart / distance[..., None]
+    gaps = distance - (radius + width)[..., None]
+    gaps[..., 1] = np.where(none, np.inf, gaps[..., 1])
+    normals[..., 1, :] = np.where(none[..., None], 0.0, normals[..., 1, :])
+    return gaps, normals, ends - width[..., None, None] * normals
+
+
+def _axes(one: Pose, two: Pose) -> tuple[Floats, Floats, Floats]:
+    """Return the axes of two capsules and the way between their centres, each (..., 3)."""
+    return one[0][..., 2], two[0][..., 2], two[1] - one[1]
+
+
+def _end(one: Pose, half: Floats, two: Pose, other: Floats, sign: float) -> tuple[Floats, Floats]:
+    """Return nearest points (..., 3) where segments side by side end: the nearer of an end and its foot."""
+    A, B, _ = _axes(one, two)
+    toward = np.copysign(other, sign * _dot(A, B))
+    return _closest([_foot(one, sign * half, two, other), _foot(two, toward, one, half)[::-1]])
+
+
+def _nearest(one: Pose, half: Floats, two: Pose, other: Floats) -> tuple[Floats, Floats]:
+    """Return the nearest points (..., 3) of segments: the best of the four ends and the common perpendicular."""
+    tried = [_foot(one, sign * half, two, other) for sign in (-1.0, 1.0)]
+    tried += [_foot(two, sign * other, one, half)[::-1] for sign in (-1.0, 1.0)]
+    A, B, way = _axes(one, two)
+    across = cross(A, B)
+    square = _dot(across, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s, t = (_dot(cross(way, axis), across) / square for axis in (B, A))
+    inside = (square > 0.0) & (np.abs(s) <= half) & (np.abs(t) <= other)
+    s, t = np.where(inside, s, half), np.where(inside, t, other)
+    return _closest([*tried, (one[1] + s[..., None] * A, two[1] + t[..., None] * B)])
+
+
+def _foot(one: Pose, along: Floats, two: Pose, half: Floats) -> tuple[Floats, Floats]:
+    """Return points (..., 3) of segments, and what is nearest to them on others."""
+    E, B = one[1] + np.asarray(along)[..., None] * one[0][..., 2], two[0][..., 2]
+    return E, two[1] + np.clip(_dot(B, E - two[1]), -half, half)[..., None] * B
+
+
+def _closest(tried: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    """Return of pairs of points (..., 3) for each place the first pair that is nearest."""
+    starts, ends = tried[0]
+    best = _dot(ends - starts, ends - starts)
+    for a, b in tried[1:]:
+        apart = _dot(b - a, b - a)
+        nearer = (apart < best)[..., None]
+        starts, ends, best = np.where(nearer, a, starts), np.where(nearer, b, ends), np.minimum(apart, best)
+    return starts, ends
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    total: Floats = np.einsum("...i,...i->...", a, b)
+    return total
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return vector products (..., 3); NumPy's own costs more than all else here for few vectors."""
+    (x, y, z), (u, v, w) = (np.moveaxis(part, -1, 0) for part in (a, b))
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+
+
+def _inside(rotation: Floats, world: Floats) -> Floats:
+    """Return vectors (..., 3) of the world in the axes of shapes."""
+    found: Floats = np.einsum("...ji,...j->...i", rotation, world)
+    return found
+
+
+def _outside(rotation: Floats, local: Floats) -> Floats:
+    """Return vectors (..., 3) of shapes' axes in the world."""
+    found: Floats = np.einsum("...ij,...j->...i", rotation, local)
+    return found

@@ -1,0 +1,248 @@
+"""Compiled functions whose machine code is kept between processes.
+
+Each overload is kept under a digest of all that it reads (`_fingerprint`), of its signature, of numba's version and
+settings and of the processor, so that code which is found is code that would be compiled again. What has no digest is
+compiled in every process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import platform
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import llvmlite
+import numba
+import numba.core.config as numba_config
+from numba.core import sigutils, types, typing
+from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
+from numba.core.serialize import dumps
+
+from crossbody.reference import code_store
+from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values
+
+_SETTINGS = (
+    "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX", "DEBUGINFO_DEFAULT",
+    "CPU_NAME", "CPU_FEATURES", "FULL_TRACEBACKS", "LLVM_PASS_TIMINGS",
+)  # fmt: skip
+
+
+def debugging() -> bool:
+    """Whether kernels are compiled with checks of every index, as `CROSSBODY_DEBUG=1` asks for."""
+    return os.environ.get("CROSSBODY_DEBUG", "") not in ("", "0")
+
+
+class Lean(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function that goes when nothing refers to it, and keeps no more than its machine code.
+
+    numba keeps every variable's type and value for `inspect_types`, in a list that outlives the function as long as
+    anything in it lives. A function that names kernels, and hangs on one of them, would hold itself.
+    """
+
+    def add_overload(self, cres: CompileResult) -> None:
+        """Take what was compiled."""
+        super().add_overload(cres._replace(type_annotation=""))
+
+
+def embedding(function: Callable[..., Any], signature: Any = None, *, nogil: bool = False) -> Any:
+    """Compile a function that names kernels as constants; it is not kept on disk.
+
+    Args:
+        function: in Python.
+        signature: compiled for at once; without it for that of the first call.
+        nogil: threads may run it side by side.
+    """
+    if numba_config.DISABLE_JIT:
+        return function
+    found = Lean(function, targetoptions={"nopython": True, "nogil": nogil})
+    if signature is not None:
+        found.compile(signature)
+        found.disable_compile()
+    return found
+
+
+class Compiled(Lean):
+    """A function that is compiled when a signature is first asked for, or read back from the store.
+
+    Args:
+        function: in Python.
+        locals: types of its variables, for numba.
+        targetoptions: of numba.
+        declared: the only signatures that it may be compiled for; those of a call if none are given.
+    """
+
+    def __init__(
+        self, function: Callable[..., Any], locals: Any = None, targetoptions: Any = None,
+        *, declared: Sequence[Any] = (),
+    ) -> None:  # fmt: skip
+        super().__init__(function, locals, {"nopython": True, **(targetoptions or {})})
+        self._cache = _Overloads(self)
+        self.declared = {tuple(signature.args): signature for signature in declared}
+        self.frozen_values: list[Any] | None = None
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature, or read the code back."""
+        args, _ = sigutils.normalize_signature(sig)
+        existing = self.overloads.get(tuple(args))
+        if existing is not None:
+            return existing.entry_point
+        if self.declared and tuple(args) not in self.declared:
+            raise TypeError(f"{self.py_func.__qualname__} is not declared for ({', '.join(map(str, args))})")
+        with global_compiler_lock, self._marked() as name:  # the order of the locks is the same in all threads
+            store = code_store.current() if name else None
+            sig = self.declared.get(tuple(args), sig)
+            if store is None:
+                return super().compile(sig)
+            key = self._cache.key(name, sig)
+            with store.alone(key):
+                return super().compile(sig)
+
+    @contextmanager
+    def _marked(self) -> Iterator[str]:
+        """Put the digest of what is read into the function's name while it is compiled; empty if there is none.
+
+        The names of machine code come from it: two versions of one function, compiled in two processes and read back
+        by a third, would have the same one, and the linker would take either for both.
+        """
+        plain = self.py_func.__qualname__
+        try:
+            found = "" if changed(self) or not _has_home(self.py_func) else fingerprint(self.py_func)
+            if not self.overloads:
+                self.frozen_values = frozen_values(self.py_func)
+        except Unreadable:
+            found = ""
+        self.py_func.__qualname__ = f"{plain}_{found[:16]}" if found else plain
+        self._cache.content = found
+        try:
+            yield found
+        finally:
+            self.py_func.__qualname__ = plain
+
+    def get_compile_result(self, sig: Any) -> CompileResult:
+        """Return what was compiled for a signature, compiling it if need be."""
+        self.compile(tuple(sig.args))
+        return self.overloads[tuple(sig.args)]
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Tell the type inference of a caller which signatures there are."""
+        if not self.declared:
+            return super().get_call_template(args, kws)
+        pysig, args = self._compiler.fold_argument_types(args, kws)
+        if tuple(args) in self.declared:
+            self.compile(tuple(args))
+        name = self.py_func.__name__
+        signatures = self.nopython_signatures
+        template = typing.make_concrete_template(f"CallTemplate({name})", key=name, signatures=signatures)
+        return template, pysig, args, {}
+
+    def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
+        """Answer a call for which nothing is compiled: a declared signature, or one with numbers of another type."""
+        if not self.declared:
+            return super()._compile_for_args(*args, **kws)
+        kinds = [self.typeof_pyval(arg) for arg in args]
+        if tuple(kinds) in self.declared:
+            return self.compile(tuple(kinds))
+        for wanted in self.overloads:
+            if len(wanted) == len(kinds) and all(map(_converts, kinds, wanted)):
+                return self.overloads[wanted].entry_point
+        self._types_active_call.clear()
+        return self._explain_matching_error(*args, **kws)
+
+
+def _has_home(function: Any) -> bool:
+    """Whether another process finds the module that code names; what `exec` makes may have none."""
+    return function.__globals__.get("__name__") == function.__module__ and function.__module__ in sys.modules
+
+
+def _converts(given: Any, wanted: Any) -> bool:
+    """Whether a value is unboxed as it is wanted: the same type, or a real number for a floating-point one."""
+    return bool(given == wanted or (wanted == types.float64 and isinstance(given, (types.Integer, types.Float))))
+
+
+class _Overloads:
+    """The store, as numba's dispatcher asks for it."""
+
+    def __init__(self, dispatcher: Compiled) -> None:
+        self._dispatcher = dispatcher
+        self.content = ""
+        self.cache_path = ""
+
+    def key(self, content: str, sig: Any) -> str:
+        """Return the name of a file: readable, then a digest of all that the code depends on."""
+        function, options = self._dispatcher.py_func, sorted(self._dispatcher.targetoptions.items())
+        what = (str(function.__module__), function.__qualname__, content, str(sig), repr(options), *_machine())
+        digest = hashlib.sha256("\0".join(what).encode("utf-8", "surrogatepass")).hexdigest()[:32]
+        return f"{re.sub(r'[^A-Za-z0-9_.-]', '', function.__name__)[:40]}-{digest}"
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """Return what was kept for a signature; None if nothing was, or if it cannot be used."""
+        store = code_store.current() if self.content else None
+        if store is None:
+            return None
+        target_context.refresh()
+        key = self.key(self.content, sig)
+        data = store.read(key)
+        if data is None:
+            return None
+        try:
+            return CompileResult._rebuild(target_context, *pickle.loads(data))
+        except Exception as error:
+            # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
+            store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
+            return None
+
+    def save_overload(self, sig: Any, result: CompileResult) -> None:
+        """Keep what was compiled, unless it holds addresses of this process."""
+        store = code_store.current() if self.content else None
+        if store is None or result.library.has_dynamic_globals or any(not part.can_cache for part in result.lifted):
+            return
+        store.write(self.key(self.content, sig), dumps(result._reduce()))
+
+    def flush(self) -> None:
+        """Forget nothing: what is stale has another key."""
+
+
+@cache
+def _machine() -> tuple[str, ...]:
+    """What the code depends on beside the function: versions, processor, settings of numba."""
+    target = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+    settings = [f"{name}={getattr(numba_config, name, None)}" for name in _SETTINGS]
+    return (numba.__version__, llvmlite.__version__, platform.python_version(), str(target), *settings)
+
+
+def compiled(function: Callable[..., Any], signatures: Any = (), *, lazy: Any = (), nogil: bool = False) -> Any:
+    """Compile a function and keep the code on disk.
+
+    Args:
+        function: in Python.
+        signatures: compiled for at once; without them the function is typed where it is used.
+        lazy: signatures that it is compiled for when they are first asked for.
+        nogil: threads may run it side by side.
+    """
+    if numba_config.DISABLE_JIT:
+        return function
+    options = {"error_model": "numpy", "nogil": nogil} | ({"boundscheck": True} if debugging() else {})
+    found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy))
+    for signature in signatures:
+        found.compile(signature)
+    if signatures and not lazy:
+        found.disable_compile()  # numba converts arguments, such as functions, only where nothing is left to compile
+    return found
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Make a function part of whatever compiled function calls it.
+
+    A compiled function carries all that it calls, optimised anew: what is called from one place, or is short, is
+    therefore written out there, and only the few parts that many places share are compiled on their own.
+    """
+    return numba.njit(inline="always", error_model="numpy")(function)
