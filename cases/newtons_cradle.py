@@ -47,13 +47,13 @@ PARAMETERS = {
 VARIANTS: dict[str, dict[str, Value]] = {
     "sliders": {},
     "pendulums": {},
-    "unequal": {"masses": "0.4,0.3,0.2,0.1,0.05", "gap": 0.01},  # apart: none collides before the last has parted
+    "unequal": {"masses": "0.4,0.3,0.2,0.1,0.05", "gap": 0.01, "collisions": "resolved"},
 }
 
 _TITLES = {
     "sliders": "balls on a line without gravity: the collision problem alone",
     "pendulums": "pendulums side by side, the leftmost let go",
-    "unequal": "balls on a line, each lighter than the one before: every pair has a reduced mass of its own",
+    "unequal": "balls on a line, each lighter than the one before, so far apart that pairs collide one by one in time",
 }
 _MECHANISMS = {"unequal": "sliders"}
 """Of the variants that are not named after theirs."""
