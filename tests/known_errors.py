@@ -13,7 +13,7 @@ from crossbody import engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.reports.judging.truth import Truth, from_run, sample_times
-from crossbody.reports.metrics._contacts import AT_REST, CLOSED
+from crossbody.reports.metrics._contacts import AT_REST, CLOSED, LIGHT
 
 OFF = 1e-3
 """Size of an error, over what it is measured by."""
@@ -131,6 +131,20 @@ def off_its_surface(s: Scene) -> tuple[Trajectory, float]:
     near, by = AT_REST * max(1.0, np.abs(s.run.q).max()), OFF * np.abs(s.run.gap).max()
     run = changed(s.run, "gap", (s.at(event.t), event.contact), s.sign() * (near + by))
     return run, by / np.abs(np.diff(run.gap[:, event.contact])).max()
+
+
+def pushing_as_it_lets_go(s: Scene) -> tuple[Trajectory, float]:
+    """One row that is let go, below its surface and by itself, while it pushes by a part of the longest step's way."""
+    t = [e.t for e in s.run.events]
+    below = [
+        (e, gap) for e in s.run.events if e.before in CLOSED and e.after not in CLOSED and t.count(e.t) == 1
+        if (gap := abs(s.run.gap[s.at(e.t)[0], e.contact])) > OFF * np.abs(np.diff(s.run.gap[:, e.contact])).max()
+    ]  # fmt: skip
+    event, gap = below[s.one(range(len(below)))]
+    by = 0.1 * OFF * np.abs(s.run.lam).max()
+    light = LIGHT * max(1.0, np.abs(s.run.lam).max())
+    run = changed(s.run, "lam", (s.at(event.t)[0], event.contact), s.sign() * (light + by), whole=True)
+    return run, by / np.abs(np.diff(run.lam[:, event.contact])).max()
 
 
 def of_all(signal: str) -> Scale:
@@ -380,6 +394,8 @@ ERRORS: dict[str, tuple[str, Known]] = {
     "complementarity of an open row": ("box", acting),
     "event_gap": ("box", off_its_surface),
     "event_gap of one row": ("linear ball", off_its_surface),
+    "event_gap of a row that lets go": ("linear ball", pushing_as_it_lets_go),
+    "event_gap of rows that let go": ("box", pushing_as_it_lets_go),
     "event_times": ("box", later),
     "event_times of one row": ("linear ball", later),
     "mode_times": ("box", handed),

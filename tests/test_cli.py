@@ -15,8 +15,11 @@ import pytest
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory, UnknownName
+from crossbody.reports.bench import measure
+from crossbody.reports.bench.ladder import Effort
 from crossbody.reports.cli import main
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.runs import watch
 
 
 @dataclass
@@ -204,3 +207,30 @@ def test_a_case_file_that_cannot_be_imported_is_wrong_use(text, line, what, rela
     assert f"broken_case.py, line {line}." in said
     assert said.count("\n") == 1
     assert "fault of crossbody" not in said
+
+
+LINEAR = ("bouncing_ball", "--variant", "linear", "-e", "fake:exact", "--time-limit", "70")
+
+
+def test_a_run_may_take_the_seconds_that_are_asked_for_and_a_truth_three_times_those(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given: dict[str, float] = {}
+    monkeypatch.setattr(watch, "limited", lambda label, seconds: given.update({label: seconds}))
+    assert call("run", *LINEAR) == 0
+    assert given == {"bouncing_ball:linear: truth": 210.0, "bouncing_ball:linear: fake:exact": 70.0}
+
+
+def test_a_benchmark_may_take_the_seconds_and_minutes_that_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of its share of the minutes an engine has to climb its ladder, and for its largest rung a quarter."""
+    given: list[tuple[float, Effort]] = []
+
+    def bench(case: Case, picks: Any, effort: Effort, tell: Any, limit: float) -> pd.DataFrame:
+        given.append((limit, effort))
+        return pd.DataFrame()
+
+    monkeypatch.setattr(measure, "bench", bench)
+    asked = ("bench", *LINEAR, "--full", "--minutes", "0.1")
+    assert call(*asked) == call(*asked, "-e", "fake:off") == 2  # nothing was measured
+    assert [limit for limit, _ in given] == [70.0, 70.0]
+    assert [(e.climb, e.longest) for _, e in given] == [pytest.approx((3.0, 1.5)), pytest.approx((1.5, 0.75))]

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from mechanisms import ball, sliders
+from many_contacts import tower
+from mechanisms import _oscillator_gaps, _oscillator_rows, ball, sliders
 
 from crossbody.cases import Mode, Outcome
 from crossbody.reference import System, kernels, simulate
@@ -95,3 +96,45 @@ def test_rows_without_memory_that_rest_on_each_other_do_not_flicker(n: int, lift
     block = 2.0 * lifted / n
     assert run.outcome.ok, run.message
     np.testing.assert_allclose(run.v[-1], [block - 1.0] * lifted + [block] * (n - lifted), atol=1e-9)
+
+
+SOLVERS = ("compiled", "cvode", "ida")
+
+
+@kernels.dynamics
+def _pushed(t, q, v, u, p, M, f, w):
+    M[0, 0] = 1.0
+    f[0] = u[0] - p[0] * q[0]
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_row_from_which_its_load_is_taken_stays_on_it_until_it_is_lifted(solver: str) -> None:
+    """Its multiplier is nothing but rounding, of either sign, for half of the run: that neither pulls nor releases."""
+    for seed in range(12):
+        stiffness, wall, press = np.random.default_rng([19, seed]).uniform(0.5, 20.0, 3)
+        a0, still = 10.0 ** (2.0 + 0.5 * seed), stiffness * wall
+        system = System(
+            n=1, inputs=1, parameters=[stiffness, wall], a0=[a0], a1=[2.0 * a0**0.5], dynamics=_pushed,
+            gaps=_oscillator_gaps, rows=_oscillator_rows,
+        )  # fmt: skip
+        inputs = ([0.0, 0.1, 0.2], [[still - press], [still], [still + press]])
+        run = simulate(system, [wall], [0.0], 0.25, solver=solver, inputs=inputs)
+        assert [e.t for e in run.events[:2]] == [0.0, pytest.approx(0.2, abs=1e-12)], seed
+        assert [e.after for e in run.events].count(Mode.CONTACT) == 1, seed
+
+
+@pytest.mark.parametrize("collisions", ["sequential", "resolved"])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_bodies_that_touch_and_fall_side_by_side_do_not_meet(solver: str, collisions: str) -> None:
+    """Rounding opens and closes their gaps, and presses: with stiff laws and weak ones, in weak fields and strong."""
+    for seed in range(8):
+        rng = np.random.default_rng([20, seed])
+        gravity, b0, n = 10.0 ** rng.uniform(0.0, 6.0), 10.0 ** rng.uniform(0.0, 8.0), int(rng.integers(2, 6))
+        falling = tower(rng.uniform(0.1, 7.0, n).tolist(), gravity, b0, zeta=rng.choice([0.0, 0.3]))
+        height = rng.uniform(1.0, 30.0)
+        time = np.sqrt(height / gravity)
+        start = [height] * n, [-0.1 * height / time] * n
+        run = simulate(falling, *start, time, solver=solver, collisions=collisions)
+        assert run.outcome.ok, (seed, run.message)
+        assert not run.events, seed
+        assert run.q[-1] == pytest.approx(np.full(n, 0.4 * height), rel=1e-6)

@@ -12,10 +12,11 @@ import pytest
 from rig_data import PENDULUM, channels, log_of, needs_pendulum
 
 from crossbody import engines, hw
-from crossbody.cases import Limit
+from crossbody.cases import InvalidValue, Limit
 from crossbody.hw.models._contract import Segment
 from crossbody.reports.cli import main
 from crossbody.reports.replay.comparison import verdicts
+from crossbody.reports.runs import watch
 
 MODEL = ["--model", "double_pendulum", "--columns", "multiarm_double"]
 
@@ -227,3 +228,23 @@ def test_an_identification_that_is_stopped_is_told_and_outside(
     told = json.loads(capsys.readouterr().out)
     assert [row["identifiable"] for row in told["identify"]] == [False]
     assert "Stopped at the time limit of 1e-06 s" in told["warnings"][0]["text"]
+
+
+def test_a_replay_may_take_the_seconds_that_are_asked_for_and_an_identification_is_given_them(
+    two_frictions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its process has twice those and two seconds more: it stops by itself before."""
+    given: list[float] = []
+
+    def identify(*_: object, time_limit: float, **__: object) -> None:
+        given.append(time_limit)
+        raise InvalidValue("asked enough")
+
+    monkeypatch.setattr(watch, "limited", lambda label, seconds: given.append(seconds))
+    asked = (two_frictions, *ONE, "--time-limit", "70", "--out")
+    assert code("replay", *asked, tmp_path / "one", "-e", "reference") == 0
+    assert set(given) == {70.0}
+    given.clear()
+    monkeypatch.setattr(hw, "identify", identify)
+    assert code("identify", *asked, tmp_path / "two", "-f", "k1") == 2
+    assert given == [142.0, 70.0]

@@ -44,12 +44,19 @@ PARAMETERS = {
     ),
 }  # fmt: skip
 
-VARIANTS: dict[str, dict[str, Value]] = {"sliders": {}, "pendulums": {}}
+VARIANTS: dict[str, dict[str, Value]] = {
+    "sliders": {},
+    "pendulums": {},
+    "unequal": {"masses": "0.4,0.3,0.2,0.1,0.05", "gap": 0.01, "collisions": "resolved"},
+}
 
 _TITLES = {
     "sliders": "balls on a line without gravity: the collision problem alone",
     "pendulums": "pendulums side by side, the leftmost let go",
+    "unequal": "balls on a line, each lighter than the one before, so far apart that pairs collide one by one in time",
 }
+_MECHANISMS = {"unequal": "sliders"}
+"""Of the variants that are not named after theirs."""
 _UNITS = {"sliders": "m", "pendulums": "rad"}
 PENDULUMS_S = 5.0
 
@@ -65,9 +72,9 @@ def horizon(balls: Row, motion: Motion) -> float:
     return 2.0 * motion.last + 4.0 * balls.n * contact + balls.gap / balls.speed
 
 
-def _start(variant: str, balls: Row, parameters: Mapping[str, Value]) -> tuple[Floats, Floats]:
+def _start(mechanism: str, balls: Row, parameters: Mapping[str, Value]) -> tuple[Floats, Floats]:
     """(q0, v0), each (n,)."""
-    if variant == "sliders":
+    if mechanism == "sliders":
         return np.zeros(balls.n), balls.v0
     return np.where(np.arange(balls.n) < balls.lifted, float(parameters["angle"]), 0.0), np.zeros(balls.n)
 
@@ -83,21 +90,22 @@ def _claims(balls: Row, rule: str) -> tuple[Claim, ...]:
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene with its truth; sliders under a frozen rule move in straight lines between impacts."""
-    balls, rule = row(parameters, variant), str(parameters["collisions"])
-    sliders = variant == "sliders"
+    mechanism = _MECHANISMS.get(variant, variant)
+    balls, rule = row(parameters, mechanism), str(parameters["collisions"])
+    sliders = mechanism == "sliders"
     motion = Motion(balls, rule if rule in FROZEN else FROZEN[0])
     t_end = parameters["t_end"]
     if t_end == AUTO:
         t_end = horizon(balls, motion) if sliders else PENDULUMS_S
-    q0, v0 = _start(variant, balls, parameters)
+    q0, v0 = _start(mechanism, balls, parameters)
     claims = _claims(balls, rule)
     return Case(
         name="newtons_cradle",
         variant=variant,
         title=_TITLES[variant],
-        mechanism=variant,
+        mechanism=mechanism,
         parameters={**parameters, "t_end": t_end},
-        coordinates=tuple(Coordinate(name=f"ball {i}", unit=_UNITS[variant]) for i in range(balls.n)),
+        coordinates=tuple(Coordinate(name=f"ball {i}", unit=_UNITS[mechanism]) for i in range(balls.n)),
         contacts=tuple(f"balls {i} and {i + 1}" for i in range(balls.n - 1)),
         q0=q0,
         v0=v0,
@@ -106,6 +114,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         collisions=rule,
         closed_form=motion if sliders and rule in FROZEN else None,
         claims=claims,
-        limits=limits(variant, rule, balls.gap, claims),
+        limits=limits(mechanism, rule, balls.gap, claims),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

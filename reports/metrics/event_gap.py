@@ -1,45 +1,61 @@
-"""Gaps where rows touch, or come free from below, by the recorded events, in ways of one step: zero where located.
+"""Gaps where rows touch, come free or let go, by the recorded events, in ways of one step: zero where located.
 
 It holds a run against itself, so that it judges engines that follow another law as well.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.reports.metrics._contacts import AT_REST, CLOSED
+from crossbody.reports.metrics._contacts import AT_REST, CLOSED, LIGHT
 from crossbody.reports.metrics._equations import equations
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Event, Trajectory
     from crossbody.cases.arrays import Floats
+    from crossbody.reference import System
     from crossbody.reports.judging.truth import Truth
 
 UNIT = "1"
 CLAIMED = False
+SAME = 1e-12
+"""Part of the horizon within which two instants are one."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |gap| of unilateral rows at touches and at the end of BALLISTIC, over the row's longest way between samples.
 
-    Only what is beyond the errors of a row at its surface counts. A start in contact is left out. None without rows
-    that open, and where gaps depend on discrete variables; NaN where an event has no instant.
+    Where a row lets go its multiplier over its own longest way counts as well, and of both the smaller: laws without
+    memory let go at the surface whatever pushes there. Left out are those at whose instant something else happens, by
+    which a multiplier may jump through zero, and a start in contact. Only what is beyond the errors of a row at its
+    surface counts. None without rows that open, and where gaps depend on discrete variables; NaN where an event has no
+    instant.
     """
     system = equations(case)
     if not case.law.unilateral.any() or len(run.t) < 2 or (system is not None and system.jumps):
         return None
-    way = np.max(np.abs(np.diff(run.gap, axis=0)), axis=0)
-    near = AT_REST * max(1.0, float(np.max(np.abs(run.q))))
-    found = [0.0]
+    near, light = AT_REST * _size(run.q), LIGHT * _size(run.lam)
+    alone, found = _alone(run, case, system), [0.0]
     for event in run.events:
         row = event.contact
-        if case.law.unilateral[row] and _at_surface(event) and not event.t <= run.t[0]:
-            gap = abs(_at(run.t, run.gap[:, row], event.t))
-            found.append(0.0 if gap <= near else (gap - near) / max(float(way[row]), near))
+        if not case.law.unilateral[row] or event.t <= run.t[0]:
+            continue
+        gap = _ways(run.t, run.gap[:, row], event.t, near)
+        if _at_surface(event) or np.isnan(gap):
+            found.append(gap)
+        elif gap > 0.0 and event.before in CLOSED and event.after not in CLOSED and alone(event.t):
+            push = _ways(run.t, run.lam[:, row], event.t, light)
+            found.append(0.0 if np.isnan(push) else min(gap, push))
     return float(np.max(found))
+
+
+def _size(signal: Floats) -> float:
+    """Return the largest value, and at least 1."""
+    return max(1.0, float(np.nanmax(np.abs(signal), initial=0.0)))
 
 
 def _at_surface(event: Event) -> bool:
@@ -48,7 +64,29 @@ def _at_surface(event: Event) -> bool:
     return touches or (event.before, event.after) == (Mode.BALLISTIC, Mode.FREE)
 
 
-def _at(t: Floats, signal: Floats, instant: float) -> float:
-    """Value of a signal (n,) at an instant, by a straight line where no sample stands."""
+def _alone(run: Trajectory, case: Case, system: System | None) -> Callable[[float], bool]:
+    """Return whether nothing but one event happens at an instant: no other row, no switch, no change of an input."""
+    same, events = SAME * case.t_end, np.sort([event.t for event in run.events])
+    given = [inputs.times for inputs in (case.inputs, run.inputs) if inputs is not None]
+    others = np.sort(np.concatenate([[switch.t for switch in run.switches], *given]))
+    tick = system.tick if system is not None and system.control is not None else 0.0
+
+    def count(instants: Floats, t: float) -> int:
+        return int(np.diff(np.searchsorted(instants, (t - same, t + same)))[0])
+
+    def alone(t: float) -> bool:
+        ticks = tick > 0.0 and abs(t - tick * round(t / tick)) <= same
+        return count(events, t) <= 1 and count(others, t) == 0 and not ticks
+
+    return alone
+
+
+def _ways(t: Floats, signal: Floats, instant: float, nothing: float) -> float:
+    """Size of a signal (n,) at an instant beyond `nothing`, over its longest way between samples.
+
+    It is read by a straight line where no sample stands, and before what happens there where two do.
+    """
     i = int(np.searchsorted(t, instant, side="left"))
-    return float(signal[i]) if i < len(t) and t[i] == instant else float(np.interp(instant, t, signal))
+    there = float(signal[i]) if i < len(t) and t[i] == instant else float(np.interp(instant, t, signal))
+    way = float(np.max(np.abs(np.diff(signal))))
+    return 0.0 if abs(there) <= nothing else (abs(there) - nothing) / max(way, nothing)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from crossbody.cases import peer_limits
 from crossbody.cases.case import Claim, Limit
 
 TOGETHER = (
@@ -88,23 +87,23 @@ _STEP: Mapping[tuple[str, str], tuple[float, str]] = {
 """Sliders: largest error of position against the equations that an engine really follows (twice what was measured)."""
 
 
-def limits(variant: str, rule: str, gap: float, claims: Iterable[Claim]) -> tuple[Limit, ...]:
-    """The limits of one variant under one rule.
+def limits(mechanism: str, rule: str, gap: float, claims: Iterable[Claim]) -> tuple[Limit, ...]:
+    """The limits of one mechanism under one rule.
 
     Args:
-        variant: "sliders" or "pendulums".
+        mechanism: "sliders" or "pendulums".
         rule: for several contacts.
         gap: between neighbours at rest, m; 0 where they touch.
         claims: what the case claims: each is a count.
     """
     counts = {claim.metric: (0.0, "a count") for claim in claims}
-    return tuple(_all(variant, rule, {**_bounds(variant, rule, gap), **counts}))
+    return tuple(_all(mechanism, rule, {**_bounds(mechanism, rule, gap), **counts}))
 
 
-def _bounds(variant: str, rule: str, gap: float) -> Bounds:
+def _bounds(mechanism: str, rule: str, gap: float) -> Bounds:
     if rule == "resolved":
         return _RESOLVED if gap > 0.0 else _TOUCHING
-    bounds = _SLIDERS if variant == "sliders" else _PENDULUMS
+    bounds = _SLIDERS if mechanism == "sliders" else _PENDULUMS
     if rule == "sequential":
         return bounds
     # Whether a row that passes an impulse on without having closed counts as a touch is a matter of convention.
@@ -113,13 +112,13 @@ def _bounds(variant: str, rule: str, gap: float) -> Bounds:
     return kept | ({"pattern_simultaneous": pattern} if gap == 0.0 else {})  # apart, not all collide at once
 
 
-def _all(variant: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
+def _all(mechanism: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
     for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
     for (engine, profile), known in _OTHERS[rule].items():
         yield Limit(metric="*", engine=engine, profile=profile, known=known)
     yield Limit(metric="momentum", value=1e-10, why=_KEPT)
-    if variant == "sliders":
+    if mechanism == "sliders":
         yield from peer_limits.sliders(bounds)
         for (engine, profile), (value, why) in _STEP.items():
             yield Limit(metric="largest position (step)", value=value, engine=engine, profile=profile, why=why)
