@@ -1,4 +1,4 @@
-"""Rows of a planar loop that follow from others: held by these, they are judged as what is always on."""
+"""Rows that follow from others: of a planar loop, and those that share a load, of which the sum alone is unique."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from four_bars import four_bar
 
-from crossbody import engines
-from crossbody.cases import Mode, Tier
+from crossbody import cases, engines
+from crossbody.cases import Case, Mode, Tier
+from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
+from crossbody.engines.pinocchio._joined import none_pulling
 from crossbody.reports import metrics
 from crossbody.reports.judging.modes import violated
 from crossbody.reports.judging.truth import from_run
@@ -39,3 +41,55 @@ def test_rows_that_others_hold_are_no_contacts_and_no_unknown_numbers(seed: int,
     met = {contact.row for contact in metrics.load("touch_count").contacts(run, True)}
     assert all(case.law.unilateral[row] for row in met), "what is always on touches nothing"
     assert violated(case, run, RTOL) == ()
+
+
+def standing(apart: float) -> Case:
+    """A body that may tip and sink, on two balls that are so far apart, m."""
+    body = Body(name="body", mass=2.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+    joints = tuple(Joint(name=kind, body="body", type=kind, axis=axis)
+                   for kind, axis in (("slide", (0.0, 0.0, 1.0)), ("hinge", (0.0, 1.0, 0.0))))  # fmt: skip
+    floor = Shape(name="floor", type="plane")
+    balls = [Shape(name=f"ball {x}", body="body", type="sphere", size=(0.1, 0.0, 0.0), position=(x, 0.0, 0.0))
+             for x in (-0.5 * apart, 0.5 * apart)]  # fmt: skip
+    law = RowLaw(a0=1e3, a1=60.0)
+    pairs = tuple(Pair(name=ball.name, first="floor", second=ball.name, law=law) for ball in balls)
+    scene = Scene(bodies=(body,), joints=joints, shapes=(floor, *balls), pairs=pairs, gravity=(0.0, 0.0, -9.81))
+    return cases.from_scene(scene, q0=[0.101, 0.0], t_end=0.3)
+
+
+@pytest.mark.parametrize(("apart", "unique"), [(1e-12, False), (1e-8, False), (1e-3, True), (0.3, True)])
+def test_a_load_may_be_shared_in_any_way_where_that_exerts_nothing(apart: float, unique: bool) -> None:
+    """What moves from one ball to the other is an error of the law where the two balls can be told apart, else none."""
+    case = standing(apart)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-11).run()
+    measure = metrics.load("law_residual").measure
+    closed = (run.mode == Mode.CONTACT).all(axis=1)
+    assert closed.any()
+    assert (run.counts.get("redundant", 0) > 0) != unique
+
+    def off(*change: float) -> float:
+        value = measure(from_run(run, Tier.D, "itself"), replace(run, lam=run.lam + closed[:, None] * change), case)
+        assert value is not None
+        return float(value)
+
+    size = 1e-3 * float(run.lam.max())
+    assert off(0.0, 0.0) <= 1e-6
+    assert (off(size, -size) <= 1e-6) != unique
+    assert off(size, 0.0) >= 4e-4, "the load itself is another"
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_multipliers_that_do_not_pull_exert_the_same_forces(seed: int) -> None:
+    """Of rows of any rank, from multipliers that push; they are no larger than those."""
+    rng = np.random.default_rng(seed)
+    width, count = rng.integers(3, 8), rng.integers(2, 8)
+    rank = rng.integers(1, min(width, count) + 1)
+    J = rng.normal(size=(count, rank)) @ rng.normal(size=(rank, width))
+    J = np.abs(J) if rng.random() < 0.5 else J
+    one_sided = rng.random(count) < 0.8
+    pushing = np.where(one_sided, 10.0 ** rng.uniform(-6.0, 3.0, count), rng.normal(size=count))
+    pushing *= rng.random(count) < 0.7
+    found = none_pulling(np.linalg.pinv(J.T, rcond=1e-9) @ (J.T @ pushing), J, one_sided)
+    assert np.abs(J.T @ (found - pushing)).max() <= 1e-11 * np.abs(J.T @ pushing).max(initial=0.0)
+    assert found[one_sided].min(initial=0.0) >= -1e-12 * np.abs(found).max()
+    assert np.linalg.norm(found) <= (1.0 + 1e-9) * np.linalg.norm(pushing)

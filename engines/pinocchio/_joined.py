@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
-from crossbody.engines.pinocchio._rows import Solve, mass_matrix, point_jacobian, pose
+from crossbody.engines.pinocchio._rows import ROUNDING, Solve, mass_matrix, point_jacobian, pose
 
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
@@ -305,20 +305,20 @@ def none_pulling(lam: Floats, J: Floats, one_sided: Sequence[bool]) -> Floats:
     Returns:
         They (na,), or `lam` where there are none: rows have to let go.
     """
-    U, s, Vt = np.linalg.svd(J.T)
-    rank = int((s > DEPENDENT * s[0]).sum())
-    several = np.abs(Vt[rank:]).max(axis=0, initial=0.0) > DEPENDENT
-    # The multiplier of any other row is unique: it may be as small as it likes beside these.
-    lam, own, pushing = lam.copy(), lam[several], np.asarray(one_sided)[several]
-    bounds = np.eye(len(own))[pushing]
-    B = U[:, :rank].T @ J.T[:, several]
-    size = float(np.abs(B @ own).max(initial=0.0)) or 1.0
-    G, h = np.vstack([bounds, B, -B]), np.concatenate([np.zeros(len(bounds)), B @ own / size, -(B @ own) / size])
-    E, target = np.vstack([G.T, h]), np.append(np.zeros(len(own)), 1.0)
+    _, s, Vt = np.linalg.svd(J.T)
+    free = Vt[int((s > DEPENDENT * s[0]).sum()) :].T  # what multipliers may change by without another force
+    # The multiplier of a row that none of these has is unique: it may be as small as it likes beside the others.
+    pushing = np.asarray(one_sided) & (np.abs(free).max(axis=1, initial=0.0) > DEPENDENT)
+    least = lam - free @ (free.T @ lam)
+    G, h = free[pushing], -least[pushing] - ROUNDING * np.abs(least).max(initial=0.0)
+    size = float(h.max(initial=0.0))
+    if size <= 0.0:
+        return lam
+    E, target = np.vstack([G.T, h / size]), np.append(np.zeros(free.shape[1]), 1.0)
     found, off = nnls(E, target)  # the least x with G x >= h: Lawson and Hanson 1974, ch. 23
     if off < NO_SUCH:
         return lam
-    rest = E @ found - target
-    least: Floats = -rest[:-1] / rest[-1] * size
-    lam[several] = np.where(pushing, np.maximum(least, 0.0), least)
-    return lam
+    tight = found > 0.0  # to rounding, where nnls is to a tolerance
+    shifted: Floats = least + free @ np.linalg.lstsq(G[tight], h[tight], rcond=DEPENDENT)[0]
+    shifted[pushing] = np.maximum(shifted[pushing], 0.0)
+    return shifted

@@ -4,8 +4,8 @@ The residual of the law (docs/explanation, contact law), recomputed by us from q
 
     (H M^-1 H^T) lam = -(H M^-1 f + H'v + a1 h' + a0 h + a2 h^3)
 
-on the rows that the run has closed, with b0 and b1 where they are in COLLISION. It tells an engine that follows another
-law from one that follows this one.
+on the rows that the run has closed, with b0 and b1 where they are in COLLISION; of rows that depend on each other the
+part that exerts a force. It tells an engine that follows another law from one that follows this one.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 UNIT = "1"
 CLAIMED = False
 NEEDS = "lam"
+DEPENDENT = 1e-10
+"""Eigenvalue of H M^-1 H^T, rows scaled to 1 there, over the largest: below it rows depend on each other, as in the
+reference. What such rows carry together is unique, how they share it is not."""
 
 
 def multipliers(
@@ -43,7 +46,21 @@ def multipliers(
     fast: NDArray[np.bool_],
     inputs: Inputs | None = None,
 ) -> tuple[Floats, Floats]:
-    """H (m, n) of some rows, and lam (m,) that the law asks for with them active, `fast` with those of COLLISION."""
+    """Multipliers that the law asks for with some rows active, and what makes of any the part that exerts a force.
+
+    Args:
+        system: the equations.
+        case: with the law.
+        t: instant, s.
+        q: positions (nq,).
+        v: velocities (n,).
+        rows: active ones (m,).
+        fast: which of all rows are in COLLISION.
+        inputs: those that act; the case's if not given.
+
+    Returns:
+        lam (m,), and a projection (m, m).
+    """
     acting = case.inputs if inputs is None else inputs
     M, f = system.terms(q, v, u=None if acting is None else acting.at(t), t=t)
     H, h, Hdv = (part[rows] for part in system.constraint(q, v))
@@ -52,14 +69,15 @@ def multipliers(
     a2 = np.where(fast, 0.0, law.a2)[rows]
     wanted = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
     inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
-    found = np.linalg.lstsq(H @ inverse[:, 1:], -(H @ inverse[:, 0] + wanted), rcond=None)[0]
-    return H, np.asarray(found, dtype=np.float64)
-
-
-def moving_part(H: Floats, lam: Floats) -> Floats:
-    """Return the part of multipliers (m,) of rows H (m, n) that exerts a force: all, if none depends on others."""
-    part: Floats = H @ (np.linalg.pinv(H) @ lam)
-    return part
+    G = H @ inverse[:, 1:]
+    size = np.sqrt(np.diag(G))
+    size[size == 0.0] = 1.0
+    values, ways = np.linalg.eigh(G / np.outer(size, size))
+    kept = values > DEPENDENT * values[-1]
+    values, ways = values[kept], ways[:, kept]
+    found: Floats = -ways @ (ways.T @ ((H @ inverse[:, 0] + wanted) / size) / values) / size
+    moving: Floats = (ways @ ways.T) * size / size[:, None]
+    return found, moving
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -83,7 +101,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     worst, scale = 0.0, 0.0
     for i in spread(run, looked):
         rows = np.flatnonzero(closed[i])
-        H, lam = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, run.mode[i] == Mode.COLLISION, inputs)
-        worst = max(worst, float(np.max(np.abs(moving_part(H, run.lam[i, rows] - lam)))))
+        fast = run.mode[i] == Mode.COLLISION
+        lam, moving = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, fast, inputs)
+        worst = max(worst, float(np.max(np.abs(moving @ (run.lam[i, rows] - lam)))))
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / scale if scale else None
