@@ -15,7 +15,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from crossbody.cases.arguments import shown
+from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import SceneError
 
 Vector = tuple[float, ...]
@@ -26,6 +29,8 @@ WIDTHS = {"free": (7, 6), "ball": (4, 3), "slide": (1, 1), "hinge": (1, 1)}
 """Coordinates and velocities of every type of joint."""
 LARGEST = 10_000
 """Bodies of one scene."""
+FLAT = 1e-6
+"""Part of its length that is the least thickness of a hull: files have corners in single precision."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,8 +185,9 @@ class Shape(_Named):
 
     Attributes:
         body: whose; empty for the world.
-        type: sphere, capsule, cylinder, box, ellipsoid or plane.
-        size: as MuJoCo's: radius; radius and half length; half sides; semi-axes, m.
+        type: sphere, capsule, cylinder, box, ellipsoid, plane or hull.
+        size: as MuJoCo's: radius; radius and half length; half sides; semi-axes, m. A hull has none.
+        corners: of a hull (n, 3), m: at least four that do not lie in a plane.
         position, orientation: in body axes.
         friction: sliding, torsional, rolling.
         margin: added to the distance at which a row acts, m.
@@ -194,7 +200,33 @@ class Shape(_Named):
     orientation: Vector = UPRIGHT
     friction: Vector = (1.0, 0.005, 0.0001)
     margin: float = 0.0
+    corners: tuple[Vector, ...] = ()
     sizes: ClassVar[dict[str, int]] = {"size": 3, "position": 3, "orientation": 4, "friction": 3}
+
+    def __post_init__(self) -> None:
+        """Check that a hull, and nothing else, has corners, and that they fill a space."""
+        _Named.__post_init__(self)
+        what = f"Shape {self.name!r}"
+        if (self.type == "hull") != bool(self.corners):
+            raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; a hull alone has them.")
+        found = tuple(_vector(f"{what}: corner {k}", corner, 3) for k, corner in enumerate(self.corners))
+        object.__setattr__(self, "corners", found)
+        if not np.isfinite(found).all():
+            raise SceneError(f"{what} has a corner at infinity; all its corners must be finite.")
+        if found and not _thickness(found) > FLAT:
+            raise SceneError(f"{what} has {len(found)} corners that lie in a plane; a hull has four that do not.")
+
+    @property
+    def extents(self) -> Floats:
+        """What its type needs: of a hull the corners (n, 3), of others the size (3,), m."""
+        return np.array(self.corners or self.size)
+
+
+def _thickness(points: tuple[Vector, ...]) -> float:
+    """Return how thick points are in their thinnest direction, part of the thickest."""
+    spread = np.array(points) - np.mean(points, axis=0)
+    values = np.linalg.svd(spread / max(np.abs(spread).max(), 1e-300), compute_uv=False)
+    return float(values[2] / values[0]) if len(points) > 3 and values[0] > 0.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,11 +14,11 @@ from crossbody.cases.scene import Joint, Pair, Scene, Shape
 PLACES = {
     ("plane", "sphere"): 1, ("plane", "capsule"): 2, ("plane", "cylinder"): 4, ("plane", "box"): 8,
     ("plane", "ellipsoid"): 1, ("sphere", "sphere"): 1, ("sphere", "capsule"): 1, ("sphere", "cylinder"): 1,
-    ("sphere", "box"): 1, ("capsule", "capsule"): 2,
+    ("sphere", "box"): 1, ("capsule", "capsule"): 2, ("plane", "hull"): 256,
 }  # fmt: skip
-"""Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box, lowest and highest
-points of a cylinder's caps, or where it stands four points of its rim;
-of two capsules one, or where they end if they lie along each other."""
+"""Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull, lowest and
+highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end if
+they lie along each other. Of a hull it is the most: each has as many as corners."""
 LEVELLED = 1e-14
 """Sine of the angle between an axis and a plane below which it lies in it: rounding."""
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6
@@ -130,6 +130,13 @@ def _all(scene: Scene) -> Iterator[Contact | Pair]:
         one, two = shapes[pair.first], shapes[pair.second]
         if (one.type, two.type) not in PLACES:
             one, two = two, one
-        places = PLACES.get((one.type, two.type))
-        without = places is None or pair.dimension > 1
-        yield pair if without else Contact(pair=pair, first=one, second=two, places=int(places or 0))
+        places = _places(one, two)
+        yield Contact(pair=pair, first=one, second=two, places=places) if places and pair.dimension == 1 else pair
+
+
+def _places(one: Shape, two: Shape) -> int:
+    """Return at how many places two shapes may meet; 0 where no gap is known, or at more than rows are made for."""
+    most = PLACES.get((one.type, two.type), 0)
+    if two.type != "hull":
+        return most
+    return len(two.corners) if len(two.corners) <= most else 0

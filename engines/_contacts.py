@@ -55,7 +55,7 @@ class _Group:
         kinds: of the first and the second shapes.
         which: places of the contacts in `Contacts.all`.
         one, two: numbers of their shapes.
-        sizes: of both (m, 3).
+        sizes: of both (m, 3), or of hulls (m, places, 3).
         margin, sine (m,): of the pairs; the sine of the angle up to which they lie along each other.
         taken: contact and place in this group of every row that is asked for.
         rows: places of these rows among those asked for.
@@ -90,7 +90,7 @@ class Contacts:
         self._body = np.array([self.bodies.index(shape.body) for shape in shapes.values()], dtype=np.intp)
         self._turned = matrices(np.array([shape.orientation for shape in shapes.values()]).reshape(-1, 4))
         self._position = np.array([shape.position for shape in shapes.values()]).reshape(-1, 3)
-        self._size = np.array([shape.size for shape in shapes.values()]).reshape(-1, 3)
+        self._extents = [shape.extents for shape in shapes.values()]
         self._groups: dict[tuple[int, ...], tuple[_Group, ...]] = {}
         self.turning = [k for k, contact in enumerate(self.all) if contact.parallel > 0.0]
 
@@ -196,10 +196,18 @@ class Contacts:
         mine = [(stands[at[row][0]], at[row][1], i) for i, row in enumerate(wanted) if at[row][0] in stands]
         contact, place, rows = np.array(mine, dtype=np.intp).T
         return _Group(
-            kinds=kinds, which=which, one=one, two=two, sizes=(self._size[one], self._size[two]),
+            kinds=kinds, which=which, one=one, two=two, sizes=(self._sizes(one), self._sizes(two)),
             margin=np.array([pair.pair.margin for pair in pairs]), sine=np.array([pair.parallel for pair in pairs]),
             taken=(contact, place), rows=rows,
         )  # fmt: skip
+
+    def _sizes(self, shapes: Indices) -> Floats:
+        """Return the extents of shapes of one type; the last corner of a hull stands for those that others have more."""
+        found = [self._extents[i] for i in shapes]
+        most = max(len(one) for one in found)
+        return np.array(
+            [np.pad(one, ((0, most - len(one)), (0, 0)), mode="edge") if one.ndim > 1 else one for one in found]
+        )
 
     def _lying(self, group: _Group, at: Pose, by: Pose, along: Mapping[int, bool]) -> NDArray[np.bool_]:
         if not group.sine.any():
@@ -214,7 +222,7 @@ class Contacts:
 
 
 def _sizes(contact: Contact) -> tuple[Floats, Floats]:
-    return np.array(contact.first.size), np.array(contact.second.size)
+    return contact.first.extents, contact.second.extents
 
 
 def _along(contact: Contact, at: Pose, by: Pose) -> bool:

@@ -20,9 +20,11 @@ Places = tuple[Floats, Floats, Floats]
 Truths = NDArray[np.bool_]
 SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in range(8)])
 """Of the corners of a box, in the order of their rows."""
+ROUND = ("box", "capsule", "hull")
+"""Shapes whose places over a plane are points of theirs: corners, or the ends of an axis."""
 UP = np.array([0.0, 0.0, 1.0])
 ENDS = np.array([-1.0, 1.0])[:, None] * UP
-ROUND = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+RIM = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Points of a rim on which a cylinder stands, in the order of their rows."""
 
 
@@ -31,7 +33,7 @@ def meet(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Pos
 
     Args:
         kinds: types of the first and of the second shapes, as in `scene_contacts.PLACES`.
-        sizes: of both (..., 3), as of `Shape`.
+        sizes: of both, `Shape.extents`: (..., 3), or of hulls (..., places, 3).
         at: poses of the first shapes.
         by: poses of the second shapes.
         along: whether capsules lie along each other, or cylinders stand (...), as `lying` says; else not looked at.
@@ -94,6 +96,14 @@ def _over_plane(kind: str, size: Floats, floor: Pose, by: Pose, stands: Truths) 
     return gaps, np.broadcast_to(n[..., None, :], points.shape), points
 
 
+def corners(kind: str, size: Floats) -> Floats:
+    """Return the points (..., places, 3) that shapes of a type in `ROUND` are round, in their axes."""
+    if kind == "hull":
+        return size
+    points: Floats = SIGNS * size[..., None, :] if kind == "box" else size[..., None, 1:2] * ENDS
+    return points
+
+
 def _lowest(kind: str, size: Floats, n: Floats) -> Floats:
     """Return the lowest points (..., places, 3) along n (..., 3), all in the shapes' axes."""
     radius, half = size[..., None, :1], size[..., None, 1:2]
@@ -103,9 +113,9 @@ def _lowest(kind: str, size: Floats, n: Floats) -> Floats:
         scaled = size * n
         lowest: Floats = -size * scaled / np.sqrt(_dot(scaled, scaled))[..., None]
         return lowest[..., None, :]
-    if kind in ("box", "capsule"):
-        points: Floats = SIGNS * size[..., None, :] if kind == "box" else half * ENDS - radius * n[..., None, :]
-        return points
+    if kind in ROUND:
+        points = corners(kind, size)
+        return points - radius * n[..., None, :] if kind == "capsule" else points
     with np.errstate(invalid="ignore"):  # caps that are level have no lowest point
         side = radius * (n * (1.0 - UP) / np.hypot(n[..., 0], n[..., 1])[..., None])[..., None, :]
     low, high = -half * UP, half * UP
@@ -115,7 +125,7 @@ def _lowest(kind: str, size: Floats, n: Floats) -> Floats:
 def _rim(size: Floats, n: Floats) -> Floats:
     """Return four points (..., 4, 3) of the rims on which cylinders stand along n (..., 3), in their axes."""
     radius, half = size[..., None, :1], size[..., None, 1:2]
-    points: Floats = radius * ROUND - np.copysign(half, n[..., None, 2:]) * UP
+    points: Floats = radius * RIM - np.copysign(half, n[..., None, 2:]) * UP
     return points
 
 

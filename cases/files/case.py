@@ -52,9 +52,9 @@ class FileCase:
 
     @cached_property
     def model(self) -> Any:
-        """MuJoCo's model of the whole file, whose text is looked at here, once."""
+        """MuJoCo's model of the file but for what its meshes touch, whose text is looked at here, once."""
         check_text(self.path)
-        return model_of(self.path)
+        return model_of(self.path, "meshes")
 
     @cached_property
     def VARIANTS(self) -> Mapping[str, Mapping[str, Value]]:
@@ -78,7 +78,7 @@ class FileCase:
         case = case_of(
             scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, rank=int(p["rank"]),
             t_end=float(p["t_end"]),
-            findings=findings_of(self.path),
+            findings=findings_of(self.path, str(p["without"])),
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
         return under(case, read_control(str(p["control"]), float(p["tick"]))) if p["control"] else case

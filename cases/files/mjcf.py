@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crossbody.cases.errors import SceneError
+from crossbody.cases.files.meshes import check_files, leave_out_colliding, leave_out_missing
 from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
 from crossbody.cases.files.warned import compiled, sentences
@@ -31,30 +32,51 @@ if TYPE_CHECKING:
     import mujoco
 
 JOINTS = ("free", "ball", "slide", "hinge")
-SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
+MESH = 7
+SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box", MESH: "hull"}
 WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 """MuJoCo's word for a kind of part, and ours."""
 JOINT_WRAP, SITE_WRAP = 1, 3
 
 
-def model_of(path: Path) -> mujoco.MjModel:
-    """Return MuJoCo's model of a file as it stands.
+def model_of(path: Path, *, meshes: bool = True) -> mujoco.MjModel:
+    """Return MuJoCo's model of a file as it stands; without `meshes` none of these touches anything.
 
     Raises:
         SceneError: with MuJoCo's own sentence.
     """
-    return _compiled(path)[0]
+    return _compiled(path, meshes=meshes)[0]
 
 
-def _compiled(path: Path) -> tuple[mujoco.MjModel, list[str]]:
+def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
+    """Return the model, and what is told of it: what MuJoCo warns of, and meshes that are left out."""
     import mujoco
 
-    return compiled(path, lambda: mujoco.MjModel.from_xml_path(str(path)))
+    told: list[str] = []
+
+    def opened() -> Any:
+        spec = mujoco.MjSpec.from_file(str(path))
+        if not meshes:
+            leave_out_colliding(spec)
+        return spec
+
+    def compiler() -> Any:
+        spec = opened()
+        check_files(spec, path)
+        try:
+            return spec.compile()
+        except ValueError:
+            spec = opened()
+            told.extend(leave_out_missing(spec, path))
+            return spec.compile()
+
+    model, warned = compiled(path, compiler)
+    return model, [*sentences(warned), *told]
 
 
-def findings(path: Path) -> list[str]:
-    """Return what MuJoCo warns of."""
-    return sentences(_compiled(path)[1])
+def findings(path: Path, *, meshes: bool = True) -> list[str]:
+    """Return what MuJoCo warns of, and which meshes are not there."""
+    return _compiled(path, meshes=meshes)[1]
 
 
 def scene_of(model: mujoco.MjModel) -> Scene:
@@ -169,18 +191,30 @@ def law(model: Any, solref: Any, solimp: Any) -> RowLaw:
 
 def _shape(model: Any, i: int) -> Shape | None:
     kind = SHAPES.get(int(model.geom_type[i]))
-    if kind is None:
+    corners = _corners(model, int(model.geom_dataid[i])) if kind == "hull" else ()
+    if kind is None or (kind == "hull" and not corners):
         return None
     return Shape(
         name=_name(model, "geom", i),
         body=_name(model, "body", int(model.geom_bodyid[i])),
         type=kind,
-        size=_floats(model.geom_size[i]),
+        size=_floats(model.geom_size[i]) if kind != "hull" else (0.0, 0.0, 0.0),
+        corners=corners,
         position=_floats(model.geom_pos[i]),
         orientation=_floats(model.geom_quat[i]),
         friction=_floats(model.geom_friction[i]),
         margin=float(model.geom_margin[i]),
     )
+
+
+def _corners(model: Any, mesh: int) -> tuple[Vector, ...]:
+    """Return the corners of a mesh's hull, which MuJoCo has of meshes that may collide."""
+    at = int(model.mesh_graphadr[mesh])
+    if at < 0:
+        return ()
+    count = int(model.mesh_graph[at])  # numbers of corners and faces, then of each corner its first edge and its vertex
+    vertices = model.mesh_vertadr[mesh] + model.mesh_graph[at + 2 + count :][:count]
+    return tuple(_floats(model.mesh_vert[k]) for k in vertices)
 
 
 def _loop(model: Any, i: int) -> Loop:

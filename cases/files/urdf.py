@@ -16,6 +16,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import SceneError
+from crossbody.cases.files.meshes import supplied
 from crossbody.cases.files.warned import compiled, sentences
 from crossbody.cases.scene import Body, Loop, Scene
 
@@ -40,16 +41,16 @@ def parsed(path: Path) -> ElementTree.Element:
     return root
 
 
-def model_of(path: Path) -> mujoco.MjModel:
+def model_of(path: Path, *, meshes: bool = True) -> mujoco.MjModel:
     """Return MuJoCo's model of the tree, with a placeholder for every inertia and without what is only drawn.
 
     Raises:
-        SceneError: with MuJoCo's own sentence.
+        SceneError: with MuJoCo's own sentence, or for a mesh that cannot be read.
     """
-    return _compiled(path)[0]
+    return _compiled(path, meshes=meshes)[0]
 
 
-def _compiled(path: Path) -> tuple[mujoco.MjModel, list[str]]:
+def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
     """Return the model, and what MuJoCo warned of, which else goes to the terminal at every reading."""
     import mujoco
 
@@ -59,14 +60,15 @@ def _compiled(path: Path) -> tuple[mujoco.MjModel, list[str]]:
             link.remove(part)
         link.append(ElementTree.fromstring(PLACEHOLDER))
         for collision in link.findall("collision"):
-            if collision.find("geometry/mesh") is not None:
-                link.remove(collision)  # no mesh has a row: hulls are watched by nothing yet
+            if not meshes and collision.find("geometry/mesh") is not None:
+                link.remove(collision)
     for own in root.findall("mujoco"):
         root.remove(own)
     setting = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
+    files = supplied(root, path)
     text = ElementTree.tostring(root, encoding="unicode")
-    return compiled(path, lambda: mujoco.MjModel.from_xml_string(text))
+    return compiled(path, lambda: mujoco.MjModel.from_xml_string(text, files))
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:
@@ -80,15 +82,9 @@ def with_inertias(path: Path, scene: Scene) -> Scene:
     return scene.replace(bodies=bodies, loops=(*scene.loops, *loops))
 
 
-def findings(path: Path) -> list[str]:
-    """Return what MuJoCo warns of, and a sentence for every link whose inertia no rigid body can have.
-
-    One more counts the meshes that would collide.
-    """
-    told = sentences(_compiled(path)[1])
-    meshes = parsed(path).findall("link/collision/geometry/mesh")
-    if meshes:
-        told.append(f"Meshes that collide ({len(meshes)}) are left out of every engine: no hull has a row here.")
+def findings(path: Path, *, meshes: bool = True) -> list[str]:
+    """Return what MuJoCo warns of, and a sentence for every link whose inertia no rigid body can have."""
+    told = sentences(_compiled(path, meshes=meshes)[1])
     for link in parsed(path).findall("link"):
         if link.find("inertial") is None:
             continue

@@ -7,7 +7,12 @@ from typing import Any
 
 from crossbody.cases.errors import InvalidValue
 
-ALL = ("friction", "contacts", "limits", "actuators", "loops", "tendons")
+ALL = ("friction", "contacts", "meshes", "limits", "actuators", "loops", "tendons")
+
+
+def leaves_out(without: str, *words: str) -> bool:
+    """Return whether one of the words that leave features out is among these."""
+    return not {part.strip() for part in without.split(",")}.isdisjoint(words)
 
 
 def strip(model: Any, without: str) -> None:
@@ -89,6 +94,7 @@ _ONE: dict[str, Callable[[Any, int], None]] = {"actuator": _actuator, "loop": _l
 _WHOLE: dict[str, Callable[[Any], None]] = {
     "friction": _friction,
     "contacts": _contacts,
+    "meshes": lambda model: None,  # the readers do it
     "limits": _limits,
     "actuators": _every(_actuator, "nu"),
     "loops": _every(_loop, "neq"),

@@ -8,17 +8,27 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Tendon
+from crossbody.cases.rotations import matrices
+from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
+
+POINT = 1e-15
+"""Radius of a corner, m: below the rounding of any place, and above 0, which no ball has."""
 
 
 def compiled(spec: Any, scene: Scene) -> Any:
     """Return the compiled model, with what no element of the format says.
 
-    That is where the springs of ball joints rest, and the points of loops, which are computed there from the pose.
+    That is where the springs of ball joints rest, the points of loops, which are computed there from the pose, and the
+    corners of meshes, which the compiler turns to its own axes in single precision.
     """
     model = spec.compile()
+    for shape in scene.shapes:
+        if shape.type == "hull" and spec.mesh(shape.name) is not None:
+            geom, mesh = model.geom(shape.name), model.mesh(shape.name).id
+            geom.pos, geom.quat = shape.position, shape.orientation
+            model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]] = shape.corners
     for i, loop in enumerate(scene.loops):
         if loop.type == "connect":
             model.eq_data[i, :6] = *loop.first_position, *loop.second_position
@@ -31,8 +41,13 @@ def compiled(spec: Any, scene: Scene) -> Any:
     return model
 
 
-def spec_of(scene: Scene) -> Any:
-    """Return a scene as an editable model."""
+def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
+    """Return a scene as an editable model.
+
+    Args:
+        scene: what it is made of.
+        by_corners: whether every corner of a hull is a shape of its own: MuJoCo has but a few contacts of a mesh.
+    """
     spec = mujoco.MjSpec()
     spec.compiler.balanceinertia = False
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
@@ -57,7 +72,10 @@ def spec_of(scene: Scene) -> Any:
     for actuator in scene.actuators:
         _add_actuator(spec, actuator)
     for contact in contacts(scene):
-        _add_contact(spec, bodies, contact)
+        if by_corners and contact.second.type == "hull":
+            _add_corners(spec, bodies, contact)
+        else:
+            _add_contact(spec, bodies, contact)
     return spec
 
 
@@ -112,14 +130,42 @@ def _add_loop(spec: Any, loop: Loop) -> None:
 def _add_contact(spec: Any, bodies: Mapping[str, Any], contact: Contact) -> None:
     """Add a pair by itself, and its shapes where no other pair has added them; nothing else touches them."""
     for shape in (contact.first, contact.second):
-        if spec.geom(shape.name) is None:
-            size = shape.size if shape.type != "plane" else (0.0, 0.0, 1.0)  # without end, and a grid to be drawn
-            bodies[shape.body].add_geom(
-                name=shape.name, type=getattr(mujoco.mjtGeom, f"mjGEOM_{shape.type.upper()}"), size=size,
-                pos=shape.position, quat=shape.orientation, contype=0, conaffinity=0,
-            )  # fmt: skip
+        _add_shape(spec, bodies, shape)
+    _add_pair(spec, contact, contact.pair.name, contact.second.name)
+
+
+def _add_corners(spec: Any, bodies: Mapping[str, Any], contact: Contact) -> None:
+    """Add every corner of a hull as the least ball that there is, and a pair of each with the plane."""
+    _add_shape(spec, bodies, contact.first)
+    shape = contact.second
+    at = np.array(shape.position) + np.array(shape.corners) @ matrices(np.array(shape.orientation)).T
+    for row, name, corner in zip(contact.rows, corner_names(shape), at, strict=True):
+        _add_shape(spec, bodies, Shape(name=name, body=shape.body, size=(POINT, 0.0, 0.0), position=corner))
+        _add_pair(spec, contact, row, name)
+
+
+def corner_names(shape: Shape) -> tuple[str, ...]:
+    """Return names for the corners of a hull; a line of its own tells them from the names in a file."""
+    return tuple(f"{shape.name}\n{k}" for k in range(len(shape.corners)))
+
+
+def _add_shape(spec: Any, bodies: Mapping[str, Any], shape: Shape) -> None:
+    """Add a shape that touches nothing by itself, if it is not there."""
+    if spec.geom(shape.name) is not None:
+        return
+    kind = "mesh" if shape.type == "hull" else shape.type
+    size = shape.size if kind != "plane" else (0.0, 0.0, 1.0)  # without end, and a grid to be drawn
+    added = bodies[shape.body].add_geom(
+        name=shape.name, type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}"), size=size,
+        pos=shape.position, quat=shape.orientation, contype=0, conaffinity=0,
+    )  # fmt: skip
+    if kind == "mesh":
+        added.meshname = spec.add_mesh(name=shape.name, uservert=np.ravel(shape.corners)).name
+
+
+def _add_pair(spec: Any, contact: Contact, name: str, second: str) -> None:
     spec.add_pair(
-        name=contact.pair.name, geomname1=contact.first.name, geomname2=contact.second.name, condim=1,
+        name=name, geomname1=contact.first.name, geomname2=second, condim=1,
         margin=contact.pair.margin, solref=_solref(contact.pair.law), solimp=IMPEDANCE,
     )  # fmt: skip
 

@@ -16,8 +16,10 @@ from crossbody.cases.scene_contacts import Contact
 from crossbody.engines._contacts import Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
+from crossbody.engines.mujoco._build import corner_names
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._observe import numbers
+from crossbody.engines.nearest import corners
 
 TOGETHER = 64
 """Instants at which gaps of shapes are computed at once."""
@@ -50,11 +52,27 @@ class Rows:
         self.nc = row + self.touching.count
         named = mjcf.names(model, "geom")
         self.geoms = {named(i): i for i in range(model.ngeom)}
-        self.touches: dict[frozenset[int], tuple[Contact, int]] = {}
+        self.touches: dict[frozenset[int], tuple[Contact, range]] = {}
         for contact in self.touching.all:
-            both = frozenset((self.geoms[contact.first.name], self.geoms[contact.second.name]))
-            self.touches[both] = (contact, row)
+            first, rows = self.geoms[contact.first.name], range(row, row + contact.places)
+            if self.by_corners(contact):
+                for k, name in zip(rows, corner_names(contact.second), strict=True):
+                    self.touches[frozenset((first, self.geoms[name]))] = (contact, range(k, k + 1))
+            else:
+                self.touches[frozenset((first, self.geoms[contact.second.name]))] = (contact, rows)
             row += contact.places
+
+    def by_corners(self, contact: Contact) -> bool:
+        """Return whether the model has a shape for each place of a contact, and a pair for each row."""
+        return contact.second.name not in self.geoms
+
+    def pair_ids(self) -> list[int]:
+        """Return the model's pair of every contact's row, by name: the compiler sorts them by the bodies they join."""
+        names = [
+            contact.rows if self.by_corners(contact) else (contact.pair.name,) * contact.places
+            for contact in self.touching.all
+        ]
+        return [int(self.model.pair(name).id) for part in names for name in part]
 
     def constants(self) -> dict[str, Any]:
         """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
@@ -62,8 +80,7 @@ class Rows:
         solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
         bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
         solref += [bounds[kind][i] for kind, i, _ in self.places]
-        for contact in self.touching.all:  # by name: the compiler sorts pairs by the bodies that they join
-            solref += [model.pair(contact.pair.name).solref] * contact.places
+        solref += [model.pair_solref[i] for i in self.pair_ids()]
         pairs = np.array(solref).reshape(-1, 2)
         if (pairs >= 0.0).any():
             return {"solref": pairs}
@@ -92,18 +109,19 @@ class Rows:
         return frozenset(int(i) for i in self.data.contact[part].geom)
 
     def _touch(self, part: int) -> int:
-        """Return which row a contact is: its place is told by the signs of its point in the second shape's axes."""
+        """Return which row a contact is: of points that shapes are round it is at the nearest."""
         found = self.data.contact[part]
-        contact, row = self.touches[self._geoms(part)]
+        contact, rows = self.touches[self._geoms(part)]
+        if len(rows) == 1:
+            return rows[0]
         one, two = (
             (self.data.geom_xmat[i].reshape(3, 3), self.data.geom_xpos[i])
             for i in (self.geoms[contact.first.name], self.geoms[contact.second.name])
         )
         if contact.parallel > 0.0:
-            return row + end_of(contact, one, two, found.pos)
-        x = two[0].T @ (found.pos - two[1])
-        bits = {1: (), 2: (x[2] > 0.0,), 8: tuple(x > 0.0)}[contact.places]
-        return row + sum(int(bit) << k for k, bit in enumerate(bits))
+            return rows[end_of(contact, one, two, found.pos)]
+        off = corners(contact.second.type, contact.second.extents) - two[0].T @ (found.pos - two[1])
+        return rows[int(np.argmin(np.einsum("ij,ij->i", off, off)))]
 
     def _place(self, j: int, kind: int, part: int) -> int:
         """Return which bound an active row is: of a joint the upper one has a falling gap, of a tendon it is nearer."""

@@ -45,8 +45,7 @@ class Switched(Rows):
         super().__init__(scene, model, data)
         margins = {int(LIMITS[0]): model.jnt_margin, int(LIMITS[1]): model.tendon_margin}
         self.part = [(margins[kind], i) for kind, i, _ in self.places]
-        for contact in self.touching.all:
-            self.part += [(model.pair_margin, model.pair(contact.pair.name).id)] * contact.places
+        self.part += [(model.pair_margin, i) for i in self.pair_ids()]
         self.surface, self.wanted, self.last = np.zeros((3, self.nc))
         self.surface[self.always :] = [margin[i] for margin, i in self.part]
         self.arm((FREE,) * self.nc)

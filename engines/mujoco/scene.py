@@ -14,7 +14,7 @@ import numpy as np
 from crossbody.cases import Case, CaseUnsupported, Parameter, SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.files.without import strip
+from crossbody.cases.files.without import leaves_out, strip
 from crossbody.cases.scene import UNBOUNDED, Scene
 from crossbody.engines._acting import Acting
 from crossbody.engines._scene import Forces
@@ -132,8 +132,9 @@ def _scene(case: Case) -> Scene:
 
 def _from_file(case: Case) -> Any:
     """Return MuJoCo's own reading of the file, less what is left out of every engine."""
-    model = mjcf.model_of(Path(case.file))
-    strip(model, str(case.parameters.get("without", "")))
+    without = str(case.parameters.get("without", ""))
+    model = mjcf.model_of(Path(case.file), meshes=not leaves_out(without, "meshes", "contacts"))
+    strip(model, without)
     return model
 
 
@@ -146,7 +147,7 @@ def matched(scene: Scene) -> Any:
         replace(one, activation="", time_constant=0.0, control_range=UNBOUNDED) if one.activation else one
         for one in scene.actuators
     ))  # fmt: skip
-    spec = spec_of(scene)
+    spec = spec_of(scene, by_corners=True)
     option = spec.option
     option.integrator, option.solver = mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_NEWTON
     option.tolerance, option.jacobian = 0.0, mujoco.mjtJacobian.mjJAC_DENSE

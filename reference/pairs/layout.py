@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(6)
+PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, HULL = range(7)
 # A shape: what it is, the node that carries it (-1: the world), its pose there (rotation by rows, position), its size.
 TYPE, NODE, POSE, SIZE, SHAPE = 0, 1, 2, 14, 17
 # A pair: two shapes, and the distance at which its rows begin.
@@ -12,8 +12,9 @@ TYPE, NODE, POSE, SIZE, SHAPE = 0, 1, 2, 14, 17
 FIRST, SECOND, MARGIN, LIES, SINE, PHASE, BENDS, PAIR = (0, SHAPE, *range(2 * SHAPE, 2 * SHAPE + 6))
 BENDING = {CAPSULE: 1, CYLINDER: 2, BOX: 3}
 """Kinks of a sphere against a solid: where the nearest point comes to an end along an axis, or to a cylinder's side."""
-# A contact row, in the columns behind its kind: which pair, and which of its places.
-WHICH, PLACE = 1, 2
+# A contact row, in the columns behind its kind: which pair, and which of its places; over a plane the
+# point that the second shape is round there, in its node's frame, and at what radius (0: a corner).
+WHICH, PLACE, POINT, RADIUS = 1, 2, 3, 6
 # How two shapes lie to each other: not yet decided, at an angle, or along each other; a cylinder on the one cap or the
 # other.
 UNDECIDED, CROSSED, ALONG, UPSIDE_DOWN = range(4)

@@ -39,19 +39,14 @@ def _sign(place: int, bit: int) -> float:
 
 
 @kernels.helper
-def _over_plane(p: Array, w: Array, o: int, kind: int, place: int, P: Any, N: Any) -> Any:
-    """Return gap, normal and lowest point of the shape at p[o:] over a plane."""
-    C, s = _point(p, w, o), o + layout.SIZE
-    if kind == layout.SPHERE:
-        return planes.sphere(P, N, C, p[s])
-    Z = _axis(p, w, o, 2)
-    if kind == layout.CAPSULE:
-        return planes.sphere(P, N, moved(C, _sign(place, 0) * p[s + 1], Z), p[s])
-    X, Y = _axis(p, w, o, 0), _axis(p, w, o, 1)
-    if kind == layout.BOX:
-        corner = moved(moved(C, _sign(place, 0) * p[s], X), _sign(place, 1) * p[s + 1], Y)
-        return planes.sphere(P, N, moved(corner, _sign(place, 2) * p[s + 2], Z), 0.0 * p[s])
-    return planes.ellipsoid(P, N, C, X, Y, Z, (p[s], p[s + 1], p[s + 2]))
+def _over_plane(p: Array, w: Array, o: int, row: int, P: Any, N: Any) -> Any:
+    """Return gap, normal and lowest point of the shape at p[o:] over a plane, in the place of the row at p[row:]."""
+    if int(p[o].real) == layout.ELLIPSOID:
+        C, s, X, Y, Z = _point(p, w, o), o + layout.SIZE, _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2)
+        return planes.ellipsoid(P, N, C, X, Y, Z, (p[s], p[s + 1], p[s + 2]))
+    k = row + layout.POINT
+    C = point(p, w, int(p[o + layout.NODE].real), p[k], p[k + 1], p[k + 2])
+    return planes.sphere(P, N, C, p[row + layout.RADIUS])
 
 
 @kernels.helper
@@ -201,21 +196,21 @@ def _capsules(p: Array, w: Array, o: int, place: int) -> Any:
 
 
 @kernels.helper
-def touch(p: Array, w: Array, o: int, place: int) -> Any:
+def touch(p: Array, w: Array, o: int, row: int) -> Any:
     """Return gap (value, rate, second derivative at v' = 0), normal from first to second, and where they would meet.
 
     Args:
         p: parameters of the scene.
         w: filled by the outward sweep.
         o: where the pair begins in p.
-        place: which of its places.
+        row: where its row does, which says the place.
     """
-    one, two = o + layout.FIRST, o + layout.SECOND
+    one, two, place = o + layout.FIRST, o + layout.SECOND, int(p[row + layout.PLACE].real)
     first, second = int(p[one].real), int(p[two].real)
     if first == layout.PLANE and second == layout.CYLINDER:
         return _cylinder(p, w, o, place)
     if first == layout.PLANE:
-        h, n, at = _over_plane(p, w, two, second, place, _point(p, w, one), _axis(p, w, one, 2))
+        h, n, at = _over_plane(p, w, two, row, _point(p, w, one), _axis(p, w, one, 2))
         return shifted(h, -p[o + layout.MARGIN]), n, at
     if first == layout.SPHERE:
         C, r = _point(p, w, one), p[one + layout.SIZE]

@@ -114,7 +114,7 @@ def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
     """Return where the pair of row i stands in p, and gap, normal and place of its contact."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     at = int(p[layout.AT_PAIR].real) + pairs.PAIR * int(p[o + pairs.WHICH].real)
-    return at, touch(p, w, at, int(p[o + pairs.PLACE].real))
+    return at, touch(p, w, at, o)
 
 
 @kernels.gaps

@@ -81,6 +81,7 @@ def _stand(p: Floats, w: Floats, o: int, i: int, mode: Bytes, before: int) -> No
 def _lie(p: Floats, w: Floats, o: int, i: int, mode: Bytes) -> None:
     """Let the shapes whose rows begin at i lie otherwise than before; what touched touches where they are nearest."""
     k, stands = int(p[layout.AT_SIDE]) + int(p[o + pairs.LIES]), int(p[o]) == pairs.PLANE
+    row = int(p[layout.AT_ROW]) + layout.ROW * i
     start, before = p[k] == pairs.UNDECIDED, int(p[k])
     if start:
         p[k] = chosen(p, w, o)
@@ -96,7 +97,7 @@ def _lie(p: Floats, w: Floats, o: int, i: int, mode: Bytes) -> None:
         if mode[i] == FREE or mode[i + 1] == CONTACT:
             mode[i] = mode[i + 1]
         mode[i + 1] = FREE
-    elif touch(p, w, o, 1)[0][0] < touch(p, w, o, 0)[0][0]:
+    elif touch(p, w, o, row + layout.ROW)[0][0] < touch(p, w, o, row)[0][0]:
         mode[i], mode[i + 1] = mode[i + 1], mode[i]
 
 

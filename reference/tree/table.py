@@ -14,14 +14,14 @@ import numpy as np
 from crossbody.cases import SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Push, Scene, Shape, Tendon, Vector
-from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.reference.kinds import Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.tree import layout
 
 SHAPES = {
     "plane": pairs.PLANE, "sphere": pairs.SPHERE, "capsule": pairs.CAPSULE, "ellipsoid": pairs.ELLIPSOID,
-    "cylinder": pairs.CYLINDER, "box": pairs.BOX,
+    "cylinder": pairs.CYLINDER, "box": pairs.BOX, "hull": pairs.HULL,
 }  # fmt: skip
 TYPES = {"free": layout.FREE, "ball": layout.BALL, "slide": layout.SLIDE, "hinge": layout.HINGE}
 
@@ -265,7 +265,7 @@ class _Builder:
         finite: Floats = np.clip(packed, -1e300, 1e300)
         return finite  # a bound that is not there: parameters are finite
 
-    def placed(self, body: str, position: Vector) -> tuple[float, ...]:
+    def placed(self, body: str, position: Vector | Floats) -> tuple[float, ...]:
         """Return the node of a body, and a point of the body in the node's frame."""
         place = self.places[body]
         return (place.node, *(place.p + place.R @ np.array(position)))
@@ -375,8 +375,29 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
             else:
                 rows.append(_row(layout.TENDON_LIMIT, sign, i, beyond))
     for i, contact in enumerate(contacts(scene)):
-        rows += [_row(layout.CONTACT, i, place) for place in range(contact.places)]
+        rows += _contact_rows(contact, i, builder)
     return rows
+
+
+def _contact_rows(contact: Contact, i: int, builder: _Builder) -> list[Floats]:
+    """Return the rows of pair i; over a plane each has the point that the second shape is round in its place."""
+    shape = contact.second
+    if contact.first.type != "plane":
+        return [_row(layout.CONTACT, i, k) for k in range(contact.places)]
+    radius = shape.size[0] if shape.type in ("sphere", "capsule") else 0.0
+    points = shape.position + _points(contact) @ rotation(shape.orientation).T
+    return [_row(layout.CONTACT, i, k, *builder.placed(shape.body, x)[1:], radius) for k, x in enumerate(points)]
+
+
+def _points(contact: Contact) -> Floats:
+    """Return the points (places, 3) that the second shape is round, in its axes; its centre where it is round none."""
+    shape = contact.second
+    if shape.type == "box":
+        signs = [[-1.0 if k >> bit & 1 == 0 else 1.0 for bit in range(3)] for k in range(contact.places)]
+        return np.array(signs) * shape.size
+    if shape.type == "capsule":
+        return np.array([[0.0, 0.0, -shape.size[1]], [0.0, 0.0, shape.size[1]]])
+    return np.array(shape.corners) if shape.type == "hull" else np.zeros((contact.places, 3))
 
 
 def pair_rows(scene: Scene, builder: _Builder, first: int) -> list[Floats]:

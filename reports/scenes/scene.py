@@ -83,7 +83,7 @@ def _meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
     shapes = (contact.first, contact.second)
     stand = [placed(bodies[shape.body], shape.position, shape.orientation) for shape in shapes]
     at, by = ((rotation, origin) for origin, rotation in stand)
-    kinds, sizes = (shapes[0].type, shapes[1].type), (np.array(shapes[0].size), np.array(shapes[1].size))
+    kinds, sizes = (shapes[0].type, shapes[1].type), (shapes[0].extents, shapes[1].extents)
     return meet(kinds, sizes, at, by, lying(kinds, sizes, at, by, np.full(len(at[1]), contact.parallel)))
 
 
