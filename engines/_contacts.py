@@ -202,7 +202,7 @@ class Contacts:
         )  # fmt: skip
 
     def _sizes(self, shapes: Indices) -> Floats:
-        """Return the extents of shapes of one type; the last corner of a hull stands for those that others have more."""
+        """Return the extents of shapes of one type; the last corner of a hull stands for those it lacks."""
         found = [self._extents[i] for i in shapes]
         most = max(len(one) for one in found)
         return np.array(

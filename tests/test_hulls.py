@@ -32,7 +32,8 @@ def unit(rng: np.random.Generator) -> tuple[float, ...]:
 def dropped(seed: int, law: RowLaw = LAW) -> tuple[Scene, np.ndarray, np.ndarray]:
     """A hull with a pose of its own on a body whose inertia is a ball's, over a tilted plane; q and v at the start."""
     rng = np.random.default_rng(seed)
-    hull = Shape(name="hull", body="body", type="hull", corners=random_corners(rng), position=tuple(0.1 * rng.normal(size=3)),
+    hull = Shape(name="hull", body="body", type="hull", corners=random_corners(rng),
+                 position=tuple(0.1 * rng.normal(size=3)),
                  orientation=unit(rng))  # fmt: skip
     floor = Shape(name="floor", type="plane", position=(0.0, 0.0, -0.2), orientation=(1.0, 0.05, -0.03, 0.2))
     scene = Scene(

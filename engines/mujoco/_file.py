@@ -67,7 +67,7 @@ def rebuilt(scene: Scene, model: Any) -> Any:
 
 
 def _join(made: Any, mesh: int, model: Any, its: int) -> None:
-    """Join the corners of a hull as the file's are: which edges lie in a flat face is the compiler's choice each time."""
+    """Join the corners of a hull as the file's are: the compiler chooses anew which edges lie in a face."""
     graph, own = model.mesh_graph[model.mesh_graphadr[its] :], made.mesh_graph[made.mesh_graphadr[mesh] :]
     corners, faces = graph[:2]
     if tuple(own[:2]) != (corners, faces):

@@ -12,7 +12,7 @@ from crossbody.cases.entry_points import checked_arguments
 from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
-    from crossbody.hw.models._contract import Model
+    from crossbody.hw.models._contract import Model as Model
 
 __all__ = ["chosen", "load", "names", "summary"]
 

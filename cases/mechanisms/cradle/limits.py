@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from crossbody.cases import peer_limits
 from crossbody.cases.case import Claim, Limit
 
 TOGETHER = (
