@@ -1,19 +1,19 @@
 """How a case is run: one module or folder an engine, found by its name, imported only when asked for.
 
-An engine is a module here with one public name, `ENGINE`, an object that follows the protocol `Engine`.
+An engine is a module here with one public name, `ENGINE`, an `Engine`.
 """
 
 from __future__ import annotations
 
-from crossbody.cases import EngineUnavailable
+from crossbody.cases import EngineUnavailable, SceneError
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.cases.registry import Registry
-from crossbody.engines._contract import QUANTITIES, Engine, Run, hidden, interpreted
+from crossbody.engines.contract import QUANTITIES, Engine, Run
 
-__all__ = ["QUANTITIES", "Engine", "Run", "hidden", "interpreted", "load", "names", "summary"]
+__all__ = ["QUANTITIES", "Engine", "Run", "load", "names", "summary"]
 
 
-_REGISTRY = Registry("engine", __name__, hidden=("equations", "linear", "nearest"))
+_REGISTRY = Registry("engine", __name__, hidden=("contract", "equations", "linear", "nearest"))
 
 
 def names() -> tuple[str, ...]:
@@ -32,6 +32,7 @@ def load(name: str) -> Engine:
 
     Raises:
         UnknownName: if there is no such engine; the message lists the names.
+        SceneError: if its module does not define one.
         EngineUnavailable: if its third-party package is not installed. A broken import of our own stays loud.
     """
     try:
@@ -45,5 +46,7 @@ def load(name: str) -> Engine:
         raise EngineUnavailable(
             f"Engine {name!r} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."
         ) from None
-    engine: Engine = module.ENGINE
+    engine = getattr(module, "ENGINE", None)
+    if not isinstance(engine, Engine):
+        raise SceneError(f"Engine file {module.__file__} does not define ENGINE, a crossbody.engines.Engine.")
     return engine

@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 from crossbody.cases import Case, Event, Mode, Outcome, Trajectory
 from crossbody.cases.arrays import Bytes, Floats
 from crossbody.engines._line import FREE, MECHANISMS, Line
+from crossbody.engines.contract import Run
 
 ROUNDING = 1e-9
 """A multiplier below this part of the largest is zero where a crossing was put in."""
@@ -29,7 +30,7 @@ OPEN = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(slots=True, kw_only=True)
-class PeerRun:
+class PeerRun(Run):
     """One prepared run; see `crossbody.engines.Run`."""
 
     engine: str

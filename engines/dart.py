@@ -13,6 +13,7 @@ from crossbody.engines import _settings
 from crossbody.engines._line import Line, line
 from crossbody.engines._peer import HIDDEN, PeerRun, why_not
 from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
+from crossbody.engines.contract import Engine
 
 THICK = 1.0  # m, of the floor
 
@@ -77,7 +78,7 @@ def _surface(shape: Any, e: float) -> None:
     surface.setFrictionCoeff(0.0)
 
 
-class Dart:
+class Dart(Engine):
     """DART 6; see `crossbody.engines.Engine`."""
 
     name = "dart"

@@ -19,6 +19,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.engines import _scale, _settings
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
+from crossbody.engines.contract import Engine
 
 METHODS = ("DOPRI5", "DVERK6", "ODE23")
 ATOL_PART = 1e-3  # absolute tolerance in units of the relative one
@@ -198,7 +199,7 @@ def _audit(case: Case, scene: Line, model: Model) -> Mapping[str, Any]:
     return found | ({"lam": lam} if scene.floor and model.laws else {})
 
 
-class Exudyn:
+class Exudyn(Engine):
     """Exudyn; see `crossbody.engines.Engine`."""
 
     name = "exudyn"

@@ -13,6 +13,7 @@ from crossbody.engines import _settings
 from crossbody.engines._line import Line, line
 from crossbody.engines._peer import HIDDEN, PeerRun, why_not
 from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
+from crossbody.engines.contract import Engine
 
 ITERATIONS = 200
 """Of the sequential impulses: enough for five balls in a row to 1e-10 of their momentum."""
@@ -65,7 +66,7 @@ def _surface(shape: Any, e: float) -> None:
     shape.elasticity, shape.friction = e, 0.0
 
 
-class Pymunk:
+class Pymunk(Engine):
     """pymunk 7; see `crossbody.engines.Engine`."""
 
     name = "pymunk"

@@ -15,6 +15,7 @@ from crossbody.cases.arrays import is_number
 from crossbody.engines import _settings
 from crossbody.engines._reference_audit import audit, listed
 from crossbody.engines._rolling import determined
+from crossbody.engines.contract import Engine, Run
 from crossbody.engines.equations import known, module, system_of
 from crossbody.reference import Options, System, prepare
 from crossbody.reference.options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
@@ -31,7 +32,7 @@ SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
 @dataclass(slots=True, kw_only=True)
-class ReferenceRun:
+class ReferenceRun(Run):
     """One prepared run; see `crossbody.engines.Run`.
 
     Attributes:
@@ -77,7 +78,7 @@ def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
 
-class Reference:
+class Reference(Engine):
     """The project's own integrators; see `crossbody.engines.Engine`.
 
     A mechanism is a module in reference/systems with `build(parameters, law) -> System`, or a file of the user's own by

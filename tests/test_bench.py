@@ -31,7 +31,7 @@ ORDERS = {"second": 2.0, "liar": 4.0, "fails": 1.0}
 
 
 @dataclass
-class FakeRun:
+class FakeRun(engines.Run):
     """The truth, moved by dt^2 for "second" and "liar"; for "fails" only below a step of 1 ms."""
 
     case: cases.Case
@@ -48,8 +48,11 @@ class FakeRun:
             outcome=Outcome.DIVERGED if bad else Outcome.FINISHED,
         )  # fmt: skip
 
+    def audit(self) -> Mapping[str, Any]:
+        return {}
 
-class FakeEngine:
+
+class FakeEngine(engines.Engine):
     name = "fake"
     profiles: Mapping[str, str] = dict.fromkeys(ORDERS, "")
     versions: Mapping[str, str] = {}

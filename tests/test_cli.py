@@ -23,7 +23,7 @@ from crossbody.reports.runs import watch
 
 
 @dataclass
-class FakeRun:
+class FakeRun(engines.Run):
     case: Case
     profile: str
     engine: str = "fake"
@@ -38,7 +38,7 @@ class FakeRun:
         return {}
 
 
-class FakeEngine:
+class FakeEngine(engines.Engine):
     """The closed form under three names: as it is, one per cent off, and not a number."""
 
     name = "fake"
@@ -209,7 +209,7 @@ def test_a_case_file_that_cannot_be_imported_is_wrong_use(text, line, what, rela
     assert "fault of crossbody" not in said
 
 
-LINEAR = ("bouncing_ball", "--variant", "linear", "-e", "fake:exact", "--time-limit", "70")
+LIMITED = ("bouncing_ball", "--variant", "linear", "-e", "fake:exact", "--time-limit", "70")
 
 
 def test_a_run_may_take_the_seconds_that_are_asked_for_and_a_truth_three_times_those(
@@ -217,7 +217,7 @@ def test_a_run_may_take_the_seconds_that_are_asked_for_and_a_truth_three_times_t
 ) -> None:
     given: dict[str, float] = {}
     monkeypatch.setattr(watch, "limited", lambda label, seconds: given.update({label: seconds}))
-    assert call("run", *LINEAR) == 0
+    assert call("run", *LIMITED) == 0
     assert given == {"bouncing_ball:linear: truth": 210.0, "bouncing_ball:linear: fake:exact": 70.0}
 
 
@@ -230,7 +230,7 @@ def test_a_benchmark_may_take_the_seconds_and_minutes_that_are_asked_for(monkeyp
         return pd.DataFrame()
 
     monkeypatch.setattr(measure, "bench", bench)
-    asked = ("bench", *LINEAR, "--full", "--minutes", "0.1")
+    asked = ("bench", *LIMITED, "--full", "--minutes", "0.1")
     assert call(*asked) == call(*asked, "-e", "fake:off") == 2  # nothing was measured
     assert [limit for limit, _ in given] == [70.0, 70.0]
     assert [(e.climb, e.longest) for _, e in given] == [pytest.approx((3.0, 1.5)), pytest.approx((1.5, 0.75))]

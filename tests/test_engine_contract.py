@@ -142,7 +142,7 @@ def test_audit_reads_the_case_back(name: str, profile: str) -> None:
     assert np.ravel(found["masses"]) == pytest.approx(2.5)
     assert found["gravity"] == pytest.approx(3.7)
     np.testing.assert_array_equal((found["q0"], found["v0"]), (case.q0, case.v0))
-    assert "constants" in {*found, *engines.hidden(FOUND[name], profile)}
+    assert "constants" in {*found, *FOUND[name].hidden_in(profile)}
     q, v = np.array([-0.01]), np.array([-1.0])
     for key, args, want in (("M", (q,), [[2.5]]), ("bias", (q, v), [2.5 * 3.7]), ("H", (q,), [[1.0]])):
         if key in found:
@@ -152,7 +152,7 @@ def test_audit_reads_the_case_back(name: str, profile: str) -> None:
 @each_profile
 def test_what_an_engine_does_not_show_its_contract_names(name: str, profile: str) -> None:
     prepared = FOUND[name].prepare(cases.load("bouncing_ball"), profile)
-    hidden, run = {**engines.hidden(FOUND[name], profile), **prepared.audit().get("hidden", {})}, prepared.run()
+    hidden, run = {**FOUND[name].hidden_in(profile), **prepared.audit().get("hidden", {})}, prepared.run()
     shown = {*prepared.audit(), *(("ledger",) if run.ledger is not None else ())}
     assert set(engines.QUANTITIES) - shown <= set(hidden)
     assert set(hidden) <= set(engines.QUANTITIES)

@@ -74,7 +74,7 @@ def test_the_cases_law_reached_the_engine(name: str, variant: str) -> None:
     case = cases.load("bouncing_ball", variant)
     mine = peer(name).prepare(case).audit()
     theirs = engines.load("reference").prepare(case, "compiled").audit()
-    rows = {row.quantity: row for row in audit(mine, theirs, case, engines.hidden(peer(name), "matched"))}
+    rows = {row.quantity: row for row in audit(mine, theirs, case, peer(name).hidden_in("matched"))}
     assert all(row.ok for row in rows.values())
     assert rows["constants"].difference == 0.0
     if name == "exudyn":

@@ -161,7 +161,7 @@ def test_a_grid_is_whole_once_and_its_first_part_is_spread() -> None:
     assert len({s.parameters["a0"] for s in specs[:6]}) > 1
 
 
-class FakeRun:
+class FakeRun(engines.Run):
     """A run that does what it is told."""
 
     engine, profile, settings = "fake", "x", {"dt": 1e-3}
@@ -172,12 +172,15 @@ class FakeRun:
     def run(self) -> Trajectory:
         return self.does()
 
+    def audit(self) -> Mapping[str, Any]:
+        return {}
+
 
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], Trajectory]], Spec]:
     """An engine that does what it is told, and a spec for it."""
 
-    class Fake:
+    class Fake(engines.Engine):
         does: Callable[[], Trajectory]
 
         def prepare(self, case: Any, profile: str, **settings: Any) -> FakeRun:

@@ -12,9 +12,9 @@ import numpy as np
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.engines import _settings
-from crossbody.engines._contract import Run
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
+from crossbody.engines.contract import Engine, Run
 from crossbody.engines.drake import _scene
 from crossbody.engines.drake._plant import offsets, plant
 from crossbody.engines.drake._scene import SceneRun
@@ -71,7 +71,7 @@ def _multipliers(scene: Line, sim: Sim, t: Floats, x: Floats, dt: float) -> Floa
     return np.where(scene.unilateral, np.where(lam > rounding, lam, 0.0), lam)
 
 
-class Drake:
+class Drake(Engine):
     """Drake; see `crossbody.engines.Engine`."""
 
     name = "drake"

@@ -22,6 +22,7 @@ from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Log
 from crossbody.engines._scene import Forces, Stretch
+from crossbody.engines.contract import Run
 from crossbody.engines.drake._simulate import Sim
 from crossbody.engines.drake._tree import Tree
 from crossbody.engines.nearest import Pose
@@ -139,7 +140,7 @@ class Observer:
 
 
 @dataclass(slots=True, kw_only=True)
-class SceneRun:
+class SceneRun(Run):
     """One prepared run of a scene; see `crossbody.engines.Run`."""
 
     case: Case

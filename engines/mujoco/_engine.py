@@ -14,7 +14,7 @@ from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Tr
 from crossbody.cases.files.warned import captured
 from crossbody.cases.registry import Registry
 from crossbody.engines import _settings
-from crossbody.engines._contract import Run
+from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.mujoco._globals import hooked
 from crossbody.engines.mujoco._march import March
@@ -25,7 +25,7 @@ MECHANISMS = Registry("mechanism of MuJoCo", "crossbody.engines.mujoco")
 
 
 @dataclass(slots=True, kw_only=True)
-class MujocoRun:
+class MujocoRun(Run):
     """One prepared run; see `crossbody.engines.Run`."""
 
     case: Case
@@ -74,7 +74,7 @@ class MujocoRun:
         return self.scene.audit
 
 
-class Mujoco:
+class Mujoco(Engine):
     """MuJoCo 4; see `crossbody.engines.Engine`.
 
     A mechanism is a module here with `default_step(case, profile)` and `build(case, profile, dt) -> Scene`; or, with a

@@ -15,6 +15,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines._cube import Cube, cube, quaternion, rotation_vector
 from crossbody.engines._log import Log, charted
+from crossbody.engines.contract import Run
 
 FASTEST = 1e4
 """Speed at which a run has diverged, m/s or rad/s."""
@@ -49,7 +50,7 @@ def prepare(case: Case, profile: str, used: Mapping[str, Any]) -> CubeRun:
 
 
 @dataclass(slots=True, kw_only=True)
-class CubeRun:
+class CubeRun(Run):
     """One prepared run; see `crossbody.engines.Run`."""
 
     case: Case

@@ -17,6 +17,7 @@ from crossbody.cases.files.warned import captured
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.scene import ONLY_CONTINUOUS, BallMaze, ball_maze
+from crossbody.engines.contract import Run
 from crossbody.engines.linear import Spot
 from crossbody.engines.mujoco import _maze_audit as audits
 from crossbody.engines.mujoco import _maze_segments as segments
@@ -41,7 +42,7 @@ class Stepper(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MazeRun:
+class MazeRun(Run):
     """One prepared run; see `crossbody.engines.Run`.
 
     Attributes:

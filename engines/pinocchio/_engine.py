@@ -15,10 +15,10 @@ from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajector
 from crossbody.cases.arrays import Floats
 from crossbody.cases.registry import Registry
 from crossbody.engines import _settings
-from crossbody.engines._contract import Run
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
+from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.pinocchio._admm import TimeStepper
 from crossbody.engines.pinocchio._audit import audit
@@ -44,7 +44,7 @@ class Solver(Protocol):
 
 
 @dataclass(slots=True, kw_only=True)
-class SmoothRun:
+class SmoothRun(Run):
     """One prepared run of rows that are always on; see `crossbody.engines.Run`."""
 
     case: Case
@@ -72,7 +72,7 @@ class SmoothRun:
 
 
 @dataclass(slots=True, kw_only=True)
-class PinocchioRun:
+class PinocchioRun(Run):
     """One prepared run; see `crossbody.engines.Run`."""
 
     case: Case
@@ -100,7 +100,7 @@ class PinocchioRun:
         return {**audit(self.case, self.scene.rows, self.constants), **self.scene.audit}
 
 
-class Pinocchio:
+class Pinocchio(Engine):
     """Pinocchio 4; see `crossbody.engines.Engine`.
 
     A mechanism is a module here with `build(case, algebra) -> Scene`; or `smooth(case, model) -> Smooth`, where no row

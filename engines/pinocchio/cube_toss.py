@@ -19,6 +19,7 @@ from crossbody.cases import Case, Mode, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.engines._cube import CORNERS, Cube, cube, quaternion, rotation_vector
 from crossbody.engines._log import Log, charted
+from crossbody.engines.contract import Run
 
 SETTINGS = {
     "dt": Parameter(default=1e-3, unit="s", doc="time step", low=0.0, open_low=True),
@@ -44,7 +45,7 @@ def prepare(case: Case, used: Mapping[str, Any]) -> CubeRun:
 
 
 @dataclass(slots=True, kw_only=True)
-class CubeRun:
+class CubeRun(Run):
     """One prepared run; see `crossbody.engines.Run`."""
 
     case: Case

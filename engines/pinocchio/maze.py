@@ -13,6 +13,7 @@ from crossbody.cases import Case, Parameter, Trajectory, Value
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine
 from crossbody.engines._maze.scene import ONLY_CONTINUOUS, ball_maze
+from crossbody.engines.contract import Run
 from crossbody.engines.linear import Spot, same
 from crossbody.engines.pinocchio._linear import Stand
 from crossbody.engines.pinocchio._maze_flow import MazeFlow
@@ -35,7 +36,7 @@ SMALL = 2e-2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MazeRun:
+class MazeRun(Run):
     """One prepared run; see `crossbody.engines.Run`."""
 
     case: Case

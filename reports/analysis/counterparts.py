@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from crossbody import engines
-from crossbody.cases import CaseUnsupported, CrossbodyError
+from crossbody.cases import CrossbodyError
 from crossbody.cases.arrays import Floats
 from crossbody.engines.linear import Tangent
 from crossbody.reference.kinds import Array
@@ -52,7 +52,7 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
         for name in names:
             about = {"place": place.name, "engine": name}
             try:
-                ways = _ways(name, place)
+                ways = engines.load(name).linearise(place.case, place.spot)
             except CrossbodyError as error:
                 rows.append({**about, "verdict": Word.SKIPPED.value, "why": str(error)})
                 continue
@@ -61,14 +61,6 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
                 rows.append({**about, **row})
                 poles += [{**about, "way": way.way, **pair} for pair in pairs]
     return pd.DataFrame(rows, columns=list(COLUMNS)), pd.DataFrame(poles, columns=list(POLE_COLUMNS))
-
-
-def _ways(name: str, place: Place) -> tuple[Tangent, ...]:
-    linearise = getattr(engines.load(name), "linearise", None)
-    if linearise is None:
-        raise CaseUnsupported(f"The engine {name!r} does not linearise.")
-    ways: tuple[Tangent, ...] = linearise(place.case, place.spot)
-    return ways
 
 
 def _compared(place: Place, way: Tangent) -> tuple[dict[str, Any], list[dict[str, float]]]:

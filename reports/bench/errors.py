@@ -47,7 +47,7 @@ class Truths:
         return name, self.known[name]
 
     def _followed(self, run: Any) -> Case | None:
-        case, followed = self.case, getattr(run, "follows", None)
+        case, followed = self.case, run.follows
         if followed is None and run.settings.get("law") == "memoryless" and case.law.unilateral.any():
             followed = replace(case, fsm="memoryless", collisions="resolved", closed_form=None)
         same = followed is None or (followed.fsm, followed.collisions) == (case.fsm, case.collisions)

@@ -83,8 +83,8 @@ def _rungs(
 def _climbed(case: Case, pick: Pick, effort: Effort, truths: Truths) -> Iterator[Rung]:
     """The rungs of one engine, up to the one that takes too long."""
     engine = engines.load(pick.engine)
-    promised = float(getattr(engine, "orders", {}).get(pick.profile, math.nan))
-    python = engines.interpreted(engine, pick.profile)
+    promised = float(engine.orders.get(pick.profile, math.nan))
+    python = engine.interpreted_in(pick.profile)
     rungs = Ladder(case, pick, effort)
     for knob, setting, run in rungs:
         began = time.perf_counter()
@@ -162,8 +162,8 @@ def _row(case: Case, rung: Rung) -> dict[str, Any]:
         "error_between": rung.between,
         "honesty": rung.errors["error"] / rung.setting if rung.knob == "rtol" else math.nan,
         "median_ms": median, "iqr_ms": high - low, "call_ms": 1e3 * float(np.median(rung.call)),
-        "native_ms": 1e3 * min((rung.run.native() for _ in range(NATIVE)), default=math.nan)
-        if hasattr(rung.run, "native") else math.nan, "control_ms": 1e3 * float(np.median(rung.control)),
+        "native_ms": 1e3 * min(rung.run.native() for _ in range(NATIVE)),
+        "control_ms": 1e3 * float(np.median(rung.control)),
         "interpreted": rung.interpreted,
         "cores": float(np.median(rung.cpu)), "repeats": len(rung.call), "steps": rung.first.steps,
         "outcome": rung.first.outcome.value, "promised": rung.promised,

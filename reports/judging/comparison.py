@@ -6,14 +6,16 @@ import math
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
+from crossbody import engines
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Trajectory, UnknownName
 from crossbody.cases.arguments import instance, shown
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import limits_of
+from crossbody.engines import Run
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
@@ -29,9 +31,6 @@ from crossbody.reports.judging.verdict import (
     judge,
     limit_for,
 )  # fmt: skip
-
-if TYPE_CHECKING:
-    from crossbody.engines import Run
 
 GROWING = frozenset({"position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path"})
 """Metrics that compare a motion with the truth's."""
@@ -103,7 +102,7 @@ def compare(
     if not isinstance(runs, Sequence):
         raise InvalidValue(f"runs is {shown(runs)}; it must be a list of prepared runs.")
     for run in runs:
-        if not isinstance(run, Entry) and not callable(getattr(run, "run", None)):
+        if not isinstance(run, (Entry, Run)):
             raise InvalidValue(f"runs holds {shown(run)}; each must be what an engine's prepare returns, or an Entry.")
     truth = truth_of(case) if truth is None else truth
     entries = [_entry(run) for run in runs]
@@ -138,8 +137,6 @@ def check_names(case: Case) -> None:
         UnknownName: for a metric or an engine that does not exist; the valid ones are listed.
         InvalidValue: for a limit that is negative or not a number.
     """
-    from crossbody import engines
-
     known = {*metrics.names(), "audit", "*", *LARGEST_PARTS}
     for kind, named in (("claims", case.claims), ("limits", case.limits)):
         for name in (each.metric for each in named):
@@ -156,9 +153,7 @@ def check_names(case: Case) -> None:
 def _entry(run: Entry | Run) -> Entry:
     if isinstance(run, Entry):
         return run
-    from crossbody import engines
-
-    hidden = engines.hidden(engines.load(run.engine), run.profile) if run.engine in engines.names() else {}
+    hidden = engines.load(run.engine).hidden_in(run.profile) if run.engine in engines.names() else {}
     return Entry(engine=run.engine, profile=run.profile, settings=run.settings, run=run.run(), hidden=hidden)
 
 

@@ -7,7 +7,7 @@ A metric is a module with a docstring whose first line says what it measures, an
     measure(truth, run, case)       the number; None where there is none (no contact, another mechanism, ...), NaN where
                                     the run does not show what it needs
 
-and, if it needs a signal that an engine may withhold (`crossbody.engines._contract`), NEEDS, its name.
+and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name.
 """
 
 from __future__ import annotations

@@ -115,7 +115,7 @@ def _profiles(name: str, profile: str | None) -> Iterator[Pick]:
         return
     if profile is not None and profile not in engine.profiles:
         raise UnknownName(f"profile of {name}", profile, engine.profiles)
-    others = getattr(engine, "of_scenes", {}).values()
+    others = engine.of_scenes.values()
     for each in engine.profiles if profile is None else (profile,):
         if profile is not None or each not in others:
             yield Pick(engine=name, profile=each, every=profile is None)
@@ -125,8 +125,7 @@ def of_case(pick: Pick, case: Case) -> Pick:
     """Return a pick, or for one of all profiles the one that stands for it where the case is a scene."""
     if not pick.every or pick.skipped or case.scene is None:
         return pick
-    others: Mapping[str, str] = getattr(engines.load(pick.engine), "of_scenes", {})
-    return replace(pick, profile=others.get(pick.profile, pick.profile))
+    return replace(pick, profile=engines.load(pick.engine).of_scenes.get(pick.profile, pick.profile))
 
 
 def load_cases(names: Sequence[str], variant: str | None, overrides: Mapping[str, Value]) -> tuple[Case, ...]:
@@ -233,7 +232,7 @@ def _ran(
 ) -> Entry:  # fmt: skip
     prepared = prepare(case, pick, asked)
     shown = prepared.audit()
-    hidden = {**engines.hidden(engines.load(pick.engine), prepared.profile), **shown.get("hidden", {})}
+    hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     began = process_time()
     natural: Trajectory = prepared.run()
@@ -249,11 +248,11 @@ def _ran(
         audit=rows,
         study=_study(case, pick, prepared, natural, run, took) if refine and natural.outcome.ok else None,
         hidden=hidden,
-        own=law_of(followed) if refine and (followed := getattr(prepared, "follows", None)) is not None else None,
+        own=law_of(prepared.follows) if refine and prepared.follows is not None else None,
     )
 
 
-def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> Any:
+def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:
     """A prepared run, with those of the asked settings that the engine has."""
     engine = engines.load(pick.engine)
     prepared = engine.prepare(case, pick.profile)
@@ -298,7 +297,7 @@ def _study(
     built = run(**of_scene, **size) if of_scene else None
     of_scene = {} if isinstance(built, str) else of_scene
     told: dict[str, Any] = {"why_built": built} if isinstance(built, str) else {"built": built}
-    if getattr(prepared, "follows", None) is not None:
+    if prepared.follows is not None:
         return Study(**told)
     if not size:
         return Study(why="It has neither a step nor a tolerance that could be refined.", **told)
