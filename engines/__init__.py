@@ -13,18 +13,18 @@ from crossbody.engines.contract import QUANTITIES, Engine, Run
 __all__ = ["QUANTITIES", "Engine", "Run", "load", "names", "summary"]
 
 
-_REGISTRY = Registry("engine", __name__, hidden=("contract", "equations", "linear", "nearest"))
+REGISTRY = Registry("engine", __name__, hidden=("contract", "equations", "linear", "nearest"))
 
 
 def names() -> tuple[str, ...]:
     """Names of all engines, installed or not; imports none of them."""
-    return _REGISTRY.names()
+    return REGISTRY.names()
 
 
 @checked_arguments
 def summary(name: str) -> str:
     """What an engine is, in one line; imports nothing."""
-    return _REGISTRY.summary(name)
+    return REGISTRY.summary(name)
 
 
 def load(name: str) -> Engine:
@@ -36,12 +36,12 @@ def load(name: str) -> Engine:
         EngineUnavailable: if its third-party package is not installed. A broken import of our own stays loud.
     """
     try:
-        module = _REGISTRY.load(name)
+        module = REGISTRY.load(name)
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package in ("", "crossbody"):
             raise
-        known = name in _REGISTRY.own()
+        known = name in REGISTRY.own()
         brings = f"crossbody[{name}]" if known else package
         raise EngineUnavailable(
             f"Engine {name!r} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."

@@ -142,7 +142,7 @@ def check_names(case: Case) -> None:
         for name in (each.metric for each in named):
             if name not in known:
                 raise UnknownName(f"metric (in {kind} of {case.label})", name, known)
-    installed = set(engines.names())
+    installed = {*engines.names(), *engines.REGISTRY.own()}
     for limit in case.limits:
         if limit.engine not in ("*", *installed):
             raise UnknownName(f"engine (in limits of {case.label})", limit.engine, installed)
