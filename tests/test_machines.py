@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from many_contacts import tower
-from mechanisms import _oscillator_gaps, _oscillator_rows, ball, sliders
+from mechanisms import ball, sliders
 
 from crossbody.cases import Mode, Outcome
 from crossbody.reference import System, kernels, simulate
@@ -101,26 +101,22 @@ def test_rows_without_memory_that_rest_on_each_other_do_not_flicker(n: int, lift
 SOLVERS = ("compiled", "cvode", "ida")
 
 
-@kernels.dynamics
-def _pushed(t, q, v, u, p, M, f, w):
-    M[0, 0] = 1.0
-    f[0] = u[0] - p[0] * q[0]
-
-
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_row_from_which_its_load_is_taken_stays_on_it_until_it_is_lifted(solver: str) -> None:
-    """Its multiplier is nothing but rounding, of either sign, for half of the run: that neither pulls nor releases."""
-    for seed in range(12):
-        stiffness, wall, press = np.random.default_rng([19, seed]).uniform(0.5, 20.0, 3)
-        a0, still = 10.0 ** (2.0 + 0.5 * seed), stiffness * wall
-        system = System(
-            n=1, inputs=1, parameters=[stiffness, wall], a0=[a0], a1=[2.0 * a0**0.5], dynamics=_pushed,
-            gaps=_oscillator_gaps, rows=_oscillator_rows,
-        )  # fmt: skip
-        inputs = ([0.0, 0.1, 0.2], [[still - press], [still], [still + press]])
-        run = simulate(system, [wall], [0.0], 0.25, solver=solver, inputs=inputs)
-        assert [e.t for e in run.events[:2]] == [0.0, pytest.approx(0.2, abs=1e-12)], seed
+def test_an_elastic_touch_without_load_is_one_contact(solver: str) -> None:
+    """Its multiplier begins and ends at zero, where rounding has any sign: it neither comes free there nor flickers."""
+    for seed in range(40):
+        rng = np.random.default_rng([19, seed])
+        a0, masses, start = 10.0 ** rng.uniform(1.0, 8.0), rng.uniform(0.1, 9.0, 2), np.sort(rng.normal(size=2))
+        speed = rng.uniform(0.1, 3.0)
+        system, v0 = sliders(2, a0=a0, a1=0.0, masses=masses.tolist()), np.array([speed, -rng.uniform() * speed])
+        time = (start[1] - start[0]) / (v0[0] - v0[1])
+        t_end, general = 2.0 * time + np.pi / a0**0.5, {"shortcuts": False} if solver == "compiled" else {}
+        run = simulate(system, start, v0, t_end, solver=solver, collisions="resolved", **general)
+        assert run.outcome.ok, (seed, run.message)
         assert [e.after for e in run.events].count(Mode.CONTACT) == 1, seed
+        assert run.events[0].t == pytest.approx(time, rel=1e-9)
+        assert run.events[-1].after is Mode.FREE
+        assert run.v[-1] == pytest.approx(2.0 * (masses @ v0) / masses.sum() - v0, abs=1e-6 * speed), seed
 
 
 @pytest.mark.parametrize("collisions", ["sequential", "resolved"])

@@ -1,6 +1,7 @@
 """The ball maze in MuJoCo and Pinocchio: each with rows, machine and controller of its own."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -73,6 +74,26 @@ def test_period_inside_a_ring(engine, profile, ring):
     R = float(case.parameters[f"inner{ring}"])
     exact = cf.period(LOCKED_G, R - 6.35e-3, 1.4, 1e-3)
     assert measured("swing_period", case, motion) == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("speed", [1e-5, 1e-4, 3e-4, 1e-3, 1e-2])
+def test_a_ball_that_hardly_reaches_the_face_above_falls_again(speed):
+    """Thrown up to touch at some speed: below g/a1 nothing pushes, and what weight pulls off does not stick.
+
+    The slowest stays below its surface for less than a step of either integrator takes.
+    """
+    case = load("ball_maze", variant="inside", ring=3)
+    top, far = float(case.parameters["inner3"]) - 6.35e-3, 1e-3
+    up = math.sqrt(speed * speed + 2.0 * LOCKED_G * far)
+    case = load("ball_maze", variant="inside", ring=3, t_end=up / LOCKED_G + 0.02)
+    case = replace(case, q0=np.array([0.0, 0.0, top - far, 0.0]), v0=np.array([0.0, 0.0, up, 0.0]))
+    truth, mine = (load_engine(name).prepare(case, how).run() for name, how in (("reference", "compiled"), FOLLOWS[0]))
+    assert [e.after for e in mine.events] == [e.after for e in truth.events] == [CONTACT, BALLISTIC, FREE]
+    assert mine.events[0].t == pytest.approx((up - speed) / LOCKED_G, abs=2e-12 / speed)
+    assert [e.t for e in mine.events] == pytest.approx([e.t for e in truth.events], abs=1e-5)
+    np.testing.assert_allclose(mine.q[-1], truth.q[-1], atol=1e-8)
+    if speed < LOCKED_G / float(case.law.a1[ABOVE]):
+        assert mine.q[-1, 2] == pytest.approx(top - far + up * case.t_end - 0.5 * LOCKED_G * case.t_end**2, abs=1e-8)
 
 
 @pytest.mark.parametrize(("engine", "profile"), FOLLOWS)

@@ -33,6 +33,12 @@ def test_a_touch_that_does_not_press_does_not_flicker(rtol: float) -> None:
     assert [event.after for event in run.events] == [Mode.CONTACT, Mode.BALLISTIC]
 
 
+@pytest.mark.parametrize("solver", ["cvode", "ida"])
+@pytest.mark.parametrize("seed", [215, 217, 586, 627, 652])
+def test_a_row_that_is_let_go_while_it_closes_is_not_caught_on_the_spot(seed: int, solver: str) -> None:
+    assert compared(seed, solver) < 1e-6
+
+
 def compared(seed: int, solver: str) -> float:
     """Difference of the ends between a solver at its own steps and the compiled loop at short ones."""
     system, q0, v0 = drawn(seed)
