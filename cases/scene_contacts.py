@@ -17,8 +17,8 @@ PLACES = {
     ("sphere", "box"): 1, ("capsule", "capsule"): 2, ("plane", "hull"): 256,
 }  # fmt: skip
 """Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull, lowest and
-highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end if
-they lie along each other. Of a hull it is the most: each has as many as corners."""
+highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end
+if they lie along each other. Of a hull it is the most: each has as many as corners."""
 LEVELLED = 1e-14
 """Sine of the angle between an axis and a plane below which it lies in it: rounding."""
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6

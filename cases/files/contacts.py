@@ -12,6 +12,7 @@ import numpy as np
 from crossbody.cases._arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.pairs import allowed
+from crossbody.cases.scene_contacts import PLACES
 
 APART, HALVINGS = 1e-3, 30
 """Longest time between two looks, s, and how often it is halved where two shapes have met in between."""
@@ -51,9 +52,10 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
                 before, time, pair = (before, half, sooner) if sooner else (half, time, pair)
             return (
                 f"Shapes {pair[0]!r} and {pair[1]!r} come within reach at t = {time:.6g} s: the model has no row for "
-                "them, because they have friction (without=friction leaves it out of every engine) or because no gap "
-                "is known for such shapes; without=contacts leaves all contacts out of every engine, and a shorter "
-                "t_end ends before."
+                "them, because they have friction (without=friction leaves it out of every engine), because no gap is "
+                f"known for such shapes, or because a hull has more than {PLACES['plane', 'hull']} corners (a mesh of "
+                "a file has at most its maxhullvert); without=contacts leaves all contacts out of every engine, and a "
+                "shorter t_end ends before."
             )
     return ""
 

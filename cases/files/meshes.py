@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ BYTES = 50_000_000
 """Of a mesh."""
 READ = (".stl", ".obj", ".msh")
 """Formats that MuJoCo reads; of the others Coal, Pinocchio's collision library, reads those that Assimp does."""
+
+TEXT = re.compile(rb"\s*solid\b[^\0]*\bfacet\b")
+"""Beginning of an STL file in text, which MuJoCo does not read."""
 
 
 def content(path: Path) -> bytes:
@@ -99,9 +103,10 @@ def supplied(root: ElementTree.Element, path: Path) -> dict[str, bytes]:
     for mesh in root.findall("link/collision/geometry/mesh"):
         file = located(mesh.get("filename", ""), path)
         if file not in names:
-            suffix = file.suffix.lower()
-            names[file] = f"{file.stem} {len(names)}{suffix if suffix in READ else '.obj'}"
-            found[names[file]] = content(file) if suffix in READ else _by_coal(file)
+            held, suffix = content(file), file.suffix.lower()
+            foreign = suffix not in READ or (suffix == ".stl" and TEXT.match(held))
+            names[file] = f"{file.stem} {len(names)}{'.obj' if foreign else suffix}"
+            found[names[file]] = _by_coal(file) if foreign else held
         mesh.set("filename", names[file])
     return found
 
@@ -132,7 +137,6 @@ def located(name: str, path: Path) -> Path:
 
 def _by_coal(file: Path) -> bytes:
     """Return the hull of a mesh in a format that MuJoCo does not read, as an OBJ file."""
-    content(file)
     try:
         import coal
     except ImportError:
@@ -153,7 +157,9 @@ def _obj(points: Floats, file: Path) -> bytes:
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):
-        raise SceneError(f"Mesh {file} has {len(points)} points that fill no space; a hull needs four that do.") from None
+        raise SceneError(
+            f"Mesh {file} has {len(points)} points that fill no space; a hull needs four that do."
+        ) from None
     corners = points[hull.vertices]
     number = np.empty(len(points), dtype=int)
     number[hull.vertices] = np.arange(1, len(corners) + 1)
