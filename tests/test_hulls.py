@@ -12,19 +12,18 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.optimize import brentq
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from crossbody import cases, engines
-from crossbody.cases import Mode, Outcome, SceneError
+from crossbody.cases import InvalidValue, Mode, Outcome, SceneError
 from crossbody.cases._rotations import matrices
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES, contacts, watched
 from crossbody.engines._contacts import Contacts
 from crossbody.engines.mujoco._build import compiled, spec_of
-from crossbody.reports.cli import cli
+from crossbody.reports.cli import main
 
 GRAVITY = 9.81
 LAW = RowLaw(a0=1e4, a1=20.0)
@@ -229,7 +228,7 @@ def test_what_stays_watched_is_told(tmp_path: Path) -> None:
 
 
 BROKEN = {
-    "flat": ("coplanar", lambda path: path.write_bytes(flat())),
+    "flat": ("coplanar|volume is too small", lambda path: path.write_bytes(flat())),
     "three points": (
         "at least 4 vertices",
         lambda path: path.write_bytes(triangles([[(0, 0, 0), (1, 0, 0), (0, 1, 0)]])),
@@ -239,7 +238,7 @@ BROKEN = {
     "cut": ("wrong size", lambda path: path.write_bytes(flat()[:150])),
     "empty": ("is empty", lambda path: path.write_bytes(b"")),
     "an enormous count": ("number of faces", lambda path: path.write_bytes(b"\0" * 80 + struct.pack("<I", 2**31))),
-    "too large": ("more than 50000000 bytes", lambda path: path.open("wb").truncate(50_000_001)),
+    "too large": ("more than 50000000 bytes", lambda path: (path.touch(), os.truncate(path, 50_000_001))),
     "missing": ("Error opening file", lambda path: None),
     "a pipe": ("it is a folder, a pipe or a device", os.mkfifo),
     "a folder": ("it is a folder, a pipe or a device|Is a directory", lambda path: path.mkdir()),
@@ -257,15 +256,19 @@ def flat(last: float = 0.0) -> bytes:
 
 @pytest.mark.parametrize("kind", BROKEN)
 @pytest.mark.parametrize("format_", ["xml", "urdf"])
-def test_a_mesh_that_cannot_be_used_is_one_sentence(kind: str, format_: str, tmp_path: Path) -> None:
+def test_a_mesh_that_cannot_be_used_is_one_sentence(
+    kind: str, format_: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     told, make = BROKEN[kind]
     make(tmp_path / "a.stl")
     path = tmp_path / f"robot.{format_}"
     path.write_text({"xml": MJCF, "urdf": URDF}[format_].format(mesh="a.stl"), encoding="utf-8")
-    result = CliRunner().invoke(cli, ["run", str(path), "-e", "reference:compiled", "--out", str(tmp_path / "out")])
-    assert result.exit_code == 2, result.output
-    assert re.search(told if kind != "missing" or format_ == "xml" else "is not there", " ".join(result.stderr.split()))
-    assert "Traceback" not in result.output
+    with pytest.raises(SystemExit) as ended:
+        main(["run", str(path), "-e", "reference:compiled", "--out", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert ended.value.code == 2, said
+    assert re.search("is not there" if (kind, format_) == ("missing", "urdf") else told, said), said
+    assert "Traceback" not in said
     assert not (tmp_path / "out").exists()
     without = cases.load(str(path), without="meshes", t_end=0.1)
     assert engines.load("reference").prepare(without).run().outcome is Outcome.FINISHED
@@ -373,3 +376,35 @@ def test_a_hull_that_is_none_is_refused(corners: Any, told: str) -> None:
 def test_corners_of_another_shape_are_refused() -> None:
     with pytest.raises(SceneError, match="a hull alone has them"):
         Shape(name="box", type="box", size=(1.0, 1.0, 1.0), corners=((0.0, 0.0, 0.0),) * 4)
+
+
+ARM = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1" pos="0 0 -1"/><body name="base" pos="0 0 .1">
+<geom type="box" size=".1 .1 .1" mass="1"/><body name="link" pos="0 0 .25"><joint name="a" axis="0 1 0"/>
+<geom type="box" size=".02 .02 .1" mass="1"/><body pos="0 0 -.3"><joint name="b" axis="0 1 0"/>
+<geom name="hand" type="box" size=".05 .05 .05" mass="1"/></body></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("without", ["overlaps", "pair:base:body3"])
+def test_bodies_that_overlap_are_kept_apart_in_every_engine(without: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM if without == "overlaps" else ARM.replace('pos="0 0 -.3"', 'name="body3" pos="0 0 -.3"'))
+    given = cases.load(str(path), t_end=0.1, without="friction")
+    told = engines.load("reference").prepare(given).run()
+    assert told.outcome is Outcome.INCONSISTENT
+    assert re.search(r"'shape1' of 'base' and 'hand'|'hand' and 'shape1' of 'base'", told.message)
+    case = cases.load(str(path), t_end=0.1, without=f"friction,{without}")
+    assert case.scene is not None
+    kept = [{pair.first, pair.second} for pair in case.scene.pairs]
+    assert kept == [{"floor", "shape2"}, {"floor", "hand"}, {"shape1", "shape2"}]
+    for engine, profile in (("reference", "compiled"), ("pinocchio", "law")):
+        assert engines.load(engine).prepare(case, profile).run().outcome is Outcome.FINISHED
+    soft: Any = engines.load("mujoco").prepare(case, "as_is")
+    assert soft.scene.model.nexclude == 1
+
+
+def test_a_pair_that_is_none_names_the_bodies(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM, encoding="utf-8")
+    for words in ("pair:base:arm", "pair:base", "pair:base:link:hand"):
+        with pytest.raises(InvalidValue, match=r"is no pair of bodies .* the file has: .*base, link"):
+            cases.load(str(path), without=words)
