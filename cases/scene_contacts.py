@@ -16,7 +16,7 @@ PLACES = {
     ("plane", "ellipsoid"): 1, ("sphere", "sphere"): 1, ("sphere", "capsule"): 1, ("sphere", "cylinder"): 1,
     ("sphere", "box"): 1, ("capsule", "capsule"): 2, ("plane", "hull"): 256,
 }  # fmt: skip
-"""Places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull, lowest and
+"""Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull, lowest and
 highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end
 if they lie along each other. Of a hull it is the most: each has as many as corners."""
 LEVELLED = 1e-14

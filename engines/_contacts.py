@@ -202,12 +202,12 @@ class Contacts:
         )  # fmt: skip
 
     def _sizes(self, shapes: Indices) -> Floats:
-        """Return the extents of shapes of one type; the last corner of a hull stands for those it lacks."""
+        """Return the extents of shapes of one type; a hull's last corner stands for those that others have more."""
         found = [self._extents[i] for i in shapes]
-        most = max(len(one) for one in found)
-        return np.array(
-            [np.pad(one, ((0, most - len(one)), (0, 0)), mode="edge") if one.ndim > 1 else one for one in found]
-        )
+        if found[0].ndim == 1:
+            return np.array(found)
+        most = np.arange(max(map(len, found)))
+        return np.array([one[np.minimum(most, len(one) - 1)] for one in found])
 
     def _lying(self, group: _Group, at: Pose, by: Pose, along: Mapping[int, bool]) -> NDArray[np.bool_]:
         if not group.sine.any():

@@ -209,7 +209,22 @@ def _contacts(rng: np.random.Generator, made: Sequence[Body], joints: Sequence[J
         if ((one.type, two.type) in PLACES or (two.type, one.type) in PLACES)
         and carriers[one.body] != carriers[two.body]
     ]
-    return {"shapes": tuple(shapes), "pairs": tuple(pairs[::3])}
+    hulls = [_hull(made[-1])] if carriers[made[-1].name] else []
+    return {"shapes": (*shapes, *hulls), "pairs": (*pairs[::3], *(_over(shapes[0], hull) for hull in hulls))}
+
+
+def _hull(body: Body) -> Shape:
+    """Return an octahedron on a body; by numbers of its own, which leave those of the other parts as they were."""
+    rng = np.random.default_rng(int(1e6 * body.mass))
+    corners = np.concatenate([np.eye(3), -np.eye(3)]) * rng.uniform(0.1, 0.4, (6, 1))
+    return Shape(
+        name="hull", body=body.name, type="hull", corners=tuple(map(tuple, np.float32(corners).tolist())),
+        position=tuple(rng.normal(size=3)), orientation=_unit(rng, 4),
+    )  # fmt: skip
+
+
+def _over(floor: Shape, hull: Shape) -> Pair:
+    return Pair(name=f"{floor.name}:{hull.name}", first=floor.name, second=hull.name, margin=0.05)
 
 
 def _shape(rng: np.random.Generator, name: str, body: str, kind: str) -> Shape:

@@ -29,12 +29,15 @@ def differences(mine: Any, theirs: Any, path: str = "scene") -> list[str]:
     return [found for i, (a, b) in pairs for found in differences(a, b, f"{path}[{i}]")]
 
 
-USED = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+USED = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3, "hull": 0}
 """Sizes that a shape has."""
 
 
 def told(scene: Scene) -> Scene:
-    """Return what of a scene a file can say: pushes, shapes that meet nothing and unused numbers left out."""
+    """Return what of a scene a file can say, pairs and corners sorted.
+
+    Pushes, shapes that meet nothing and unused numbers are left out.
+    """
     met = {name for pair in scene.pairs for name in (pair.first, pair.second)}
     sizes = {s.name: (*s.size[: USED[s.type]], *(0.0,) * (3 - USED[s.type])) for s in scene.shapes if s.name in met}
     gears = {a.name: (*a.gear, *(0.0,) * (6 - len(a.gear))) for a in scene.actuators}
@@ -43,9 +46,12 @@ def told(scene: Scene) -> Scene:
     }  # fmt: skip
     return scene.replace(
         joints=tuple(replace(joint, **unused.get(joint.type, {})) for joint in scene.joints),
-        shapes=tuple(replace(s, size=sizes[s.name]) for s in scene.shapes if s.name in sizes),
+        shapes=tuple(
+            replace(s, size=sizes[s.name], corners=tuple(sorted(s.corners))) for s in scene.shapes if s.name in sizes
+        ),
         actuators=tuple(replace(a, gear=gears[a.name]) for a in scene.actuators),
-        pairs=tuple(replace(pair, friction=(0.0,) * 5) for pair in scene.pairs), pushes=(),
+        pairs=tuple(sorted((replace(pair, friction=(0.0,) * 5) for pair in scene.pairs), key=lambda pair: pair.name)),
+        pushes=(),
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def drawn(rng: np.random.Generator, types: tuple[str, str]) -> tuple[Contacts, d
     """Two shapes on two bodies, so near that they often overlap."""
     names = ("one", "two")
     shapes = tuple(
-        Shape(name=name, body=name, type=kind, size=tuple(rng.uniform(0.1, 0.4, 3)),
+        Shape(name=name, body=name, type=kind, size=tuple(rng.uniform(0.1, 0.4, 3)), corners=corners(rng, kind),
               position=tuple(0.05 * rng.normal(size=3)), orientation=tuple(Rotation.random(rng=rng).as_quat()))
         for name, kind in zip(names, types, strict=True)
     )  # fmt: skip
@@ -34,6 +34,12 @@ def drawn(rng: np.random.Generator, types: tuple[str, str]) -> tuple[Contacts, d
     bodies = tuple(Body(name=name, mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)) for name in names)
     pair = Pair(name="pair", first="one", second="two", margin=0.01)
     return Contacts(Scene(bodies=bodies, shapes=shapes, pairs=(pair,))), poses
+
+
+def corners(rng: np.random.Generator, kind: str) -> tuple[tuple[float, ...], ...]:
+    """Of a hull four to nine of a sphere, no two hulls as many for sure."""
+    points = rng.normal(size=(rng.integers(4, 10), 3)) if kind == "hull" else np.zeros((0, 3))
+    return tuple(map(tuple, (0.3 * points / np.linalg.norm(points, axis=1, keepdims=True)).tolist()))
 
 
 def moved(along: Floats, pose: Pose, step: float) -> Pose:
@@ -82,6 +88,8 @@ def surface(rng: np.random.Generator, shape: Shape) -> Floats:
     size, x = np.array(shape.size), rng.uniform(-1.0, 1.0, (POINTS, 3))
     if shape.type == "sphere":
         return np.zeros((1, 3))
+    if shape.type == "hull":
+        return rng.dirichlet(np.full(len(shape.corners), 0.05), POINTS) @ shape.corners
     if shape.type == "capsule":
         return np.linspace(-size[1], size[1], 400)[:, None] * np.array([0.0, 0.0, 1.0])
     if shape.type == "ellipsoid":

@@ -35,7 +35,7 @@ NOTHING = [pytest.param("", marks=pytest.mark.skip(reason="The packages of the e
 def read(name: str, path: Path) -> tuple[Any, Scene] | None:
     """Return the model and the scene of a file less its friction; None where it is refused as it should be."""
     try:
-        model = model_of(path, "friction")
+        model = model_of(path, "friction,meshes")
         scene = scene_of(path, model)
         check_runnable(scene)
         tabulate(scene)

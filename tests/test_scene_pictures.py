@@ -89,8 +89,14 @@ def test_forces_act_where_the_rows_push(seed: int) -> None:
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     drawn = picture.arrows(q[None], np.ones((1, rows)), told(scene))[0]
-    owners = [contact for contact in met for _ in range(contact.places)]
-    for row, arrow, contact in zip(H, drawn, owners, strict=True):
+    owners, pushed, first = [], [], 0
+    for contact in met:  # of all corners of a hull there is one arrow
+        own, first = H[first : first + contact.places], first + contact.places
+        pushed += [own.sum(axis=0) / contact.places] if contact.second.type == "hull" else [*own]
+        owners += [contact] * (1 if contact.second.type == "hull" else contact.places)
+    forces = np.array([6.0 if contact.second.type == "hull" else 1.0 for contact in owners])
+    drawn[:, 3:] /= forces[:, None]
+    for row, arrow, contact in zip(pushed, drawn, owners, strict=True):
         if not row.any():  # none, as its shapes lie
             continue
         J = jacobians(model, data, scene, contact, arrow[:3])
@@ -121,10 +127,15 @@ def reach(shape: Shape, n: Any) -> float:
     return {
         "sphere": a, "capsule": a + b * abs(n[2]), "cylinder": a * across + b * abs(n[2]),
         "box": float(np.abs(n) @ shape.size), "ellipsoid": float(np.linalg.norm(n * shape.size)),
+        "hull": float((np.reshape(shape.corners, (-1, 3)) @ n).max(initial=-1.0)),
     }[shape.type]  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["sphere", "capsule", "cylinder", "box", "ellipsoid"])
+WEDGE = ((0.3, 0.2, 0.0), (-0.3, 0.2, 0.0), (-0.3, -0.2, 0.0), (0.3, -0.2, 0.0), (0.3, 0.0, 0.1), (-0.3, 0.0, 0.1))
+"""Five sides of a hull, three of them with four corners."""
+
+
+@pytest.mark.parametrize("kind", ["sphere", "capsule", "cylinder", "box", "ellipsoid", "hull"])
 def test_a_solid_reaches_as_far_as_its_shape(kind: str) -> None:
     """Along the axes of the shape to the last digit that is drawn, along others but for the corners of a circle."""
     rng = np.random.default_rng(5)
@@ -132,7 +143,13 @@ def test_a_solid_reaches_as_far_as_its_shape(kind: str) -> None:
     x, y, z, w = turn.as_quat()
     place = rng.normal(size=3)
     shape = Shape(
-        name="s", body="ball", type=kind, size=(0.3, 0.2, 0.1), position=tuple(place), orientation=(w, x, y, z)
+        name="s",
+        body="ball",
+        type=kind,
+        size=(0.3, 0.2, 0.1),
+        position=tuple(place),
+        orientation=(w, x, y, z),
+        corners=WEDGE if kind == "hull" else (),
     )
     (solid,) = picture.stage(told(BALL.replace(shapes=(shape,)))).solids
     for n, exact in [
@@ -144,15 +161,16 @@ def test_a_solid_reaches_as_far_as_its_shape(kind: str) -> None:
         assert (1.0 - exact) * reach(shape, n) - 1e-5 < found < reach(shape, n) + 1e-5
 
 
-@pytest.mark.parametrize("kind", ["cylinder", "box"])
+@pytest.mark.parametrize("kind", ["cylinder", "box", "hull"])
 def test_faces_of_a_solid_are_seen_from_outside(kind: str) -> None:
-    shape = Shape(name="s", body="ball", type=kind, size=(0.3, 0.2, 0.1))
+    shape = Shape(name="s", body="ball", type=kind, size=(0.3, 0.2, 0.1), corners=WEDGE if kind == "hull" else ())
     (solid,) = picture.stage(told(BALL.replace(shapes=(shape,)))).solids
     corners = np.array(solid["points"])
-    assert len(solid["faces"]) == {"cylinder": 2, "box": 6}[kind]
+    assert len(solid["faces"]) == {"cylinder": 2, "box": 6, "hull": 5}[kind]
     for face in solid["faces"]:  # against the clock
         x, y, z = corners[list(face[:3])]
-        assert np.cross(y - x, z - y) @ corners[list(face)].mean(axis=0) > 0.0
+        assert np.cross(y - x, z - y) @ (corners[list(face)].mean(axis=0) - corners.mean(axis=0)) > 0.0
+        assert kind != "hull" or (np.cross(y - x, z - y) @ (corners - x).T < 1e-9).all()  # no corner is beyond a side
 
 
 def test_a_body_without_a_shape_is_the_box_of_its_inertia() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.pairs import allowed
+from crossbody.cases.scene_contacts import PLACES
 
 APART, HALVINGS = 1e-3, 30
 """Longest time between two looks, s, and how often it is halved where two shapes have met in between."""
@@ -35,13 +36,13 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
     if all(frozenset((name(a), name(b))) in known for a, b in allowed(model)):
         return ""
 
-    def met(position: Floats) -> tuple[str, ...]:
+    def met(position: Floats) -> tuple[int, ...]:
         data.qpos[:] = position
         mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
         # The list of none costs thirty times what looking for them does.
-        both = ((name(int(i)) for i in contact.geom) for contact in data.contact) if data.ncon else ()
-        return next((pair for pair in map(tuple, both) if frozenset(pair) not in known), ())
+        both = (contact.geom.tolist() for contact in data.contact) if data.ncon else ()
+        return next((tuple(pair) for pair in both if frozenset(map(name, pair)) not in known), ())
 
     for before, time, position in _looks(model, t, q, v):
         if pair := met(position(time)):
@@ -49,13 +50,32 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
                 half = 0.5 * (before + time)
                 sooner = met(position(half))
                 before, time, pair = (before, half, sooner) if sooner else (half, time, pair)
+            both = " and ".join(_named(model, geom) for geom in pair)
             return (
-                f"Shapes {pair[0]!r} and {pair[1]!r} come within reach at t = {time:.6g} s: the model has no row for "
-                "them, because they have friction (without=friction leaves it out of every engine) or because no gap "
-                "is known for such shapes; without=contacts leaves all contacts out of every engine, and a shorter "
-                "t_end ends before."
+                f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for them, because they "
+                "have friction (without=friction leaves it out of every engine), because no gap is known for such shapes, "
+                "or because a hull has more than "
+                f"{PLACES['plane', 'hull']} corners (a mesh of a file has at most its maxhullvert). "
+                f"{_advice(model, pair)}without=contacts leaves all contacts out, and a shorter t_end ends before."
             )
     return ""
+
+
+def _named(model: Any, geom: int) -> str:
+    """Return a shape's name; of one that has none in the file that of its body too."""
+    named, body = mjcf.names(model, "geom")(geom), mjcf.names(model, "body")(int(model.geom_bodyid[geom]))
+    return f"{named!r}" if model.geom(geom).name or not body else f"{named!r} of {body!r}"
+
+
+def _advice(model: Any, pair: tuple[int, ...]) -> str:
+    """Return how such shapes are kept out of every engine, if both are of bodies."""
+    bodies = [str(model.body(int(model.geom_bodyid[geom])).name) for geom in pair]
+    if not all(bodies):
+        return ""
+    return (
+        f"without=pair:{':'.join(bodies)} leaves what these two bodies touch each other with out of every engine, "
+        "without=overlaps that of all that overlap in the reference pose, "
+    )
 
 
 def _looks(model: Any, t: Floats, q: Floats, v: Floats) -> Iterator[tuple[float, float, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ BYTES = 50_000_000
 """Of a mesh."""
 READ = (".stl", ".obj", ".msh")
 """Formats that MuJoCo reads; of the others Coal, Pinocchio's collision library, reads those that Assimp does."""
+
+TEXT = re.compile(rb"\s*solid\b[^\0]*\bfacet\b")
+"""Beginning of an STL file in text, which MuJoCo does not read."""
 
 
 def content(path: Path) -> bytes:
@@ -47,14 +51,14 @@ def check_files(spec: Any, path: Path) -> None:
 
 
 def leave_out_colliding(spec: Any) -> None:
-    """Let no mesh of an MJCF file touch anything."""
+    """Let no mesh of an MJCF file touch anything, and take out those that then are only drawn."""
     meshes = [geom for geom in spec.geoms if geom.meshname]
+    for pair in list(spec.pairs):
+        if {pair.geomname1, pair.geomname2} & {geom.name for geom in meshes}:
+            spec.delete(pair)
     for geom in meshes:
         geom.contype = geom.conaffinity = 0
-    names = {geom.name for geom in meshes}
-    for pair in list(spec.pairs):
-        if {pair.geomname1, pair.geomname2} & names:
-            spec.delete(pair)
+    _leave_out(spec, {_name(mesh) for mesh in spec.meshes})
 
 
 def leave_out_missing(spec: Any, path: Path) -> list[str]:
@@ -62,14 +66,24 @@ def leave_out_missing(spec: Any, path: Path) -> list[str]:
 
     A mesh that may touch or that gives its body inertia stays, for the compiler to name its file.
     """
-    gone = {mesh.name or file.stem: file for mesh, file in _files(spec, path) if not file.exists()}
-    using = {name: [geom for geom in spec.geoms if geom.meshname == name] for name in gone}
+    gone = {_name(mesh): file for mesh, file in _files(spec, path) if not file.exists()}
+    taken = _leave_out(spec, set(gone))
+    return [f"Mesh {name!r} is only drawn, and left out: there is no file {gone[name]}." for name in taken]
+
+
+def _leave_out(spec: Any, names: set[str]) -> list[str]:
+    """Take out those of the meshes of these names that are only drawn; return which."""
     touching = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
-    drawn = [name for name in gone if all(_only_drawn(spec, geom, touching) for geom in using[name])]
-    for name in drawn:
-        for part in [*using[name], *(mesh for mesh, file in _files(spec, path) if file == gone[name])]:
-            spec.delete(part)
-    return [f"Mesh {name!r} is only drawn, and left out: there is no file {gone[name]}." for name in drawn]
+    using = {name: [geom for geom in spec.geoms if geom.meshname == name] for name in names}
+    taken = sorted(name for name in names if all(_only_drawn(spec, geom, touching) for geom in using[name]))
+    meshes = [mesh for mesh in spec.meshes if _name(mesh) in taken]
+    for part in [*(geom for name in taken for geom in using[name]), *meshes]:
+        spec.delete(part)
+    return taken
+
+
+def _name(mesh: Any) -> str:
+    return mesh.name or Path(mesh.file).stem
 
 
 def _files(spec: Any, path: Path) -> Iterator[tuple[Any, Path]]:
@@ -99,9 +113,10 @@ def supplied(root: ElementTree.Element, path: Path) -> dict[str, bytes]:
     for mesh in root.findall("link/collision/geometry/mesh"):
         file = located(mesh.get("filename", ""), path)
         if file not in names:
-            suffix = file.suffix.lower()
-            names[file] = f"{file.stem} {len(names)}{suffix if suffix in READ else '.obj'}"
-            found[names[file]] = content(file) if suffix in READ else _by_coal(file)
+            held, suffix = content(file), file.suffix.lower()
+            foreign = suffix not in READ or (suffix == ".stl" and TEXT.match(held))
+            names[file] = f"{file.stem} {len(names)}{'.obj' if foreign else suffix}"
+            found[names[file]] = _by_coal(file) if foreign else held
         mesh.set("filename", names[file])
     return found
 
@@ -122,7 +137,7 @@ def located(name: str, path: Path) -> Path:
     else:
         tried = [above[0] / inside]
     for file in tried:
-        if file.is_file():
+        if file.exists():
             return file
     raise SceneError(
         f"{path}: the mesh {name!r}, with which a link collides, is not there (tried {tried[0]}"
@@ -132,7 +147,6 @@ def located(name: str, path: Path) -> Path:
 
 def _by_coal(file: Path) -> bytes:
     """Return the hull of a mesh in a format that MuJoCo does not read, as an OBJ file."""
-    content(file)
     try:
         import coal
     except ImportError:

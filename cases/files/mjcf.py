@@ -13,6 +13,7 @@ from crossbody.cases.files.meshes import check_files, leave_out_colliding, leave
 from crossbody.cases.files.pairs import pairs_of
 from crossbody.cases.files.understood import check_understood
 from crossbody.cases.files.warned import compiled, sentences
+from crossbody.cases.files.without import apart, without_meshes
 from crossbody.cases.scene import (
     ROWS,
     UNBOUNDED,
@@ -39,16 +40,17 @@ WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 JOINT_WRAP, SITE_WRAP = 1, 3
 
 
-def model_of(path: Path, *, meshes: bool = True) -> mujoco.MjModel:
-    """Return MuJoCo's model of a file as it stands; without `meshes` none of these touches anything.
+def model_of(path: Path, without: str = "") -> mujoco.MjModel:
+    """Return MuJoCo's model of a file as it stands but for what has to be left out before it is compiled.
 
     Raises:
         SceneError: with MuJoCo's own sentence.
+        InvalidValue: for a pair of bodies that the file does not have.
     """
-    return _compiled(path, meshes=meshes)[0]
+    return _compiled(path, without)[0]
 
 
-def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
+def _compiled(path: Path, without: str) -> tuple[mujoco.MjModel, list[str]]:
     """Return the model, and what is told of it: what MuJoCo warns of, and meshes that are left out."""
     import mujoco
 
@@ -56,7 +58,7 @@ def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
 
     def opened() -> Any:
         spec = mujoco.MjSpec.from_file(str(path))
-        if not meshes:
+        if without_meshes(without):
             leave_out_colliding(spec)
         return spec
 
@@ -64,19 +66,19 @@ def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
         spec = opened()
         check_files(spec, path)
         try:
-            return spec.compile()
+            return apart(spec, without)
         except ValueError:
             spec = opened()
             told.extend(leave_out_missing(spec, path))
-            return spec.compile()
+            return apart(spec, without)
 
     model, warned = compiled(path, compiler)
     return model, [*sentences(warned), *told]
 
 
-def findings(path: Path, *, meshes: bool = True) -> list[str]:
+def findings(path: Path, without: str = "") -> list[str]:
     """Return what MuJoCo warns of, and which meshes are not there."""
-    return _compiled(path, meshes=meshes)[1]
+    return _compiled(path, without)[1]
 
 
 def scene_of(model: mujoco.MjModel) -> Scene:

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from crossbody.cases.files import mjcf, urdf
-from crossbody.cases.files.without import leaves_out, strip
-from crossbody.cases.regular import open_regular
+from crossbody.cases.files.without import strip
 from crossbody.cases.scene import Scene
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ def model_of(path: Path, without: str = "") -> mujoco.MjModel:
         SceneError: with the compiler's own sentence.
         InvalidValue: for a word in `without` that names nothing.
     """
-    model = (urdf if is_urdf(path) else mjcf).model_of(path, meshes=not leaves_out(without, "meshes", "contacts"))
+    model = (urdf if is_urdf(path) else mjcf).model_of(path, without)
     strip(model, without)
     return model
 
@@ -48,5 +47,4 @@ def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
 
 def findings_of(path: Path, without: str = "") -> tuple[str, ...]:
     """Return sentences on what is strange in a file but taken as it stands."""
-    meshes = not leaves_out(without, "meshes", "contacts")
-    return tuple((urdf if is_urdf(path) else mjcf).findings(path, meshes=meshes))
+    return tuple((urdf if is_urdf(path) else mjcf).findings(path, without))

@@ -18,6 +18,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import SceneError
 from crossbody.cases.files.meshes import supplied
 from crossbody.cases.files.warned import compiled, sentences
+from crossbody.cases.files.without import apart, without_meshes
 from crossbody.cases.scene import Body, Loop, Scene
 
 if TYPE_CHECKING:
@@ -41,16 +42,17 @@ def parsed(path: Path) -> ElementTree.Element:
     return root
 
 
-def model_of(path: Path, *, meshes: bool = True) -> mujoco.MjModel:
+def model_of(path: Path, without: str = "") -> mujoco.MjModel:
     """Return MuJoCo's model of the tree, with a placeholder for every inertia and without what is only drawn.
 
     Raises:
         SceneError: with MuJoCo's own sentence, or for a mesh that cannot be read.
+        InvalidValue: for a pair of bodies that the file does not have.
     """
-    return _compiled(path, meshes=meshes)[0]
+    return _compiled(path, without)[0]
 
 
-def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
+def _compiled(path: Path, without: str) -> tuple[mujoco.MjModel, list[str]]:
     """Return the model, and what MuJoCo warned of, which else goes to the terminal at every reading."""
     import mujoco
 
@@ -60,7 +62,7 @@ def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
             link.remove(part)
         link.append(ElementTree.fromstring(PLACEHOLDER))
         for collision in link.findall("collision"):
-            if not meshes and collision.find("geometry/mesh") is not None:
+            if without_meshes(without) and collision.find("geometry/mesh") is not None:
                 link.remove(collision)
     for own in root.findall("mujoco"):
         root.remove(own)
@@ -68,7 +70,7 @@ def _compiled(path: Path, *, meshes: bool) -> tuple[mujoco.MjModel, list[str]]:
     ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
     files = supplied(root, path)
     text = ElementTree.tostring(root, encoding="unicode")
-    return compiled(path, lambda: mujoco.MjModel.from_xml_string(text, files))
+    return compiled(path, lambda: apart(mujoco.MjSpec.from_string(text, assets=files), without))
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:
@@ -82,9 +84,9 @@ def with_inertias(path: Path, scene: Scene) -> Scene:
     return scene.replace(bodies=bodies, loops=(*scene.loops, *loops))
 
 
-def findings(path: Path, *, meshes: bool = True) -> list[str]:
+def findings(path: Path, without: str = "") -> list[str]:
     """Return what MuJoCo warns of, and a sentence for every link whose inertia no rigid body can have."""
-    told = sentences(_compiled(path, meshes=meshes)[1])
+    told = sentences(_compiled(path, without)[1])
     for link in parsed(path).findall("link"):
         if link.find("inertial") is None:
             continue

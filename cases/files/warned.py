@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from crossbody.cases.errors import SceneError
+from crossbody.cases.errors import CrossbodyError, SceneError
 
 NOT_A_NUMBER = "'NaN'"
 """What MuJoCo's warning names; it takes such an entry as not given."""
@@ -36,6 +36,8 @@ def compiled(path: Path, compiler: Callable[[], Any]) -> tuple[Any, list[str]]:
     with captured() as warned:
         try:
             found = compiler()
+        except CrossbodyError:
+            raise
         except ValueError as error:
             raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
     if any(NOT_A_NUMBER in text for text in warned):

@@ -7,12 +7,51 @@ from typing import Any
 
 from crossbody.cases.errors import InvalidValue
 
-ALL = ("friction", "contacts", "meshes", "limits", "actuators", "loops", "tendons")
+ALL = ("friction", "contacts", "meshes", "overlaps", "limits", "actuators", "loops", "tendons")
 
 
-def leaves_out(without: str, *words: str) -> bool:
-    """Return whether one of the words that leave features out is among these."""
-    return not {part.strip() for part in without.split(",")}.isdisjoint(words)
+def without_meshes(without: str) -> bool:
+    """Return whether no mesh touches anything."""
+    return not {"meshes", "contacts"}.isdisjoint(_words(without))
+
+
+def apart(spec: Any, without: str) -> Any:
+    """Return the compiled model in which pairs of bodies that are left out do not touch each other.
+
+    Args:
+        spec: MuJoCo's; it is changed.
+        without: of `strip`; here count pair:BODY:BODY and overlaps: bodies that do so in the reference pose.
+
+    Raises:
+        InvalidValue: for a pair of bodies that there is not.
+    """
+    words = _words(without)
+    bodies = {body.name for body in spec.bodies}
+    for word in words:
+        kind, *names = word.split(":")
+        if kind == "pair":
+            if len(names) != 2 or not bodies.issuperset(names):
+                known = ", ".join(sorted(filter(None, bodies)))
+                raise InvalidValue(f"without: {word!r} is no pair of bodies (pair:BODY:BODY); the file has: {known}.")
+            spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
+    model = spec.compile()
+    return _without_overlaps(spec, model) if "overlaps" in words else model
+
+
+def _without_overlaps(spec: Any, model: Any) -> Any:
+    """Return the model in which bodies never touch whose shapes overlap in the reference pose, planes aside."""
+    import mujoco
+
+    data, plane = mujoco.MjData(model), int(mujoco.mjtGeom.mjGEOM_PLANE)
+    mujoco.mj_forward(model, data)
+    met = [contact.geom for contact in data.contact if contact.dist < 0.0]
+    pairs = {tuple(model.geom_bodyid[pair].tolist()) for pair in met if plane not in model.geom_type[pair]}
+    for body in spec.bodies:
+        body.name = body.name or f"body{body.id}"
+    named = {body.id: body.name for body in spec.bodies}
+    for one, two in sorted(pairs):
+        spec.add_exclude(bodyname1=named[one], bodyname2=named[two])
+    return spec.compile()
 
 
 def strip(model: Any, without: str) -> None:
@@ -20,20 +59,31 @@ def strip(model: Any, without: str) -> None:
 
     Args:
         model: MuJoCo's; it is changed.
-        without: words separated by commas: one of `ALL`, or kind:NAME of an actuator, loop or tendon.
+        without: words separated by commas: one of `ALL`, kind:NAME of an actuator, loop or tendon, or what `apart`
+            has done before.
 
     Raises:
         InvalidValue: for a word that names nothing.
     """
-    for word in filter(None, (part.strip() for part in without.split(","))):
+    for word in _words(without):
         kind, _, name = word.partition(":")
         if not name and kind in ALL:
-            _WHOLE[kind](model)
+            _WHOLE.get(kind, _done)(model)
         elif name and kind in _ONE:
             _ONE[kind](model, _index(model, kind, name))
-        else:
+        elif kind != "pair":
             named = ", ".join(f"{one}:NAME" for one in _ONE)
-            raise InvalidValue(f"without: {word!r} is nothing that can be left out; valid: {', '.join(ALL)}, {named}.")
+            raise InvalidValue(
+                f"without: {word!r} is nothing that can be left out; valid: {', '.join(ALL)}, {named}, pair:BODY:BODY."
+            )
+
+
+def _words(without: str) -> list[str]:
+    return [word for part in without.split(",") if (word := part.strip())]
+
+
+def _done(model: Any) -> None:
+    """Leave alone what was left out before the model was compiled."""
 
 
 def _index(model: Any, kind: str, name: str) -> int:
@@ -94,7 +144,6 @@ _ONE: dict[str, Callable[[Any, int], None]] = {"actuator": _actuator, "loop": _l
 _WHOLE: dict[str, Callable[[Any], None]] = {
     "friction": _friction,
     "contacts": _contacts,
-    "meshes": lambda model: None,  # the readers do it
     "limits": _limits,
     "actuators": _every(_actuator, "nu"),
     "loops": _every(_loop, "neq"),

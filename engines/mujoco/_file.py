@@ -58,16 +58,18 @@ def rebuilt(scene: Scene, model: Any) -> Any:
     made.eq_solref[:], made.eq_solimp[:] = model.eq_solref[on], model.eq_solimp[on]
     for name in ("jnt_solref", "jnt_solimp", "tendon_solref_lim", "tendon_solimp_lim"):
         getattr(made, name)[:] = getattr(model, name)
-    for name in (shape.name for shape in scene.shapes if shape.type == "hull" and spec.mesh(shape.name) is not None):
-        _join(made, int(made.mesh(name).id), model, int(model.geom(name).dataid[0]))
-    soft = constants_of(model, mjcf.names(model, "geom"))
+    named = mjcf.names(model, "geom")
+    for i in range(model.ngeom):
+        if spec.mesh(named(i)) is not None:
+            _join(made, int(made.mesh(named(i)).id), model, int(model.geom_dataid[i]))
+    soft = constants_of(model, named)
     for i in range(made.npair):
         made.pair_solref[i], made.pair_solimp[i] = soft[frozenset((_geom(made, 1, i), _geom(made, 2, i)))]
     return made
 
 
 def _join(made: Any, mesh: int, model: Any, its: int) -> None:
-    """Join the corners of a hull as the file's are: the compiler chooses anew which edges lie in a face."""
+    """Join the corners of a hull as the file's are: what edges a flat face has is the compiler's choice each time."""
     graph, own = model.mesh_graph[model.mesh_graphadr[its] :], made.mesh_graph[made.mesh_graphadr[mesh] :]
     corners, faces = graph[:2]
     if tuple(own[:2]) != (corners, faces):

@@ -14,7 +14,7 @@ import numpy as np
 from crossbody.cases import Case, CaseUnsupported, Parameter, SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.files.without import leaves_out, strip
+from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
 from crossbody.engines._acting import Acting
 from crossbody.engines._scene import Forces
@@ -133,7 +133,7 @@ def _scene(case: Case) -> Scene:
 def _from_file(case: Case) -> Any:
     """Return MuJoCo's own reading of the file, less what is left out of every engine."""
     without = str(case.parameters.get("without", ""))
-    model = mjcf.model_of(Path(case.file), meshes=not leaves_out(without, "meshes", "contacts"))
+    model = mjcf.model_of(Path(case.file), without)
     strip(model, without)
     return model
 

@@ -80,7 +80,10 @@ class _Rests:
         self.light = LIGHT * max(1.0, float(np.nanmax(self.lam, initial=0.0)))
 
     def joined(self, row: int, own: list[Contact]) -> list[Contact]:
-        """Return the contacts of one row less those that bear nothing, and those joined between which no gap opens."""
+        """Return the contacts of one row less those that bear nothing, and those joined between which no gap opens.
+
+        One that begins where the one before ends is the same: modes were tried at that instant.
+        """
         if (own and self._led(row)) or (self.mode[:, row] < 0).any():
             return own
         if len(self.t) and self._stays(row, self.t[0], np.inf) and self.mode[0, row] != Mode.BILATERAL:
@@ -89,7 +92,7 @@ class _Rests:
         for c in own:
             if self._bears_nothing(c):
                 continue
-            if found and self._stays(row, found[-1].release, c.touch):
+            if found and (found[-1].release == c.touch or self._stays(row, found[-1].release, c.touch)):
                 found[-1] = replace(c, touch=found[-1].touch, settled=min(found[-1].settled, c.settled))
             else:
                 found.append(c)
@@ -114,9 +117,10 @@ class _Rests:
     def _bears_nothing(self, c: Contact) -> bool:
         """Whether a row at its surface does not push, and has not struck: no velocity jumps at one instant."""
         first, last = np.searchsorted(self.t, c.touch, side="left"), np.searchsorted(self.t, c.release, side="right")
-        struck = c.release == c.touch and bool(np.ptp(self.v[first:last], axis=0).any())
+        at_once, sampled = c.release == c.touch, bool(last > first)
+        struck = at_once and sampled and bool(np.ptp(self.v[first:last], axis=0).any())
         light = bool((self.lam[first:last, c.row] <= self.light).all())
-        return bool(last > first) and light and not struck and self._stays(c.row, c.touch, c.release)
+        return (sampled or at_once) and light and not struck and self._stays(c.row, c.touch, c.release)
 
 
 def _by_sign(run: Trajectory) -> tuple[Contact, ...]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
@@ -22,6 +23,8 @@ MOST = 500
 """Bodies that are drawn."""
 AROUND = 24
 """Points of a drawn circle."""
+FLAT = 5
+"""Decimals to which planes are the same side of a hull."""
 SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 """Corners of each side of a box, seen from outside against the clock."""
@@ -72,10 +75,21 @@ def _arrows(scene: Scene, q: Floats, lam: Floats) -> Iterator[Floats]:
     row += sum(int(np.isfinite(part.range).sum()) for part in scene.bounded)
     for contact in contacts(scene):
         _, normals, points = _meeting(contact, bodies)
+        pushing = lam[:, row : row + contact.places]
+        row += contact.places
+        if contact.second.type == "hull":
+            yield _resultant(normals[:, 0], points, pushing)
+            continue
         for place in range(contact.places):
-            pushed = np.nan_to_num(normals[:, place]) * lam[:, [row]]
+            pushed = np.nan_to_num(normals[:, place]) * pushing[:, [place]]
             yield np.concatenate([points[:, place], pushed], axis=1)
-            row += 1
+
+
+def _resultant(normal: Floats, points: Floats, pushing: Floats) -> Floats:
+    """Return the sum of parallel forces (n, 6), at the point where it acts: a hull has hundreds of corners."""
+    total = pushing.sum(axis=1, keepdims=True)
+    share = np.divide(pushing, total, out=np.zeros_like(pushing), where=total != 0.0)
+    return np.concatenate([np.einsum("nk,nki->ni", share, points), normal * total], axis=1)
 
 
 def _meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
@@ -107,9 +121,27 @@ def _solid(shape: SceneShape, body: int) -> dict[str, Any]:
         points, faces = np.concatenate(rings), (tuple(range(AROUND))[::-1], tuple(range(AROUND, 2 * AROUND)))
     elif shape.type == "box":
         points, faces = SIGNS * size, FACES
+    elif shape.type == "hull":
+        points, faces = shape.extents, _sides(shape.extents)
     else:
         points = _ball() * size
     return _drawn(np.asarray(shape.position) + points @ turn.T, body, radius, faces)
+
+
+def _sides(corners: Floats) -> tuple[tuple[int, ...], ...]:
+    """Return the corners of each side of a hull, seen from outside against the clock."""
+    hull = ConvexHull(corners)
+    sides: dict[tuple[float, ...], set[int]] = {}
+    for triangle, plane in zip(hull.simplices, np.round(hull.equations, FLAT), strict=True):
+        sides.setdefault(tuple(plane), set()).update(triangle.tolist())
+    return tuple(_around(corners, sorted(side), np.array(plane[:3])) for plane, side in sides.items())
+
+
+def _around(corners: Floats, side: Sequence[int], normal: Floats) -> tuple[int, ...]:
+    """Return the corners of a flat side in the order of their angles about its normal."""
+    off = corners[list(side)] - corners[list(side)].mean(axis=0)
+    angles = np.arctan2(off @ np.cross(normal, off[0]), off @ off[0])
+    return tuple(side[k] for k in np.argsort(angles))
 
 
 def _inertia_box(body: Body, index: int) -> dict[str, Any]:
