@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from crossbody.cases.files import mjcf, urdf
 from crossbody.cases.files.without import strip
+from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import Scene
 
 if TYPE_CHECKING:
