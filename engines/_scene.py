@@ -142,6 +142,21 @@ class Forces:
         self.slack = np.array([one.rest for one in scene.tendons]).reshape(-1, 2).T
         self.spanning = [i for i, tendon in enumerate(scene.tendons) if tendon.bodies]
         self._lay_out_actuators()
+        self._lay_out_bounds()
+
+    def _lay_out_bounds(self) -> None:
+        """Write the gap of every bound as sign x + offset, x one of the joints' coordinates and tendons' lengths."""
+        joints = self.scene.joints
+        self.firsts = np.array([self.place[joint.name] for joint in joints], dtype=int)
+        self.balls = [(i, self.at[joint.name]) for i, joint in enumerate(joints) if joint.type == "ball"]
+        rows = [
+            (i, sign, -sign * bound - part.margin)
+            for i, part in enumerate(self.scene.bounded)
+            for sign, bound in zip((1.0, -1.0), part.range, strict=True)
+            if np.isfinite(bound)
+        ]
+        of, self.bound_sign, self.bound_at = np.array(rows).reshape(-1, 3).T
+        self.bound_of = of.astype(int)
 
     def _lay_out_actuators(self) -> None:
         scene, names = self.scene, [tendon.name for tendon in self.scene.tendons]
@@ -254,20 +269,13 @@ class Forces:
             A[self.pulling], lengths[self.pulling] = gear[:, None] * stretch[2][tendon], gear * stretch[0][tendon]
         return lengths, A @ v, A
 
-    def bounds(self, q: Floats, lengths: Floats) -> list[float]:
+    def bounds(self, q: Floats, lengths: Floats) -> Floats:
         """Return the gaps of all bounds at a state, in the order of their rows; lengths (nt,) are of the tendons."""
-        x, found = self.x(q), []
-        for joint in self.scene.joints:
-            if joint.type == "ball":
-                found.append(float(np.linalg.norm(angle_of(q[self.at[joint.name] :][:4]))))
-            else:
-                found.append(x[self.place[joint.name]])
-        h: list[float] = []
-        for part, length in zip(self.scene.bounded, (*found, *lengths), strict=True):
-            low, high = part.range
-            h += [length - low - part.margin] if np.isfinite(low) else []
-            h += [high - length - part.margin] if np.isfinite(high) else []
-        return h
+        found = np.concatenate([self.x(q)[self.firsts], lengths])
+        for i, at in self.balls:
+            found[i] = np.linalg.norm(angle_of(q[at:][:4]))
+        gaps: Floats = self.bound_sign * found[self.bound_of] + self.bound_at
+        return gaps
 
     def outside(self, lengths: Floats) -> Floats:
         """Return how far the lengths (..., nt) of tendons are outside their dead bands."""
