@@ -137,9 +137,13 @@ def test_poses_out_of_reach_and_singular_ones_are_told():
     robot = delta.LIGHT
     y = delta.elbow_angle(robot)
     q = np.tile([y, np.arccos(-(robot.offset + robot.l1 * np.cos(y)) / robot.l2), 0.0], 3)
-    found = poses(delta.system(robot), [q], [0, 1, 2])
-    assert not found.well_posed[0]
-    assert np.isnan(found.growth[0])
+    reached = delta.inverse(robot, (0.0, 0.0, 0.6))
+    found = poses(delta.system(robot), [q, reached], [0, 1, 2])
+    assert found.well_posed.tolist() == [False, True]
+    assert np.isnan(found.growth).tolist() == [True, False]
+    for signal in (found.u, found.lam, found.basis, found.A, found.poles):
+        assert np.isnan(signal[0]).all()
+        assert np.isfinite(signal[1]).all()
     with pytest.raises(SceneError, match="3 inputs"):
         poses(delta.system(robot), [q], [0, 1])
 

@@ -6,6 +6,8 @@ from four_bar import assembled, four_bar
 
 from crossbody.cases import Outcome
 from crossbody.reference import System, kernels, simulate
+from crossbody.reference.sundials.equations import Equations
+from crossbody.reference.sundials.folds import PROBE, TURN, Folds
 
 
 @kernels.dynamics
@@ -149,3 +151,41 @@ def test_linkages_fold_where_their_lengths_say(seed):
         assert run.outcome is Outcome.ILL_POSED
     else:
         assert run.outcome.ok, run.message
+
+
+@kernels.gaps
+def _turning_gaps(t, q, v, p, h, hd):
+    s, c = np.sin(q[2]), np.cos(q[2])
+    h[0], hd[0] = c * q[0] + s * q[1], c * v[0] + s * v[1] + (c * q[1] - s * q[0]) * v[2]
+    h[1], hd[1] = c * q[1] - s * q[0], c * v[1] - s * v[0] - (c * q[0] + s * q[1]) * v[2]
+
+
+@kernels.rows
+def _turning_rows(t, q, v, p, w, idx, na, H, h, Hdv):
+    for j in range(na):
+        s, c = np.sin(q[2]), np.cos(q[2])
+        if idx[j] == 1:
+            s, c = c, -s
+        H[j, 0], H[j, 1], H[j, 2] = c, s, c * q[1] - s * q[0]
+        h[j], Hdv[j] = c * q[0] + s * q[1], 0.0
+
+
+@pytest.mark.parametrize("turned", [0.1, 0.7, 3.0, 12.0])
+def test_rows_are_looked_at_as_often_as_they_turn(turned):
+    """Two rows about the origin turn by sqrt(2) times the angle: over every part of a step by no more than TURN."""
+    system = System(
+        n=3, mass_block=1, dynamics=_still, gaps=_turning_gaps, rows=_turning_rows, unilateral=False, a0=[1.0] * 2,
+        a1=2.0,
+    )  # fmt: skip
+    watching, looks = Folds(Equations(system)), []
+
+    def state(t):
+        looks.append(t)
+        return np.array([0.0, 0.0, turned * t]), np.zeros(3)
+
+    watching.begin(0.0, np.zeros(3), np.zeros(3))
+    for step in range(3):
+        looks.clear()
+        watching.check(float(step), step + 1.0, state)
+        parts = len({t for t in looks if t > step + 2.0 * PROBE})
+        assert parts == pytest.approx(np.ceil(np.sqrt(2.0) * turned / TURN), rel=0.1, abs=1.0)

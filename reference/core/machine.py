@@ -40,6 +40,7 @@ from crossbody.reference.kinds import Bytes, Floats
 SLOW = 1e-9  # part of the largest rate seen
 DEEP = 1e-9  # m: a FREE gap below -DEEP was started in penetration
 ROUNDING = 1e-13
+TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
 LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 
 
@@ -75,6 +76,15 @@ def _from_state(s: Any, w: Work, i: int) -> float:
 
 
 @inlined
+def touching(s: Any, w: Work) -> float:
+    """How large a gap rounding alone can make of a touch."""
+    largest = 1.0
+    for a in range(s.nq):
+        largest = max(largest, abs(w.y[a]))
+    return float(TOUCHING * largest)
+
+
+@inlined
 def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
     """What the law of a row that came to rest makes of a gap that counts as closed and a rate that counts as none.
 
@@ -88,13 +98,15 @@ def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
 @inlined
 def noise(s: Any, m: Model, w: Work) -> None:
     """What rounding of the state and of the sums, and what collisions left, can make of each multiplier."""
-    largest = 0.0
+    largest, touch = 0.0, touching(s, w)
     for j in range(s.na):
         i = w.idx[j]
+        # A touch stands open by the rounding of where bodies came from: near the origin that is more than theirs now.
+        opened = w.law[i, 0] * w.ha[j] if 0.0 < w.ha[j] <= touch else 0.0
         G = 0.0
         for c in range(m.span[i, 0], m.span[i, 1]):
             G += w.H[j, c] * w.X[j, c]
-        w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i)) / G
+        w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i) + opened) / G
         w.r[j] = _left_over(s, m, w, i)
         largest = max(largest, w.r[j])
     if largest > 0.0:

@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
-from crossbody.reference.core.algebra import ULP, copy
+from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.collisions import collide
 from crossbody.reference.core.holding import MOVED, doubtful, hold
 from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
@@ -24,11 +24,10 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise
+from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise, touching
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
-TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
 SAME_CHANGE = 1e-9  # part by which changes of v' may differ and count as equal: rounding does not choose
 ALONE = np.int64(2)  # of one_by_one: rows join one after another, however alike
 SWITCH_ROUNDS = 32  # switches that follow one another at one instant
@@ -103,15 +102,6 @@ def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
         if s.has_solve:
             accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL)
         noise(s, m, w)
-
-
-@inlined
-def _touching(s: Any, w: Work) -> None:
-    """How large a gap rounding alone can make of a touch."""
-    largest = 1.0
-    for a in range(s.nq):
-        largest = max(largest, abs(w.y[a]))
-    s.touch = TOUCHING * largest
 
 
 @compiled
@@ -214,7 +204,7 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         of the history marks the rows that switch for ever.
     """
     if s.frozen or s.fsm == MEMORYLESS:
-        _touching(s, w)
+        s.touch = touching(s, w)
     code = _iterate(K, s, m, w, b)
     rounds = 0
     while code == 0 and s.has_switch:
