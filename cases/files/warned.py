@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,14 +16,17 @@ NOT_A_NUMBER = "'NaN'"
 
 @contextmanager
 def captured() -> Iterator[list[str]]:
-    """Collect the warnings."""
+    """Collect the warnings: those of the library, and those of its Python layer."""
     import mujoco
 
     messages: list[str] = []
     previous = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(messages.append)
     try:
-        yield messages
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            yield messages
+        messages += [str(one.message) for one in told]
     finally:
         mujoco.set_mju_user_warning(previous)
 
