@@ -1,6 +1,6 @@
 """What is run, and the words that all other parts speak.
 
-A case is one module here with three public names:
+A case is one module in `library` with three public names:
 
     PARAMETERS   a mapping from name to `Parameter`
     VARIANTS     a mapping from variant to the parameters it changes; the first is the default
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.cases.errors import (
@@ -36,6 +36,7 @@ from crossbody.cases.registry import Registry
 if TYPE_CHECKING:
     from crossbody.cases.case import Case, Chaos, Claim, Coordinate, Inputs, Law, Limit, Parameter, Tier, Value
     from crossbody.cases.control import Control
+    from crossbody.cases.files.case import Given
     from crossbody.cases.scene import Scene
     from crossbody.cases.trajectory import Event, Ledger, Mode, Switch, Trajectory
 
@@ -157,7 +158,7 @@ def from_file(
 
 
 @checked_arguments
-def from_scene(scene: Scene, **given: Any) -> Case:
+def from_scene(scene: Scene, **given: Unpack[Given]) -> Case:
     """Build a case from a scene; see `crossbody.cases.files.case.case_of` for what else may be given."""
     from crossbody.cases.files.case import case_of
 

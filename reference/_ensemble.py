@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ from crossbody.reference._system import System, initial_modes
 from crossbody.reference.cache import embedding
 from crossbody.reference.core.layout import MORE, open_buffers, open_model, open_work
 from crossbody.reference.kinds import Floats, Index
-from crossbody.reference.options import Options, checked
+from crossbody.reference.options import Chosen, Options, checked
 from crossbody.reference.start import check_starts
 
 CONSTANTS = ("a0", "a1", "a2", "b0", "b1", "b2")
@@ -64,7 +64,7 @@ def ensemble(
     parameters: Mapping[str, ArrayLike] | None = None,
     law: Mapping[str, ArrayLike] | None = None,
     threads: int | None = None,
-    **options: Any,
+    **options: Unpack[Chosen],
 ) -> Ensemble:
     """Run one mechanism N times to t_end.
 

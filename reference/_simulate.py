@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numba.core.config as numba_config
 from numpy.typing import ArrayLike
@@ -11,11 +11,11 @@ from crossbody.cases import InvalidValue, Trajectory
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._check import check_once
 from crossbody.reference._system import System
-from crossbody.reference.options import Options, checked
+from crossbody.reference.options import Chosen, Options, checked
 from crossbody.reference.start import check_start
 
 
-def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **options: Any) -> Trajectory:
+def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **options: Unpack[Chosen]) -> Trajectory:
     """Integrate the hybrid penalty DAE of spec 1.1 from (q0, v0) at t = 0 to t_end.
 
     Args:

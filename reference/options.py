@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,27 @@ SOLVERS = ("compiled", "ida", "cvode")
 TOLERANCES = (1e-14, 1e-1)
 LARGEST_ATOL = 1e100  # its square is still a number
 ATOL_PART = 1e-3  # default absolute tolerance in units of rtol: gaps are small against heights
+
+
+class Chosen(TypedDict, total=False):
+    """Options of a run by name, for editors and type checkers; what each means stands in `Options`."""
+
+    rtol: float
+    atol: float | None
+    fsm: str
+    collisions: str
+    solver: str
+    samples: ArrayLike | None
+    inputs: tuple[ArrayLike, ArrayLike] | None
+    consistent: bool
+    ledger: bool
+    events: bool
+    shortcuts: bool
+    implicit: bool
+    index: int
+    max_step: float
+    max_steps: int
+    time_limit: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

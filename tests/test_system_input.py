@@ -1,5 +1,8 @@
 """A user's own mechanism and options: each mistake is one sentence that names the field and what would be valid."""
 
+import dataclasses
+import inspect
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +10,9 @@ from hypothesis import strategies as st
 from mechanisms import ball, flyby
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
-from crossbody.reference import System, simulate
+from crossbody.cases.files.case import Given, case_of
+from crossbody.reference import Options, System, simulate
+from crossbody.reference.options import Chosen
 from crossbody.reference.systems import ball as ball_kernels
 
 KERNELS = ball_kernels.KERNELS
@@ -103,3 +108,15 @@ def test_mass_matrix_and_rows_can_be_asked_for():
     assert np.allclose(H, [[0.6, 0.8]], rtol=1e-15)
     assert h == pytest.approx([4.5])
     assert Hdv == pytest.approx([(1.0 - 0.36) / 5.0])
+
+
+def test_options_are_named_once_for_editors_and_once_for_runs():
+    """A type checker sees the one, a run checks the other."""
+    fields = {field.name: field.type for field in dataclasses.fields(Options)}
+    assert {name: part.__forward_arg__ for name, part in Chosen.__annotations__.items()} == {
+        name: kind for name, kind in fields.items() if name != "t_end"
+    }
+    parameters = inspect.signature(case_of).parameters
+    assert {name: part.__forward_arg__ for name, part in Given.__annotations__.items()} == {
+        name: one.annotation for name, one in parameters.items() if name != "scene"
+    }

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Coordinate, Inputs, Law, Limit, Parameter, Value
@@ -110,14 +111,31 @@ def overruled(scene: Scene, a0: float, a1: float) -> Scene:
     return scene.replace(**changed)
 
 
+class Given(TypedDict, total=False):
+    """What may be given beside a scene, by name; what each means stands in `case_of`."""
+
+    name: str
+    variant: str
+    q0: ArrayLike | None
+    v0: ArrayLike | None
+    act0: ArrayLike | None
+    rank: int
+    inputs: Inputs | None
+    control: Control | None
+    t_end: float
+    parameters: Mapping[str, Value] | None
+    file: str
+    findings: tuple[str, ...]
+
+
 def case_of(
     scene: Scene,
     *,
     name: str = UNNAMED,
     variant: str = REFERENCE_POSE,
-    q0: Any = None,
-    v0: Any = None,
-    act0: Any = None,
+    q0: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    act0: ArrayLike | None = None,
     rank: int = -1,
     inputs: Inputs | None = None,
     control: Control | None = None,
@@ -160,7 +178,8 @@ def case_of(
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         contacts=tuple(names), q0=start,
-        v0=np.zeros(scene.nv) if v0 is None else v0, act0=np.zeros(0) if act0 is None else act0, t_end=t_end, law=law,
+        v0=np.zeros(scene.nv) if v0 is None else cast(Floats, v0),  # arrays are checked there
+        act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law,
         inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
         limits=AS_IT_STANDS if file else (),
