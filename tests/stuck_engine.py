@@ -15,7 +15,7 @@ def patched(arguments: list[str] | None) -> int:
     import signal
     import time
     from dataclasses import replace
-    from types import SimpleNamespace
+    from types import MappingProxyType
 
     from crossbody import engines
     from crossbody.hw import models
@@ -32,15 +32,26 @@ def patched(arguments: list[str] | None) -> int:
             raise LookupError("a fault of its own")
         return truth_of(case).trajectory
 
-    def prepare(case: Any, profile: str = "exact", **_: Any) -> Any:
-        return SimpleNamespace(
-            case=case, profile=profile, engine="fake", settings={"dt": 1e-3}, audit=dict,
-            run=lambda: act(case, profile),
-        )  # fmt: skip
+    class FakeRun(engines.Run):
+        engine, settings = "fake", MappingProxyType({"dt": 1e-3})
 
-    profiles = dict.fromkeys(("exact", "slow", "stuck", "crash", "fault"), "")
-    fake, real = SimpleNamespace(name="fake", profiles=profiles, versions={}, prepare=prepare), engines.load
-    fake.why_not = lambda *_: None
+        def __init__(self, case: Any, profile: str) -> None:
+            self.case, self.profile = case, profile
+
+        def run(self) -> Any:
+            return act(self.case, self.profile)
+
+        def audit(self) -> Any:
+            return {}
+
+    class Fake(engines.Engine):
+        name, versions = "fake", MappingProxyType({})
+        profiles = MappingProxyType(dict.fromkeys(("exact", "slow", "stuck", "crash", "fault"), ""))
+
+        def prepare(self, case: Any, profile: str = "exact", **_: Any) -> FakeRun:
+            return FakeRun(case, profile)
+
+    fake, real = Fake(), engines.load
     engines.names = lambda: ("fake",)
 
     def load(name: str) -> Any:
