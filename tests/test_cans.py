@@ -124,3 +124,26 @@ def test_rolling_through_level_is_ill_posed(profile: str) -> None:
         found = engines.load("reference").prepare(case, profile, rtol=1e-10).run()
         assert found.outcome is outcome, found.message
     assert "rolls on its rim" in found.message
+
+
+def test_the_can_that_rolls_through_level_is_found_among_others() -> None:
+    """Rows and variables count on from those of the shapes before it: of a ball, a box, and a can that stands."""
+    alone = can((1e-2, 0.0, 0.0), v=[0.0, 0.0, 0.0, -0.3, 3e-6, 0.0], t_end=0.03)
+    scene = alone.scene
+    assert scene is not None
+    sizes = {"sphere": (0.03, 0.0, 0.0), "box": (0.03, 0.04, 0.05), "cylinder": (RADIUS, HALF, 0.0)}
+    low = {"sphere": 0.03, "box": 0.05, "cylinder": HALF}
+    bodies = tuple(Body(name=kind, mass=1.0, inertia=(0.01, 0.01, 0.01, 0.0, 0.0, 0.0)) for kind in sizes)
+    case = cases.from_scene(
+        scene.replace(
+            bodies=(*bodies, *scene.bodies),
+            joints=(*(Joint(name=f"free {kind}", body=kind, type="free") for kind in sizes), *scene.joints),
+            shapes=(*scene.shapes, *(Shape(name=k, body=k, type=k, size=size) for k, size in sizes.items())),
+            pairs=(*(Pair(name=kind, first="floor", second=kind, law=LAW) for kind in sizes), *scene.pairs),
+        ),
+        q0=np.concatenate([*([1.0 + k, 0.0, low[kind], 1, 0, 0, 0] for k, kind in enumerate(sizes)), alone.q0]),
+        v0=np.concatenate([np.zeros(6 * len(sizes)), alone.v0]), t_end=alone.t_end,
+    )  # fmt: skip
+    found = engines.load("reference").prepare(case, "compiled", rtol=1e-10).run()
+    assert found.outcome is Outcome.ILL_POSED, found.message
+    assert "Pair 'can' rolls on its rim" in found.message

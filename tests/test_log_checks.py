@@ -219,6 +219,9 @@ def test_dropped_samples_are_filled_measured_linearly_commanded_held(tmp_path: P
     data = {name: np.delete(values, [300, 301, 302, 1500]) for name, values in whole.items()}
     log = hw.read(parquet(tmp_path / "log.parquet", data), columns(), repair=("fill_dropped",))
     np.testing.assert_array_equal(log.filled, [300, 301, 302, 1500])
+    for start, stop in ((0, 2000), (301, 1500), (302, 2000), (400, 1400), (1, 1501)):
+        part = log.window(*log.time[[start, min(stop, 1999)]])
+        np.testing.assert_array_equal(part.time[part.filled], log.time[[i for i in log.filled if start <= i < stop]])
     kept = np.setdiff1d(np.arange(2000), log.filled)
     np.testing.assert_allclose(log.time, whole["t"], atol=1e-15)
     q, u = log.channel("coordinates", "arm").values, log.channel("inputs", "motor").values

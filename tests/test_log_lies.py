@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from crossbody import hw
 from crossbody.cases import LogFormatError
 from crossbody.hw.checks.finding import first_of_each
+from crossbody.hw.checks.jumps import find_jumps
 from crossbody.hw.checks.rates import RateCheck
 from crossbody.hw.checks.smooth import JumpCheck, unwrapped
 from crossbody.hw.checks.values import ValueCheck
@@ -258,6 +259,22 @@ unit = "rad"
 column = "v"
 unit = "rad/s"
 """
+
+
+@pytest.mark.parametrize("span", [1, 2])
+@pytest.mark.parametrize("seed", range(20))
+def test_a_spike_is_as_large_as_it_is_off_the_line_of_those_around_it(seed: int, span: int) -> None:
+    """However fast the motion is on which it sits, by ten to a hundred of whose steps: it is no slip."""
+    rng = np.random.default_rng([seed, span])
+    t, row = np.arange(400) / 500.0, int(rng.integers(50, 350))
+    speed, steps = rng.choice([-1.0, 1.0], 2) * 10.0 ** rng.uniform((-1.0, 1.0), (2.0, 2.0))
+    size = steps * abs(speed) * t[1]
+    motion = speed * (t + 1e-3 * t**2) + 1e-9 * rng.normal(size=len(t))
+    assert not len(find_jumps(t, motion, False)[0].at)
+    motion[row : row + span] += size
+    found = find_jumps(t, motion, False)[0]
+    assert (found.at.tolist(), found.span.tolist(), found.spike.tolist()) == ([row], [span], [True])
+    assert found.size == pytest.approx([size], rel=1e-3)
 
 
 def _written(path: Path, **columns: np.ndarray) -> Path:

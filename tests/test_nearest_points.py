@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from crossbody import cases
 from crossbody.cases.arrays import Floats
-from crossbody.cases.scene import Body, Pair, Scene, Shape
+from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES
 from crossbody.engines._contacts import FAR, Contacts
+from crossbody.engines.equations import system_of
 from crossbody.engines.nearest import Pose
 from crossbody.reports.scenes.scene import _meeting
 
@@ -170,3 +172,22 @@ def test_instants_and_pairs_are_computed_at_once_as_one_by_one(types: tuple[str,
         there = np.isfinite(drawn_at[0][0])
         np.testing.assert_allclose(drawn_at[0][0][there] - met.all[0].pair.margin, one.gap[there], atol=1e-15)
         np.testing.assert_allclose(drawn_at[2][0][there], one.point[there], atol=1e-15)
+
+
+@pytest.mark.parametrize("types", PLACES, ids=":".join)
+def test_the_reference_finds_the_same_gaps_apart_and_inside_each_other(types: tuple[str, str]) -> None:
+    """Its kernels choose faces, edges and ends by rules of their own."""
+    rng = np.random.default_rng(5)
+    for _ in range(DRAWS):
+        met, poses = drawn(rng, types)
+        scene = Scene(
+            bodies=tuple(Body(name=name, mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)) for name in poses),
+            joints=tuple(Joint(name=f"free {name}", body=name, type="free") for name in poses),
+            shapes=(met.all[0].first, met.all[0].second), pairs=(met.all[0].pair,),
+        )  # fmt: skip
+        system = system_of(cases.from_scene(scene))
+        turns = [np.roll(Rotation.from_matrix(R).as_quat(), 1) for R, _ in poses.values()]
+        q = np.concatenate([part for turn, (_, x) in zip(turns, poses.values(), strict=True) for part in (x, turn)])
+        theirs = met.touches(poses.__getitem__).gap
+        there = theirs < FAR
+        np.testing.assert_allclose(system.gap(q, np.zeros(12))[0][there], theirs[there], atol=1e-12)

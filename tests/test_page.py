@@ -413,3 +413,17 @@ def test_observed_order_is_the_slope(order: float) -> None:
     steps = np.array([0.4, 0.2, 0.1, 0.05])
     assert observed_order(steps, 3.0 * steps**order) == pytest.approx(order, rel=1e-9)
     assert np.isnan(observed_order(steps, [np.inf, np.nan, 1e-3, 1e-4]))
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 20_000])
+def test_steps_of_a_run_begin_where_the_one_before_ended(count: int) -> None:
+    """Each of those that are drawn is from an instant of the run to its next one; of few, all are."""
+    rng = np.random.default_rng(count)
+    t = np.repeat(np.cumsum(rng.uniform(1e-3, 1.0, count)), rng.integers(1, 3, count))
+    case = load("bouncing_ball", "linear")
+    truth = truth_of(case)
+    steps = study._trace(case, Entry(engine="reference", profile="compiled", run=truth.trajectory, stepped=t), truth)
+    starts, lengths = (np.array(part) for part in steps.about["steps"])
+    behind = dict(zip(np.unique(t)[:-1].tolist(), np.diff(np.unique(t)).tolist(), strict=True))
+    assert [behind[start] for start in starts.tolist()] == lengths.tolist()
+    assert len(starts) == count - 1 if count < 10 else 100 < len(starts) < count

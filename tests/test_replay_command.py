@@ -6,6 +6,8 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from crossbody import engines, hw
 from crossbody.cases import InvalidValue, Limit
 from crossbody.hw.models._contract import Segment
 from crossbody.reports.cli import main
+from crossbody.reports.replay import command
 from crossbody.reports.replay.comparison import verdicts
 from crossbody.reports.runs import watch
 
@@ -248,3 +251,19 @@ def test_a_replay_may_take_the_seconds_that_are_asked_for_and_an_identification_
     monkeypatch.setattr(hw, "identify", identify)
     assert code("identify", *asked, tmp_path / "two", "-f", "k1") == 2
     assert given == [142.0, 70.0]
+
+
+def test_tables_of_an_identification_tell_its_own_numbers() -> None:
+    """No two are equal: each stands in its own column."""
+    names = ("value", "low", "high", "start", "std", "freedom", "kept_low", "kept_high")
+    told = dict(zip(names, np.arange(1.0, 9.0), strict=True)) | {"name": "k", "unit": "N", "identifiable": True}
+    fit: Any = SimpleNamespace(
+        estimates=[SimpleNamespace(**told)], agreement=[SimpleNamespace(name="k", values=(11.0, 12.0))],
+        before={"rmse": (21.0, 20.0)}, after={"rmse": (23.0, 25.0)},
+    )  # fmt: skip
+    halves = {"first_half": 11.0, "second_half": 12.0}
+    assert command.estimates(fit).to_dict(orient="records") == [told | halves]
+    assert command.held_out(fit).to_dict(orient="records") == [{
+        "error": "rmse", "fitted_before": 21.0, "held_before": 20.0, "fitted_after": 23.0, "held_after": 25.0,
+        "change": 25.0,
+    }]  # fmt: skip
