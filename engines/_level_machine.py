@@ -49,10 +49,14 @@ class LevelMachine:
     """Guards on levels, evaluated until nothing changes.
 
     One run uses one machine: it remembers the largest rate that it saw, and which free gaps are closed.
+
+    Args:
+        rows: of the mechanism.
+        rtol: to which positions are known; rows that close touch together where it cannot tell which comes first.
     """
 
-    def __init__(self, rows: Rows) -> None:
-        self.rows = rows
+    def __init__(self, rows: Rows, rtol: float = 0.0) -> None:
+        self.rows, self.rtol = rows, rtol
         self.own = switched(rows)
         self.slow = 0.0
         self._closed: set[int] = set()
@@ -91,7 +95,7 @@ class LevelMachine:
         """See `crossbody.engines._machines.Machine`."""
         h, hd = (x.copy() for x in self.rows.gaps(q, v))
         self.slow = max(self.slow, SLOW * float(np.abs(hd[list(self.own)]).max(initial=0.0)))
-        modes, passed = self._fire(h, modes, fired)
+        modes, passed = self._fire(h, modes, fired | self._touching_too(q, h, hd, modes, fired))
         h[[i for i, which in fired if which == GAP]] = 0.0
         modes, more, cycle = self._iterate(q, v, h, hd, modes)
         self._closed = {i for i in self.own if h[i] <= 0.0}
@@ -112,11 +116,18 @@ class LevelMachine:
                 passed.append((i, mode, after[i], 0.0))
         return shared(self.rows, after), passed
 
+    def _touching_too(self, q: Floats, h: Floats, hd: Floats, modes: Modes, fired: Fired) -> Fired:
+        """The free rows that touch together with one that was located to."""
+        if not any(modes[i] == FREE and which == GAP for i, which in fired):
+            return frozenset()
+        closing = (np.abs(h) <= self.rtol * np.abs(q).max()) & (hd < -self.slow)
+        return frozenset((i, GAP) for i in self.own if modes[i] == FREE and closing[i])
+
     def _iterate(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> tuple[Modes, list[Passed], bool]:
         """All rows together; one at a time once a set of modes has repeated; a cycle if that repeats too."""
         seen, passed, one_by_one = {modes}, list[Passed](), False
         while True:
-            wanted = self._wanted(self._look(q, v, h, hd, modes), modes)
+            wanted = self._wanted(self._look(q, v, h, hd, modes), modes, max(DEEP, self.rtol * np.abs(q).max()))
             moved = [i for i in self.own if wanted[i] != modes[i]][: 1 if one_by_one else None]
             if not moved:
                 return modes, passed, False
@@ -137,7 +148,7 @@ class LevelMachine:
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
         return View(h, hd, lam, allowed, press > noise)
 
-    def _wanted(self, view: View, modes: Modes) -> list[int]:
+    def _wanted(self, view: View, modes: Modes, deep: float) -> list[int]:
         """Where every row belongs by the guards that hold now."""
         after = list(modes)
         for i in self.own:
@@ -145,10 +156,10 @@ class LevelMachine:
                 pulls = view.lam[i] < -view.noise[i]
                 after[i] = self._released(modes[i], float(view.h[i])) if pulls else modes[i]
             else:
-                after[i] = self._inactive(view, modes[i], i)
+                after[i] = self._inactive(view, modes[i], i, deep)
         return after
 
-    def _inactive(self, view: View, mode: int, i: int) -> int:
+    def _inactive(self, view: View, mode: int, i: int, deep: float) -> int:
         h, hd, presses = view.h[i], view.hd[i], view.presses[i]
         if h > 0.0:
             return FREE
@@ -157,7 +168,7 @@ class LevelMachine:
             return self._activated(i) if closing and presses else mode
         if closing:
             return self._activated(i)
-        if h < -DEEP:
+        if h < -deep:
             return self._activated(i) if presses else BALLISTIC
         return self._activated(i) if hd <= self.slow and presses else FREE
 

@@ -93,3 +93,20 @@ def test_multipliers_that_do_not_pull_exert_the_same_forces(seed: int) -> None:
     assert np.abs(J.T @ (found - pushing)).max() <= 1e-11 * np.abs(J.T @ pushing).max(initial=0.0)
     assert found[one_sided].min(initial=0.0) >= -1e-12 * np.abs(found).max()
     assert np.linalg.norm(found) <= (1.0 + 1e-9) * np.linalg.norm(pushing)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_rows_that_rounding_has_pull_leave_the_others_as_they_are(seed: int) -> None:
+    """Heels and toes of two feet that stand alike, and two joints at bounds that bear nothing."""
+    rng = np.random.default_rng(seed)
+    lever, (heel, toe) = rng.uniform(0.05, 1.0), 10.0 ** rng.uniform(0.0, 3.0, 2)
+    J = np.zeros((6, 9))
+    J[0, 3] = J[1, 4] = -1.0
+    J[2:, 1] = 1.0
+    J[2, 2:6] = -lever, lever, lever, lever
+    J[4, 2], J[4, 6:] = -lever, lever
+    J[3, 2:6] = 1e-18 * rng.normal(size=4)
+    J[5, 2], J[5, 6:] = J[3, 2], 1e-18 * rng.normal(size=3)
+    lam = np.array([-7e-15, -1e-14, heel, toe, heel, toe])
+    found = none_pulling(lam, J, np.ones(6, dtype=bool))
+    assert np.abs(J.T @ (found - lam)).max() <= 1e-11 * np.abs(J.T @ lam).max()

@@ -231,7 +231,7 @@ Integrate = Callable[[Log], tuple[Solver, Mapping[str, int]]]
 
 
 def _law(case: Case, scene: Scene, used: Mapping[str, Any], _e: list[float]) -> Integrate:
-    return _flowing(lambda: LevelMachine(scene.rows), case, scene, used)
+    return _flowing(lambda: LevelMachine(scene.rows, float(used["rtol"])), case, scene, used)
 
 
 def _impulse(rule: Impact) -> Callable[[Case, Scene, Mapping[str, Any], list[float]], Integrate]:

@@ -29,6 +29,7 @@ from crossbody.reference.core.layout import (
     EVENTS_FULL,
     EXACT,
     EXPLICIT,
+    FREE,
     ILL_POSED,
     IMPLICIT,
     LOST,
@@ -45,6 +46,7 @@ from crossbody.reference.core.layout import (
     open_model,
     open_work,
 )
+from crossbody.reference.core.machine import active_mode
 from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
@@ -116,6 +118,7 @@ def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
         return ILL_POSED
     scatter(s, w, w.lam0)
+    settle.begin_watch(K, s, m, w)
     return 0
 
 
@@ -138,6 +141,7 @@ def _take_over(s: Any, w: Work) -> None:
     copy(w.lams[last], w.lam0)
     copy(w.gaps[last], w.gaps[0])
     copy(w.rates[last], w.rates[0])
+    copy(w.guards[last], w.guards[0])
 
 
 @inlined
@@ -159,13 +163,17 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
-    moved = False
+    moved, touched = False, False
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
             if after != b.mode[i]:
+                touched = touched or b.mode[i] == FREE
                 journal.move(s, b, i, after)
                 moved = True
+    for i in range(s.nc if touched else 0):
+        if events.touches_too(s, m, w, b.mode, i):
+            journal.move(s, b, i, active_mode(s, m, i))
     if moved and journal.remember(s, b):
         if s.one_by_one:
             return MODE_CYCLE

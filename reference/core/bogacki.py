@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import copy
-from crossbody.reference.core.dop853 import begin_watch, derivative, keep_velocity, watch_multipliers
+from crossbody.reference.core.dop853 import derivative, keep_velocity, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.kinds import Array, Floats
 
@@ -47,7 +47,6 @@ def _error(s: Any, w: Work, h: float) -> float:
 @compiled
 def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     """From y and k[0] to y1 and k[3] = f(y1); the error in units of the tolerance, -1 if a stage is ill posed."""
-    begin_watch(K, s, m, w)
     for stage in range(1, STAGES):
         _advance(w.y, w.k, stage, h, w.ys)
         if derivative(K, s, m, w, s.t + C[stage] * h, w.ys, stage) != 0:

@@ -101,13 +101,6 @@ def _error(s: Any, w: Work, h: float) -> float:
 
 
 @inlined
-def begin_watch(K: Any, s: Any, m: Model, w: Work) -> None:
-    """Guards of the discrete variables at the start of the step."""
-    if s.ng > 0:
-        K.watch(s.t, w.y[: s.nq], w.y[s.nq :], m.p, w.guards[0])
-
-
-@inlined
 def watch_guards(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
     """Keep the discrete variables' guards at a stage."""
     K.watch(t, w.ys[: s.nq], w.ys[s.nq :], m.p, w.guard_at[place])
@@ -138,7 +131,6 @@ def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
 @compiled
 def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     """From y and k[0] to y1; returns the error in units of the tolerance, -1 if a stage is ill posed."""
-    begin_watch(K, s, m, w)
     for stage in range(1, STAGES):
         _combine(w.y, w.k, stage, h, w.ys)
         t = s.t + C[stage] * h

@@ -19,7 +19,6 @@ from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, OWN, SMOOTH, accelerate, push_rows
 from crossbody.reference.core.algebra import ULP, factor_lu, solve_lu, solve_schur
 from crossbody.reference.core.dop853 import (
-    begin_watch,
     keep_velocity,
     powers,
     watch_gaps,
@@ -283,7 +282,6 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
             return -1.0
     elif s.jacobian_scale != h and _newton_matrix(s, w, h) != 0:
         return -1.0
-    begin_watch(K, s, m, w)
     for stage in range(1, STAGES):
         code = _stage(K, s, m, w, stage, h)
         if code == 1:

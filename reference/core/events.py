@@ -44,7 +44,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.core.machine import active_mode, released_mode
+from crossbody.reference.core.machine import active_mode, known, released_mode, slow
 from crossbody.reference.core.search import first_below, opens
 from crossbody.reference.kinds import Bytes
 
@@ -202,6 +202,18 @@ def _tie(s: Any, w: Work) -> None:
     for i in range(s.nc):
         if w.hit[i] <= together:
             s.theta = max(s.theta, w.hit[i])
+
+
+@inlined
+def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether row i touches with another that has just been found to: it closes, and is as near as positions are known.
+
+    What a touch exchanges may have third rows let go for good: rounding must not choose which of two comes first.
+    """
+    if s.fsm != LEVEL or mode[i] != FREE or not m.unilateral[i] or m.follows[i] >= 0:
+        return False
+    collides = s.frozen and m.beta[i, 0] > 0.0
+    return bool(not collides and w.rate[i] < -slow(s) and abs(w.gap[i]) <= known(s, w))
 
 
 @inlined

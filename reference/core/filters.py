@@ -29,6 +29,7 @@ from crossbody.reference.kinds import Bytes
 STAGES_RANGE = 1.7  # degree 6 within a range at the stages of DOP853: how many times the range it may leave it by
 STAGES_OFF = 4.0  # the same, of what is off a parabola: 3.02 for degree 6, of ESDIRK 1.98 for degree 4
 TURNS = 2.0  # times by which (G^-1)_ii may change in a step
+CLEAR = 5.5  # of five values: one whose least is so many times their range passes the parabola's test, any way they lie
 GAPS_OFF = 0.2  # twice the most that x^2 (1 - x)^2 times a parabola of 1 at the three stages comes to
 
 
@@ -153,6 +154,11 @@ def switch_may_fire(s: Any, w: Work, i: int) -> bool:
     start, end = w.guards[0, i], w.guards[NODES - 1, i]
     if s.method == SHORT:
         return not min(start, end) > abs(end - start)
+    low, high = min(start, end), max(start, end)
+    for place in range(BETWEEN):
+        low, high = min(low, w.guard_at[place, i]), max(high, w.guard_at[place, i])
+    if low > CLEAR * (high - low):
+        return False
     off, half, middle = 0.0, w.guard_at[1, i], _between(s, 1)
     for place in range(BETWEEN):
         off = max(off, abs(w.guard_at[place, i] - _parabola(start, half, end, middle, _between(s, place))))

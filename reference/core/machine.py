@@ -38,7 +38,7 @@ from crossbody.reference.core.shares import CONSISTENT
 from crossbody.reference.kinds import Bytes, Floats
 
 SLOW = 1e-9  # part of the largest rate seen
-DEEP = 1e-9  # m: a FREE gap below -DEEP was started in penetration
+DEEP = 1e-9  # m: a FREE gap below -DEEP, and below what it is known to, was started in penetration
 ROUNDING = 1e-13
 TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
 LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
@@ -48,6 +48,15 @@ LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot
 def slow(s: Any) -> float:
     """The rate below which a gap is taken to stand still."""
     return float(SLOW * s.speed)
+
+
+@inlined
+def known(s: Any, w: Work) -> float:
+    """To what a gap is known, as far as the tolerance of the positions tells."""
+    largest = 0.0
+    for a in range(s.nq):
+        largest = max(largest, w.atol[a] + s.rtol * abs(w.y[a]))
+    return float(largest)
 
 
 @inlined
@@ -280,7 +289,7 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return int(mode[i])
     if rate < -slow(s):
         return active_mode(s, m, i)
-    if h < -DEEP:
+    if h < -max(DEEP, known(s, w)):
         return active_mode(s, m, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
     if rate <= slow(s) and _would_press(K, s, m, w, mode, i, collides):
         return active_mode(s, m, i)

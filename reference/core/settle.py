@@ -195,9 +195,16 @@ def switch(K: Any, s: Any, m: Model, w: Work, b: Buffers, fired: int) -> int:
     return int(result)
 
 
+@inlined
+def begin_watch(K: Any, s: Any, m: Model, w: Work) -> None:
+    """Guards of the discrete variables at the start of the next step."""
+    if s.ng > 0:
+        K.watch(s.t, w.y[: s.nq], w.y[s.nq :], m.p, w.guards[0])
+
+
 @compiled
 def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Iterate until modes and discrete variables agree; leaves k[0], lam0 and the gaps of node 0 for the next step.
+    """Iterate until modes and discrete variables agree; leaves k[0], lam0, gaps and guards of node 0 for the next step.
 
     Returns:
         0, EVENTS_FULL if the caller must make room and come again, or a negative code. After MODE_CYCLE the last line
@@ -220,4 +227,5 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         code = _iterate(K, s, m, w, b)
     w.spent[:] = 0
     _keep(w)
+    begin_watch(K, s, m, w)
     return int(code)

@@ -92,10 +92,11 @@ class LevelMachine:
         deep: depth beyond which a gap that does not close was started in penetration, m.
         work (nc,): done by the impulses of every row so far, J.
         error: of the integrator's state along a step; times a0 it moves the multiplier of a row that has just let go.
+        rtol: of positions; rows that close touch together where it cannot tell which comes first.
     """
 
     def __init__(self, system: System, equations: Equations) -> None:
-        self.equations, self.error = equations, 0.0
+        self.equations, self.error, self.rtol = equations, 0.0, 0.0
         self.follows = np.asarray(system.follows).tolist()
         self.switching = np.asarray(system.unilateral, dtype=bool).tolist()
         self.rows = [i for i in range(system.nc) if self.switching[i] and self.follows[i] < 0]
@@ -242,7 +243,7 @@ class LevelMachine:
             return self._active_mode(i) if closing and presses() else mode
         if closing:
             return self._active_mode(i)
-        if h < -self.deep:
+        if h < -max(self.deep, self.rtol * float(np.abs(q).max())):
             return self._active_mode(i) if presses() else Mode.BALLISTIC
         return self._active_mode(i) if rate <= self.slow and presses() else mode
 
@@ -365,7 +366,7 @@ class LevelMachine:
 
     def fire(self, t: float, q: Floats, v: Floats, fired: Iterable[tuple[int, Watch]]) -> bool:
         """Apply what was located, never deciding it again from a value at round-off; whether anything switched."""
-        gap, _ = self.equations.gaps(t, q, v)
+        gap, rate = (a.copy() for a in self.equations.gaps(t, q, v))
         self._repeats(t)
         before = len(self.events)
         for i, watch in dict(fired).items():
@@ -378,6 +379,12 @@ class LevelMachine:
                 self._switch(t, i, self._released(i, float(gap[i])))
             else:
                 self._switch(t, i, self._active_mode(i) if mode == Mode.FREE else Mode.FREE)
+        if any(event.before == Mode.FREE for event in self.events[before:]):  # others may touch at the same instant
+            known = self.rtol * float(np.abs(q).max())
+            for i in self.rows:
+                closes = self.modes[i] == Mode.FREE and i not in self.frozen and rate[i] < -self.slow
+                if closes and abs(gap[i]) <= known:
+                    self._switch(t, i, self._active_mode(i))
         return len(self.events) > before or bool(self.spent)
 
     def move(self, t: float, modes: list[Mode]) -> None:

@@ -78,7 +78,7 @@ class SundialsRun:
         """Back to the beginning."""
         e = self.equations = Equations(self.system, rigid=bool(self.rigid))
         self.machine = self._machine(e)
-        self.machine.error = SHARE * self.options.tolerance
+        self.machine.error, self.machine.rtol = SHARE * self.options.tolerance, self.options.rtol
         self.discrete = Discrete(self.system, e)
         self.folds = Folds(e)
         self.single = self.natural or bool(self.folds.rows)

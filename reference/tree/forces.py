@@ -170,10 +170,20 @@ def pull(p: Array, o: int, force: Any, f: Array) -> None:
 
 @kernels.helper
 def actuated(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, sums: Array) -> None:
-    """Add the actuators' forces to sums (n,), each within its own bounds; w holds poses if one acts between points."""
+    """Add the actuators' forces to sums (n,), each within its own bounds; w holds poses if one acts between points.
+
+    References to arrays are counted at every call of what is not small: one on a hinge or a slide is written out here.
+    """
     for i in range(int(p[layout.ACTUATORS].real)):
         o = int(p[layout.AT_ACTUATOR].real) + layout.ACTUATOR * i
-        exert(p, w, o, held(unbounded(t, q, v, u, p, w, i), p, o + layout.FORCE), sums)
+        if p[o + layout.SINGLE].real == 0.0:
+            force = unbounded(t, q, v, u, p, w, i)
+            exert(p, w, o, within(force, p, o + layout.FORCE), sums)
+            continue
+        j, gear = int(p[o + layout.WHICH].real), p[o + layout.GEAR]
+        a = clamped(u[i], p[o + layout.CONTROL], p[o + layout.CONTROL + 1])
+        force = by(p, o, a, gear * q[int(p[o + layout.ANGLE].real)], gear * v[j])
+        sums[j] += gear * within(force, p, o + layout.FORCE)
 
 
 @kernels.helper
@@ -192,7 +202,7 @@ def exert(p: Array, w: Array, o: int, force: Any, sums: Array) -> None:
         pull(p, at, force, sums)
 
 
-@inlined
+@kernels.helper
 def moved(q: Array, v: Array, p: Array, w: Array, o: int) -> tuple[Any, Any]:
     """Return the length of the actuator at p[o:], 0 where its joint has none, and the rate of it."""
     which = int(p[o + layout.WHICH].real)
@@ -219,7 +229,14 @@ def unheld(t: float, u: Array, p: Array, o: int, i: int) -> Any:
     return a + c * since if kind == layout.INTEGRATOR else c + (a - c) * np.exp(-since / p[o + layout.TAU])
 
 
-@inlined
+@kernels.helper
+def by(p: Array, o: int, a: Any, x: Any, speed: Any) -> Any:
+    """Return the force of the actuator at p[o:] before its bounds, by what drives it, its length and its rate."""
+    gain = p[o + layout.GAIN] + p[o + layout.GAIN + 1] * x + p[o + layout.GAIN + 2] * speed
+    return gain * a + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
+
+
+@kernels.helper
 def unbounded(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, i: int) -> Any:
     """Return the force of actuator i before its bounds."""
     o = int(p[layout.AT_ACTUATOR].real) + layout.ACTUATOR * i
@@ -227,8 +244,13 @@ def unbounded(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, i: int
     if p[o + layout.ACTIVATION].real != layout.DIRECT:
         a = held(a, p, o + layout.SPAN)
     x, speed = moved(q, v, p, w, o)
-    gain = p[o + layout.GAIN] + p[o + layout.GAIN + 1] * x + p[o + layout.GAIN + 2] * speed
-    return gain * a + p[o + layout.BIAS] + p[o + layout.BIAS + 1] * x + p[o + layout.BIAS + 2] * speed
+    return by(p, o, a, x, speed)
+
+
+@kernels.helper
+def within(x: Any, p: Array, o: int) -> Any:
+    """Return x within the bounds at p[o:], as `held`."""
+    return held(x, p, o)
 
 
 @kernels.helper

@@ -17,6 +17,7 @@ from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.rows import bend
 from crossbody.reference.tree import forces, layout
+from crossbody.reference.tree.forces import by, clamped
 
 SMALL = 1e-3  # m or rad, and 1/s: coordinates are known to the tolerance of this at least
 ROUNDING = 1e-14  # of a value
@@ -69,24 +70,54 @@ def _value(
 
 
 @kernels.helper
+def _left(x: float, low: float, high: float, band: float, now: int) -> float:
+    """Return how far x is from the end of the side that holds, and 0 a band beyond it."""
+    if low == high:
+        return (x if now == layout.HIGH else -x) + band
+    if now != layout.INSIDE:
+        return (x - high if now == layout.HIGH else low - x) + band
+    if low < -NONE or high > NONE:
+        return (high - x if low < -NONE else x - low) + band
+    return (x - low + band) * ((high - x + band) / (high - low + 2.0 * band))  # as far as the nearer one, and smooth
+
+
+@kernels.helper
+def _plain(p: Floats, k: int) -> bool:
+    """Return whether kink k is that of an actuator on one hinge or slide."""
+    o = int(p[layout.AT_KINK]) + layout.KINK * k
+    at = int(p[layout.AT_ACTUATOR]) + layout.ACTUATOR * int(p[o + layout.OF])
+    return bool(p[o] == layout.FORCE_BENDS and p[at + layout.SINGLE] > 0.0)
+
+
+@kernels.helper
+def look_plainly(q: Floats, v: Floats, p: Floats, g: Floats) -> None:
+    """Do what `look` does, for actuators on one hinge or slide each: it calls nothing that is large."""
+    first, sides, bands = int(p[layout.AT_TOLD]) + 1, int(p[layout.AT_BEND]), int(p[layout.AT_BAND])
+    for k in range(len(g)):
+        if not _plain(p, k):
+            continue
+        i, now = int(p[int(p[layout.AT_KINK]) + layout.KINK * k + layout.OF]), int(p[sides + k])
+        at = int(p[layout.AT_ACTUATOR]) + layout.ACTUATOR * i
+        a, gear = clamped(p[first + i], p[at + layout.CONTROL], p[at + layout.CONTROL + 1]), p[at + layout.GEAR]
+        x = by(p, at, a, gear * q[int(p[at + layout.ANGLE])], gear * v[int(p[at + layout.WHICH])])
+        left = _left(x, p[at + layout.FORCE], p[at + layout.FORCE + 1], p[bands + k], now)
+        g[k] = 1.0 if now == layout.OPEN else left
+
+
+@kernels.helper
 def look(t: float, q: Floats, v: Floats, p: Floats, w: Floats, g: Floats) -> None:
-    """Fill g of every kink with how far it is, positive on the side that holds, and 0 a band beyond it."""
+    """Fill g of kinks that are not plain with how far they are: positive on the side that holds, 0 a band beyond it."""
     u, sides, bands = inputs(p), int(p[layout.AT_BEND]), int(p[layout.AT_BAND])
     total = sums(t, q, v, u, p, w)
     for k in range(len(g)):
+        if _plain(p, k):
+            continue
         now, band = int(p[sides + k]), p[bands + k]
         if now == layout.OPEN:
             g[k] = 1.0
             continue
         x, low, high = _value(t, q, v, u, p, w, total, k)
-        if low == high:
-            g[k] = (x if now == layout.HIGH else -x) + band
-        elif now != layout.INSIDE:
-            g[k] = (x - high if now == layout.HIGH else low - x) + band
-        elif low < -NONE or high > NONE:
-            g[k] = (high - x if low < -NONE else x - low) + band
-        else:  # as far as the nearer one, and smooth
-            g[k] = (x - low + band) * ((high - x + band) / (high - low + 2.0 * band))
+        g[k] = _left(x, low, high, band, now)
 
 
 @kernels.helper

@@ -12,7 +12,8 @@ NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, 
 # Then how many pairs of shapes lie to each other in more than one way; how many kinks forces have, where these, the
 # sides on which they are, and their bands stand, and the tolerance that is in force: the inputs follow it.
 RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, LYING, KINKS, AT_KINK, AT_BEND, AT_BAND, AT_TOLD = range(14, 26)
-SUMMED, GAPPED, HEAD = 26, 27, 28  # how many of the kinks are those of sums of forces, and of gaps
+# How many of the kinks are those of sums of forces, of gaps, and of actuators on one hinge or slide each.
+SUMMED, GAPPED, PLAIN, HEAD = 26, 27, 28, 29
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (
@@ -23,9 +24,10 @@ BOUNDS_BEND, DAMPER_BEND = 2, 3
 # A degree of freedom: the one before it on the way to the world, armature, damping, bounds of its actuators' sum.
 BEFORE, ARMATURE, DAMPING, SUM, DOF = 0, 1, 2, 6, 9
 # An actuator: what kind of thing it moves and which, gear of up to six velocities, constants and bounds; of its
-# activation what it is, its time constant and bounds, and where in u the instant and the value stand that it goes from.
-TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTIVATION, TAU, SPAN, SINCE, ACTUATOR = (
-    0, 1, 2, 3, 9, 12, 15, 17, 20, 21, 22, 25, 26,
+# activation what it is, its time constant and bounds, and where in u the instant and the value stand that it goes from;
+# whether it acts on a hinge or a slide without one.
+TARGET, WHICH, ANGLE, GEAR, GAIN, BIAS, CONTROL, FORCE, ACTIVATION, TAU, SPAN, SINCE, SINGLE, ACTUATOR = (
+    0, 1, 2, 3, 9, 12, 15, 17, 20, 21, 22, 25, 26, 27,
 )  # fmt: skip
 ON_JOINT, ON_TENDON = 0, 1
 DIRECT, INTEGRATOR, FILTER = range(3)

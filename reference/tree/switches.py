@@ -36,10 +36,14 @@ def _posed(q: Floats, v: Floats, p: Floats) -> Floats:
 @kernels.watch
 def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
     """Of every bound of a ball joint how far it is from half a turn, of pairs from lying otherwise, of kinks."""
-    w = _posed(q, v, p)
     bends = int(p[layout.KINKS])
     first = len(g) - bends
-    if bends > 0:
+    if p[layout.PLAIN] > 0.0:
+        kinks.look_plainly(q, v, p, g[first:])
+    if first == 0 and p[layout.PLAIN] == bends:
+        return
+    w = _posed(q, v, p)
+    if p[layout.PLAIN] < bends:
         kinks.look(t, q, v, p, w, g[first:])
     if first == 0:
         return

@@ -261,6 +261,9 @@ class _Builder:
         head[[layout.SUMMED, layout.GAPPED]] = [
             sum(kink[0] == kind for kink in self.kinks) for kind in (layout.SUM_BENDS, layout.GAP_BENDS)
         ]
+        head[layout.PLAIN] = sum(
+            kind == layout.FORCE_BENDS and actuators[i][layout.SINGLE] for kind, i, *_ in self.kinks
+        )
         packed = np.concatenate([head, *(row for part in parts for row in part)])
         finite: Floats = np.clip(packed, -1e300, 1e300)
         return finite  # a bound that is not there: parameters are finite
@@ -295,6 +298,7 @@ class _Builder:
                 )
             dof = self.dofs[joint.name]
             row[[layout.TARGET, layout.WHICH, layout.ANGLE]] = layout.ON_JOINT, dof, self.coordinates[joint.name]
+            row[layout.SINGLE] = width == 1 and not actuator.activation
             row[layout.GEAR : layout.GEAR + width] = actuator.gear[:width]
             for k in range(width):
                 self.dof_rows[dof + k][layout.ARMATURE] += actuator.gear[0] ** 2 * actuator.armature
