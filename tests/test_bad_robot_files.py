@@ -116,5 +116,5 @@ def test_a_link_without_mass_behind_a_coupled_joint_is_named(tmp_path: Path) -> 
     joints = joint.format("a", "base", "arm", "") + joint.format("b", "arm", "tip", '<mimic joint="a"/>')
     path = tmp_path / "arm.urdf"
     path.write_text(f'<robot name="r">{links}{joints}</robot>', encoding="utf-8")
-    with pytest.raises(SceneError, match="not positive definite at the start: .* is above all velocity 1"):
+    with pytest.raises(SceneError, match=r"not positive definite at the start: .* is above all velocity 1"):
         engines.load("reference").prepare(cases.load(str(path), t_end=0.1))
