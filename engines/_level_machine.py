@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
@@ -30,6 +31,8 @@ COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 GAP, PUSH, SPENT = 0, 1, 2
 """The functions watched of a row: touch or leave; turn, release or catch; hand-over."""
 SLOW, DEEP, EPS = 1e-9, 1e-9, 0.01
+PUSHES, ULP = 1e-9, float(np.finfo(float).eps)
+"""Part of the largest multiplier below which one is rounding."""
 UNMOVED = 1e-24
 """Of the largest diagonal entry of H M^-1 H^T: the rate of a row which no motion moves is rounding, and has no dips."""
 
@@ -43,6 +46,21 @@ class View:
     lam: Floats
     noise: Floats
     presses: NDArray[np.bool_]
+
+
+def least_push(G: Floats, demand: Floats) -> Floats:
+    """Return multipliers lam >= 0 (n,) with G lam >= demand and the least lam.G lam, by least distance programming.
+
+    G (n, n) may be singular; where nothing fulfils the demand they are what comes nearest (Lawson and Hanson 1974, 23).
+    """
+    values, ways = np.linalg.eigh(G)
+    size = float(np.abs(demand).max(initial=0.0)) or 1.0
+    E = np.vstack([(ways * np.sqrt(np.maximum(values, 0.0))).T, demand / size])
+    goal = np.zeros(len(E))
+    goal[-1] = 1.0
+    found, _ = nnls(E, goal)
+    lam: Floats = size * found / max(1.0 - float(E[-1] @ found), ULP)
+    return lam
 
 
 class LevelMachine:
@@ -75,6 +93,8 @@ class LevelMachine:
         for i in self._closed.intersection(free.tolist()):
             out[WATCHED * i + GAP] = max(h[i], hd[i] + self.slow)
         out[WATCHED * np.array([*self._unmoved], dtype=int) + PUSH] = 1.0
+        below = any(modes[i] not in ACTIVE for i in others)
+        pressure = rows.pressure(q, v, vd)[0] if vd is not None and below else h
         for i in others:
             mode, at = modes[i], WATCHED * i
             if mode in ACTIVE and lam is not None:
@@ -82,7 +102,7 @@ class LevelMachine:
                 out[at + SPENT] = self._left(q, v, modes, lam, i) if mode == COLLISION else 1.0
             elif vd is not None:
                 out[at + GAP] = -h[i]
-                out[at + PUSH] = max(hd[i] + self.slow, -rows.pressure(q, v, vd)[0][i])
+                out[at + PUSH] = max(hd[i] + self.slow, -pressure[i])
 
     def _sorted(self, modes: Modes) -> tuple[NDArray[np.intp], list[int]]:
         """The rows that a machine decides about: those that are free, and the others; found once for a set of modes."""
@@ -124,7 +144,10 @@ class LevelMachine:
         return frozenset((i, GAP) for i in self.own if modes[i] == FREE and closing[i])
 
     def _iterate(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> tuple[Modes, list[Passed], bool]:
-        """All rows together; one at a time once a set of modes has repeated; a cycle if that repeats too."""
+        """All rows together; one at a time once a set of modes has repeated; a cycle if that repeats too.
+
+        Then the set of the least motion, if it is consistent: many rows of one body, of which few can follow their law.
+        """
         seen, passed, one_by_one = {modes}, list[Passed](), False
         while True:
             wanted = self._wanted(self._look(q, v, h, hd, modes), modes, max(DEEP, self.rtol * np.abs(q).max()))
@@ -135,10 +158,33 @@ class LevelMachine:
             modes = shared(self.rows, [wanted[i] if i in moved else mode for i, mode in enumerate(modes)])
             if modes in seen:
                 if one_by_one:
-                    return modes, passed, True
+                    found = self._least(q, v, h, hd, modes)
+                    moved = [i for i in self.own if found[i] != modes[i]]
+                    passed += [(i, modes[i], found[i], 0.0) for i in moved]
+                    return found, passed, self._wanted(self._look(q, v, h, hd, found), found) != list(found)
                 one_by_one = True
                 seen.clear()
             seen.add(modes)
+
+    def _least(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> Modes:
+        """Return the modes in which rows that close or are active push, and none falls behind its law, least of all.
+
+        Gauss's principle: of the accelerations that no such row forbids the one nearest to that without them.
+        """
+        tried = [i for i in self.own if modes[i] in ACTIVE or (h[i] <= 0.0 and hd[i] <= self.slow)]
+        found = list(modes)
+        for i in tried:
+            found[i] = self._released(modes[i], float(h[i]))
+        off = shared(self.rows, found)
+        demand = self.rows.pressure(q, v, self.rows.accelerate(q, v, off)[0])[0]
+        G, on = self.rows.delassus(q), list(active(off))
+        if on:
+            G = G - G[:, on] @ np.linalg.pinv(G[np.ix_(on, on)], hermitian=True) @ G[on]
+        pushing = least_push(G[np.ix_(tried, tried)], demand[tried])
+        for i, push in zip(tried, pushing, strict=True):
+            if push > PUSHES * pushing.max():
+                found[i] = modes[i] if modes[i] in ACTIVE else self._activated(i)
+        return shared(self.rows, found)
 
     def _look(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> View:
         vd, lam = self.rows.accelerate(q, v, modes)

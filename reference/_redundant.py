@@ -74,11 +74,21 @@ def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
         q: positions (nq,).
         groups: rows that are scaled by one length, the largest of them: one a loop. Each by its own would lift a row
             that is nothing but rounding to the size of the others.
+
+    Raises:
+        SceneError: for a mass matrix that is not positive definite.
     """
     rows = [i for group in groups for i in group]
     p, _ = started(system, np.array(q), np.zeros(system.n))
     state = State(system, 0.0, system.checked_state("q", q), np.zeros(system.n), p)
-    root = np.linalg.cholesky(state.mass_matrix())
+    M = state.mass_matrix()
+    least, ways = np.linalg.eigh(M)
+    if not least[0] > 0.0:
+        raise SceneError(
+            f"The mass matrix is not positive definite at the start: its least eigenvalue is {least[0]:.3g}, and what "
+            f"moves there without a mass is above all velocity {int(np.abs(ways[:, 0]).argmax())}, counted from 0."
+        )
+    root = np.linalg.cholesky(M)
     scaled = np.linalg.solve(root, state.H[rows].T).T
     at = 0
     for group in groups:

@@ -105,3 +105,16 @@ def test_controls_of_another_width_are_refused(kind: str, tmp_path: Path) -> Non
         (table.to_csv if kind == "csv" else table.to_parquet)(path, index=False)
     with pytest.raises(InvalidValue, match=r"valid: t, m\.|valid: \(2, 1\)\."):
         cases.load(arm, ctrl=str(path))
+
+
+def test_a_link_without_mass_behind_a_coupled_joint_is_named(tmp_path: Path) -> None:
+    """Rows of loops are ranked by the mass matrix, before anything else looks at it."""
+    links = "".join(f'<link name="{name}">{inertial}</link>' for name, inertial in (
+        ("base", ""), ("arm", '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+                              "</inertial>"), ("tip", "")))  # fmt: skip
+    joint = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><axis xyz="0 1 0"/>{}</joint>'
+    joints = joint.format("a", "base", "arm", "") + joint.format("b", "arm", "tip", '<mimic joint="a"/>')
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<robot name="r">{links}{joints}</robot>', encoding="utf-8")
+    with pytest.raises(SceneError, match=r"not positive definite at the start: .* is above all velocity 1"):
+        engines.load("reference").prepare(cases.load(str(path), t_end=0.1))

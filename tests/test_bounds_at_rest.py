@@ -144,7 +144,7 @@ def test_a_contact_ends_where_its_gap_opens(gap: list[float], modes: list[Mode],
 @pytest.mark.parametrize("t", [2.0, 2.5])
 def test_what_is_tried_at_one_instant_is_no_contact_and_ends_none(t: float) -> None:
     """A row that lands and is ballistic at once, or lets go and is caught at once, sampled there or not."""
-    run = told([1.0, 0.5, 0.0, -0.5, -0.6], [F, F, F, F, F])
+    run = told([1.0, 0.5, -0.1, -0.5, -0.6], [F, F, F, F, F])
     tried = (Event(t=t, contact=0, before=F, after=C), Event(t=t, contact=0, before=C, after=Mode.BALLISTIC))
     assert contacts(replace(run, events=tried), joined=True) == ()
     held = told([1.0, 0.0, -0.1, -0.1, 0.1], [F, C, C, C, F])

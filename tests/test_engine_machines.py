@@ -11,7 +11,7 @@ import pytest
 from crossbody.cases import Law, Mode, Outcome
 
 pin = pytest.importorskip("pinocchio")
-from crossbody.engines._level_machine import EPS, LevelMachine  # noqa: E402 - they import the engine's package
+from crossbody.engines._level_machine import EPS, LevelMachine, least_push  # noqa: E402 - they import the engine's package
 from crossbody.engines._log import Log  # noqa: E402
 from crossbody.engines.pinocchio._flow import Flow  # noqa: E402
 from crossbody.engines.pinocchio._impulse import ImpulseMachine, Instant, sequential, simultaneous  # noqa: E402
@@ -178,3 +178,17 @@ def test_a_state_that_the_scene_cannot_reach_is_an_outcome() -> None:
     found = flow(LevelMachine(mass), [0.0], [0.0], 10.0, world)
     assert found.outcome is Outcome.DIVERGED
     assert "t = " in found.message
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_least_push_leaves_no_row_behind_its_law(seed: int) -> None:
+    """lam >= 0, G lam >= demand, and what is above its demand does not push: also where rows depend on each other."""
+    rng = np.random.default_rng(seed)
+    n, rank = int(rng.integers(1, 30)), int(rng.integers(1, 7))
+    C = np.column_stack([rng.uniform(0.1, 1.0, n), rng.normal(size=(n, rank - 1))])  # all of them can be lifted
+    G, demand = C @ C.T, 10.0 ** rng.uniform(-3.0, 4.0) * rng.normal(size=n)
+    lam = least_push(G, demand)
+    left, size = G @ lam - demand, np.abs(demand).max()
+    assert lam.min() >= 0.0
+    assert left.min() >= -1e-9 * size
+    assert np.abs(lam * left).max() <= 1e-9 * size * max(float(lam.max()), size)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import struct
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from crossbody.cases.scene_contacts import PLACES, contacts, watched
 from crossbody.engines._contacts import Contacts
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.reports.cli import main
+from crossbody.reports.metrics._contacts import contacts as touched
 
 GRAVITY = 9.81
 LAW = RowLaw(a0=1e4, a1=20.0)
@@ -108,6 +110,23 @@ def test_both_witnesses_follow_a_hull_over_its_corners_and_its_energy_is_account
     account = one.ledger.input - one.ledger.dissipated + one.ledger.contact.sum(axis=1)
     scale = one.energy[:, 0].max() + np.ptp(one.energy[:, 1])
     assert np.abs(one.total_energy - one.total_energy[0] - account).max() < 2e-8 * scale
+
+
+def test_many_corners_below_the_surface_are_followed_by_the_few_that_can_be() -> None:
+    """Trials of modes go round there; the set of the least motion is the one that the reference comes to."""
+    rng = np.random.default_rng(1)
+    scene, q, v = dropped(1, RowLaw(a0=2600.0, a1=105.0))
+    points = rng.normal(size=(80, 3))
+    points *= 0.1 / np.linalg.norm(points, axis=1, keepdims=True) * [1.0, 0.8, 0.3]
+    floor, hull = scene.shapes
+    scene = scene.replace(shapes=(floor, replace(hull, corners=tuple(map(tuple, points.tolist())))))
+    case = cases.from_scene(scene, q0=q, v0=v, t_end=touch(scene, q, v)[0] + 0.008)
+    one, two = (engines.load(e).prepare(case, p).run() for e, p in (("reference", "compiled"), ("pinocchio", "law")))
+    assert (one.outcome, two.outcome) == (Outcome.FINISHED, Outcome.FINISHED), two.message
+    assert np.abs(one.q[-1] - two.q[-1]).max() < 1e-8
+    met = [[(c.row, round(c.touch, 7)) for c in touched(run, joined=True)] for run in (one, two)]
+    assert met[0] == met[1]
+    assert len({event.contact for event in one.events}) > 10
 
 
 def stl(path: Path, points: np.ndarray) -> None:

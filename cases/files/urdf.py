@@ -70,7 +70,14 @@ def _compiled(path: Path, without: str) -> tuple[mujoco.MjModel, list[str]]:
     ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
     files = supplied(root, path)
     text = ElementTree.tostring(root, encoding="unicode")
-    return compiled(path, lambda: apart(mujoco.MjSpec.from_string(text, assets=files), without))
+
+    def compiler() -> Any:
+        spec = mujoco.MjSpec.from_string(text, assets=files)
+        for mesh in spec.meshes:  # whose inertia is not asked for: of one that is open there is none
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        return apart(spec, without)
+
+    return compiled(path, compiler)
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:

@@ -115,12 +115,13 @@ class _Rests:
         return bool((self.gap[first:last, row] <= self.near).all())
 
     def _bears_nothing(self, c: Contact) -> bool:
-        """Whether a row at its surface does not push, and has not struck: no velocity jumps at one instant."""
+        """Whether a row at its surface does not push, or was on for no time and has not struck: no velocity jumps."""
         first, last = np.searchsorted(self.t, c.touch, side="left"), np.searchsorted(self.t, c.release, side="right")
-        at_once, sampled = c.release == c.touch, bool(last > first)
-        struck = at_once and sampled and bool(np.ptp(self.v[first:last], axis=0).any())
+        sampled = bool(last > first)
+        if c.release == c.touch:
+            return not (sampled and np.ptp(self.v[first:last], axis=0).any())
         light = bool((self.lam[first:last, c.row] <= self.light).all())
-        return (sampled or at_once) and light and not struck and self._stays(c.row, c.touch, c.release)
+        return sampled and light and self._stays(c.row, c.touch, c.release)
 
 
 def _by_sign(run: Trajectory) -> tuple[Contact, ...]:
