@@ -149,8 +149,9 @@ class LevelMachine:
         Then the set of the least motion, if it is consistent: many rows of one body, of which few can follow their law.
         """
         seen, passed, one_by_one = {modes}, list[Passed](), False
+        deep = max(DEEP, self.rtol * float(np.abs(q).max()))
         while True:
-            wanted = self._wanted(self._look(q, v, h, hd, modes), modes, max(DEEP, self.rtol * np.abs(q).max()))
+            wanted = self._wanted(self._look(q, v, h, hd, modes), modes, deep)
             moved = [i for i in self.own if wanted[i] != modes[i]][: 1 if one_by_one else None]
             if not moved:
                 return modes, passed, False
@@ -161,7 +162,7 @@ class LevelMachine:
                     found = self._least(q, v, h, hd, modes)
                     moved = [i for i in self.own if found[i] != modes[i]]
                     passed += [(i, modes[i], found[i], 0.0) for i in moved]
-                    return found, passed, self._wanted(self._look(q, v, h, hd, found), found) != list(found)
+                    return found, passed, self._wanted(self._look(q, v, h, hd, found), found, deep) != list(found)
                 one_by_one = True
                 seen.clear()
             seen.add(modes)
