@@ -291,3 +291,9 @@ def test_a_number_that_left_its_band_is_wrong_if_that_is_asked_for(recorded: Rec
     assert "position" in {row.metric for row in rows if row.regression == Regression.LOST}
     words, regressions = [row.verdict for row in rows], [row.regression for row in rows]
     assert (exit_code(words), exit_code(words, regressions)) == (0, 1)
+
+
+def test_samples_of_a_judged_run_are_not_the_callers_to_choose() -> None:
+    """Too few would show neither its events nor its forces, and a right run would be outside."""
+    with pytest.raises(InvalidValue, match="leave samples out"):
+        jobs.run_case(load("bouncing_ball", "resting"), jobs.picks(["reference:compiled"]), settings={"samples": 201})

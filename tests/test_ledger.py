@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mechanisms import ball, flyby, oscillator, sliders
 from test_machines import gusty
+from wall_pendulum import wall_pendulum
 
 from crossbody import cases, engines
 from crossbody.cases import Outcome
@@ -30,6 +31,21 @@ def test_ledger_closes(name, rtol):
     residual = run.total_energy - run.total_energy[0] - account
     scale = run.energy[:, 0].max() + np.ptp(run.energy[:, 1])
     assert np.abs(residual).max() < 200.0 * rtol * scale + 1e-13
+
+
+@pytest.mark.parametrize("pole", [1e3, 3e3, 1e4])
+def test_ledger_closes_inside_long_steps_of_stiff_rows_too(pole):
+    """At samples between the ends of implicit steps, while a force drives a pendulum through a fluid."""
+    system, grid = wall_pendulum(5.0, pole=pole, drag=0.5), np.linspace(0.0, 2.0, 977)
+    for rtol in (1e-6, 1e-7):
+        run = simulate(
+            system, [np.sin(-0.5), -np.cos(0.5)], [0.0, 0.0], 2.0, rtol=rtol, ledger=True, samples=grid,
+            inputs=([0.0, 0.5], [[1.0], [-2.0]]),
+        )  # fmt: skip
+        assert run.counts["implicit_steps"] > 10
+        account = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
+        residual = run.total_energy - run.total_energy[0] - account
+        assert np.abs(residual).max() < 10.0 * rtol * run.energy[:, 0].max()
 
 
 def test_work_of_one_bounce_is_the_law_s():

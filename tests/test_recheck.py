@@ -86,3 +86,13 @@ def test_a_truth_is_trusted_up_to_the_first_mode_that_does_not_hold(seed: int, m
     (row,) = truth_row(case, told, "")
     assert row.verdict == Word.OUTSIDE
     assert row.compared == pytest.approx(early / case.t_end)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_motion_of_one_row_is_looked_at_by_itself(seed: int) -> None:
+    """A run may end where it began."""
+    system, q0, v0 = drawn(seed)
+    run = simulate(system, q0, v0, 1.0, samples=[0.0])
+    assert recheck(system, run) == ()
+    below = replace(run, gap=run.gap - 1e3, mode=np.full_like(run.mode, Mode.FREE), events=())
+    assert {one.reason for one in recheck(system, below)} == {"below the surface"}

@@ -161,9 +161,14 @@ def run_case(
 
     Raises:
         UnknownName: for a setting that none of them knows.
+        InvalidValue: for samples, which are not the caller's to choose.
         CaseUnsupported: for a file whose motion leaves what its model covers: nothing could be judged.
     """
     asked = dict(settings or {}) | ({} if rtol is None else {"rtol": rtol})
+    if "samples" in asked:
+        raise InvalidValue(
+            "A run that is judged takes the samples that its events and its motion need: leave samples out."
+        )
     check_names(case)
     label = f"{case.label}: truth"
     tell(label)
