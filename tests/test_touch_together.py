@@ -79,4 +79,5 @@ def test_every_solver_keeps_it(engine: str, profile: str, seed: int) -> None:
     run = engines.load(engine).prepare(case, profile, rtol=1e-9).run()
     assert run.outcome is Outcome.FINISHED
     assert uneven(run, legs) <= 1e-6
+    assert run.lam.min() >= -1e-6 * run.lam.max(), "no foot pulls"
     assert np.abs(run.q[-1] - exact.q[-1]).max() <= 1e-6

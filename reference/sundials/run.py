@@ -261,7 +261,8 @@ class SundialsRun:
         s.q, s.v = s.q.copy(), s.v.copy()
         self.equations.project(s.q, s.v, rows, np.where(laws[:, 0] > 0.0, h, np.nan), rate)
         if not self.rigid:
-            s.lam = self.equations.accelerate(s.t, s.q, s.v)[1]
+            e, lam = self.equations, self.equations.accelerate(s.t, s.q, s.v)[1]
+            s.lam = lam if e.spread is None else e.spread @ lam[e.active]
 
     def _follow_law(self, view: View, anew: bool) -> None:
         """Note from where each active row follows its law; one that did so before goes on, unless all begin anew."""
