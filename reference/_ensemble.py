@@ -86,6 +86,8 @@ def ensemble(
     """
     if isinstance(system.control, Control):
         raise SceneError("ensemble: the system has a controller in Python, one for every run; run them by `simulate`.")
+    for name in {"samples", "events"} & options.keys():
+        raise InvalidValue(f"ensemble: {name} is given; nothing is recorded on the way (`simulate` does, of one run).")
     settings = replace(checked(t_end, options), samples=(), events=False)
     job = _Job(system, q0, v0, parameters or {}, law or {})
     count = len(os.sched_getaffinity(0)) if threads is None else threads

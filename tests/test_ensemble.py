@@ -77,6 +77,8 @@ def test_failures_are_outcomes_of_their_own_runs() -> None:
         ({"law": {"a0": -np.ones(N)}}, SceneError, "at least 0"),
         ({"parameters": {"colour": np.ones(N)}}, UnknownName, "colour"),
         ({"threads": -1}, InvalidValue, "threads"),
+        ({"samples": [0.5]}, InvalidValue, "samples"),
+        ({"events": True}, InvalidValue, "events"),
     ],
 )
 def test_bad_input_is_named(given: dict, error: type[Exception], words: str) -> None:
