@@ -136,6 +136,10 @@ class LevelMachine:
         """Whether gap i is closed."""
         return h <= 0.0
 
+    def _known(self, q: Floats) -> float:
+        """To what a gap is known, as far as the tolerance of the positions tells."""
+        return self.rtol * float(np.abs(q).max())
+
     def _approaches(self, i: int, rate: float) -> bool:
         """Whether gap i closes."""
         return rate < -self.slow
@@ -243,7 +247,7 @@ class LevelMachine:
             return self._active_mode(i) if closing and presses() else mode
         if closing:
             return self._active_mode(i)
-        if h < -max(self.deep, self.rtol * float(np.abs(q).max())):
+        if h < -max(self.deep, self._known(q)):
             return self._active_mode(i) if presses() else Mode.BALLISTIC
         return self._active_mode(i) if rate <= self.slow and presses() else mode
 
@@ -380,7 +384,7 @@ class LevelMachine:
             else:
                 self._switch(t, i, self._active_mode(i) if mode == Mode.FREE else Mode.FREE)
         if any(event.before == Mode.FREE for event in self.events[before:]):  # others may touch at the same instant
-            known = self.rtol * float(np.abs(q).max())
+            known = self._known(q)
             for i in self.rows:
                 closes = self.modes[i] == Mode.FREE and i not in self.frozen and rate[i] < -self.slow
                 if closes and abs(gap[i]) <= known:
