@@ -42,8 +42,12 @@ def known(case: Case) -> bool:
     return case.scene is not None or builder(case.mechanism) is not None
 
 
-def system_of(case: Case) -> System:
+def system_of(case: Case, traced: bool | None = None) -> System:
     """The mechanism with the law of its rows.
+
+    Args:
+        case: whose.
+        traced: of a scene: whether code is compiled for it alone; None takes it where it was compiled before.
 
     Raises:
         CaseUnsupported: if the reference has no equations of it.
@@ -51,7 +55,7 @@ def system_of(case: Case) -> System:
     if case.scene is not None:
         from crossbody.reference.tree.system import system
 
-        return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank)
+        return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank, traced)
     build = builder(case.mechanism)
     if build is None:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")
