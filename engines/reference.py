@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, SceneError, Trajectory
 from crossbody.cases.arrays import is_number
-from crossbody.engines import _settings
+from crossbody.engines import settings as _settings
 from crossbody.engines._reference_audit import audit, listed
 from crossbody.engines._rolling import determined
 from crossbody.engines.contract import Engine, Run
