@@ -52,7 +52,7 @@ def why_not(case: Case, profile: str) -> str | None:
     if profile == "default":
         return "What MuJoCo makes of a robot file by itself is the profile as_is; default is one of the shipped cases."
     if profile != "as_is":
-        return None
+        return "MuJoCo's rows have no cubic term: a2 must be 0." if case.law.a2.any() else None
     if not case.file:
         return "There is no file to run as it stands."
     try:
