@@ -27,8 +27,8 @@ pytestmark = pytest.mark.bench
 ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 WANTED = 1e-9
 ROBOT = {
-    "franka_emika_panda/panda": (2.0, 20.0), "universal_robots_ur5e/ur5e": (2.0, 20.0), "unitree_go1/go1": (2.0, 20.0),
-    "agility_cassie/cassie": (0.5, 20.0),
+    "franka_emika_panda/panda": (2.0, 12.0), "universal_robots_ur5e/ur5e": (2.0, 15.0), "unitree_go1/go1": (2.0, 12.0),
+    "agility_cassie/cassie": (0.5, 4.0),
 }  # fmt: skip
 """Horizon, s, and the least ratio."""
 
