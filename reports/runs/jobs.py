@@ -238,9 +238,9 @@ def _entry(
 def _ran(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool
 ) -> Entry:  # fmt: skip
-    prepared = prepare(case, pick, asked)
     if pick.every and (dear := _dear(case, pick, asked)):
         raise CaseUnsupported(dear)
+    prepared = prepare(case, pick, asked)
     shown = prepared.audit()
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
