@@ -17,7 +17,6 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-import llvmlite
 import llvmlite.binding as llvm
 import numba.core.config as numba_config
 import numpy as np
@@ -26,6 +25,7 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from crossbody.reference import code_store
+from crossbody.reference.cache import machine
 from crossbody.reference.kinds import Floats
 from crossbody.reference.tree import layout, sweeps
 
@@ -212,10 +212,10 @@ def compiled(text: str) -> bytes:
 
 
 @cache
-def _machine() -> tuple[str, ...]:
-    """Return what the code depends on beside the model: this file, the sweeps, LLVM and the processor."""
+def _dependencies() -> tuple[str, ...]:
+    """Return what the code depends on beside the model: this file, the sweeps and the machine."""
     texts = [Path(file).read_text(encoding="utf-8") for file in (__file__, sweeps.__file__, layout.__file__)]
-    return (*texts, llvmlite.__version__, llvm.get_process_triple(), llvm.get_host_cpu_name())
+    return (*texts, *machine())
 
 
 def _read(p: Floats) -> Iterator[bytes]:
@@ -243,7 +243,7 @@ def compiled_sweeps(p: Floats, nq: int, nv: int, *, anew: bool) -> float:
     """
     if numba_config.DISABLE_JIT:
         return 0.0
-    key = f"sweeps-{hashlib.sha256(repr(_machine()).encode() + b''.join(_read(p))).hexdigest()[:32]}"
+    key = f"sweeps-{hashlib.sha256(repr(_dependencies()).encode() + b''.join(_read(p))).hexdigest()[:32]}"
     if key not in _LOADED:
         store = code_store.current()
         data = store.read(key) if store is not None else None
