@@ -62,30 +62,14 @@ def cli() -> None:
 
 
 @cli.command("list")
+@click.argument("case", required=False)
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
-def list_(plain: bool) -> None:
-    """List cases, engines, metrics, stress suites and models that logs are replayed on."""
-    from crossbody import cases, engines
-    from crossbody.hw import models
-    from crossbody.reports import metrics, suites
+def list_(case: str | None, plain: bool) -> None:
+    """List cases, engines, metrics, stress suites and models of logs; or parameters and metrics of CASE."""
+    from crossbody.reports import described
 
-    sources = {
-        "Cases": cases,
-        "Engines": engines,
-        "Metrics": metrics,
-        "Stress suites": suites,
-        "Models of logs": models,
-    }
-    listed = tuple(sources.items())
-    if plain:
-        kinds = {title.lower(): {name: source.summary(name) for name in source.names()} for title, source in listed}
-        click.echo(json.dumps(kinds, indent=1))
-        return
-    for title, source in listed:
-        click.echo(f"{title}:")
-        width = max(map(len, source.names()), default=0)
-        for name in source.names():
-            click.echo(f"  {name:<{width}}  {source.summary(name)}")
+    told = described.everything() if case is None else described.case(case)
+    click.echo(json.dumps({k.lower(): v for k, v in told.items()}, indent=1) if plain else described.text(told))
 
 
 def _parameters(command: _Work) -> _Work:

@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
-from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.section import Figure
 from crossbody.reports.pages.sheet import Sheet

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from crossbody.cases import Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.cases.trajectory import Trajectory
+
+PARTS = 16
+"""Points looked at from each sample to the next."""
 
 
 def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
@@ -43,6 +45,15 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
     return at
 
 
+def multipliers(run: Trajectory) -> Floats | None:
+    """Lam (m, nc) at the samples and between them, by splines that never cross an event; None if lam is not known."""
+    if np.isnan(run.lam).any():
+        return None
+    cuts = np.linspace(0.0, 1.0, PARTS, endpoint=False)
+    inside = run.t[:-1, None] + np.diff(run.t)[:, None] * cuts
+    return np.concatenate([run.lam, between(run)(np.unique(inside)).lam])
+
+
 def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     keep = np.concatenate([[True], np.diff(t) > 0.0])
     t, values = t[keep], values[keep]
@@ -51,5 +62,7 @@ def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     out = np.stack([np.interp(times, t, column) for column in values.T], axis=1)
     finite = np.isfinite(values).all(axis=0)
     if smooth and len(t) > 2 and finite.any():
+        from scipy.interpolate import CubicSpline  # a tenth of a second, which a case alone does not need
+
         out[:, finite] = CubicSpline(t, values[:, finite])(np.clip(times, t[0], t[-1]))
     return out

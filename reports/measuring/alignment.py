@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.contacts import Contact, contacts
 from crossbody.cases.trajectory import Trajectory
-from crossbody.reports.metrics._contacts import Contact, contacts
 
 if TYPE_CHECKING:
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 _Pairs = list[tuple[Contact, Contact]]
 

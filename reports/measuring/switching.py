@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.cases.contacts import CLOSED
 from crossbody.engines.equations import system_of
-from crossbody.reports.metrics._contacts import CLOSED
 
 
 def made(run: Trajectory, case: Case) -> float | None:
