@@ -14,7 +14,8 @@ from crossbody.cases import closed_forms as cf
 from crossbody.cases.mechanisms.maze import closed_forms as maze_forms
 from crossbody.reference import simulate
 from crossbody.reference.systems import maze
-from crossbody.reports import commands, metrics
+from crossbody.reports import metrics
+from crossbody.reports.commands import maps
 from crossbody.reports.maps import stability
 from crossbody.reports.runs import jobs
 
@@ -195,7 +196,7 @@ def test_map_is_a_command_with_a_section_of_the_page(tmp_path, monkeypatch, caps
     points = (stability.Point(change="omega", parameters={"omega": 0.8}), stability.Point(change="default"))
     absent = stability.Point(change="t_end", parameters={"t_end": 2.0})
     monkeypatch.setattr(stability, "POINTS", (*points, absent))
-    assert commands.stability_map((), tmp_path / "out", "crossbody stability") == 1
+    assert maps.stability_map((), tmp_path / "out", "crossbody stability") == 1
     said = capsys.readouterr().out
     assert "outside: reference:compiled t_end = 2: solved expected." in said
     page = (tmp_path / "out" / "index.html").read_text()

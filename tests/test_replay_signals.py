@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 from crossbody import hw
 from crossbody.cases import SceneError
 from crossbody.hw.replaying import measures
-from crossbody.hw.replaying.lift import closed_by
 from crossbody.hw.replaying.rank import conditions
-from crossbody.hw.replaying.rates import rates_by_fit
-from crossbody.hw.replaying.turns import advanced, deviation, difference, increments, way
-from crossbody.hw.replaying.whiteness import autocorrelation, crosscorrelation, noise_level, stride_of
-from crossbody.hw.replaying.windows import windows
+from crossbody.hw.windows.lift import closed_by
+from crossbody.hw.windows.rates import rates_by_fit
+from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way
+from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation, noise_level, stride_of
+from crossbody.hw.windows.window import windows
 
 STEP = 1e-3
 SEEDS = st.integers(0, 2**32 - 1)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.hw.replaying.whiteness import noise_level
+from crossbody.hw.windows.whiteness import noise_level
 
 Floats = NDArray[np.float64]
 REACH = 0.25

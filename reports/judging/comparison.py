@@ -31,11 +31,10 @@ from crossbody.reports.judging.verdict import (
     judge,
     limit_for,
 )  # fmt: skip
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import TRUTH, Truth
 
 GROWING = frozenset({"position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path"})
 """Metrics that compare a motion with the truth's."""
-TRUTH = "truth"
 """Engine and metric of the row that judges the truth itself."""
 LARGEST = "largest"
 """Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""

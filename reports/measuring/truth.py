@@ -13,6 +13,9 @@ from crossbody.cases import Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
 
+TRUTH = "truth"
+"""Name of the truth where engines have theirs, and of the row that judges it."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:

@@ -8,7 +8,7 @@ from pathlib import Path
 from crossbody.cases import InvalidValue
 from crossbody.reports import voice
 from crossbody.reports.analysis import bode as responses
-from crossbody.reports.commands import where
+from crossbody.reports.commands.shared import where
 from crossbody.reports.pages import site as page
 from crossbody.reports.runs import jobs, output, study
 from crossbody.reports.runs.provenance import provenance

@@ -1,8 +1,7 @@
-"""What the commands do: run, judge, write, show."""
+"""What the command `run` does: run, judge, write, show."""
 
 from __future__ import annotations
 
-import hashlib
 import math
 import shlex
 import sys
@@ -12,16 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from crossbody import engines
 from crossbody.cases import Case, InvalidValue, installed
-from crossbody.cases.files.reading import SUFFIXES
 from crossbody.engines.equations import known, system_of
 from crossbody.reports import voice
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid, html, results, site
-from crossbody.reports.pages.styles import TRUTH
 from crossbody.reports.runs import files, jobs, output, store, study
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
@@ -31,9 +28,8 @@ from crossbody.reports.voice import progress
 if TYPE_CHECKING:
     import pandas as pd
 
-OF_USERS = (".py", *SUFFIXES)
-"""How names of files end that are cases."""
-GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
+from crossbody.reports.commands.shared import OF_USERS, identity, key, where
+
 WRONG = [Word.OUTSIDE, Word.CRASHED]
 WIDTH = 140  # of the table in a file or a pipe
 SHOWN = {"position": "position", **{part_of("position", part): part for part in PARTS}}
@@ -90,64 +86,6 @@ def findings(case: Case) -> tuple[str, ...]:
     return (*case.findings, *system_of(case).findings)
 
 
-def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:
-    """What decides what a command computes: the sources too, and case files of one's own."""
-    from crossbody.reports.sweep.store import code
-
-    paths = [*(name for name in names if name.endswith(OF_USERS)), *_acting(cases)]
-    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in paths]
-    scenes = [[case.label, dict(case.parameters)] for case in cases]
-    return {"kind": kind, "code": code(), "cases": scenes, "files": own, "plugins": installed.digests(), **more}
-
-
-def _acting(cases: Sequence[Case]) -> list[str]:
-    """Files that say what acts on the cases: tables of controls, controllers."""
-    told = [(str(case.parameters.get("ctrl", "")), str(case.parameters.get("control", ""))) for case in cases]
-    return sorted({name for table, control in told for name in (table, control.rpartition(":")[0]) if name})
-
-
-def key(number: int, case: Case) -> str:
-    """What tells the part of a case from those of the others, which may have its name."""
-    return f"{number} {case.label}"
-
-
-def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
-    """Run the sliders over all gaps; writes the table and the page."""
-    from crossbody.reports.maps import gapmap
-
-    picks = jobs.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
-    output.check(out, "gapmap")
-    with progress(len(counts) * len(gapmap.lines(picks))) as tell:
-        rows = gapmap.gap_map(counts, picks, points, tell)
-    told = provenance(command, points=points)
-    with output.folder(out, "gapmap") as made:
-        study.write(made, [], study.judge([], {}), told)
-        study.write_table(made / "gapmap", rows, told)
-        site.write(made)
-    if not voice.told_as_json({"gapmap": rows, "summary": gapmap.summary(rows)}):
-        show_gap_map(gapmap.summary(rows), out)
-    return 0
-
-
-def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
-    """Run the closed-loop maze with one thing changed at a time; writes the table and the page."""
-    from crossbody.reports.maps import stability
-
-    picks = jobs.picks(wanted) if wanted else (stability.DEFAULT,)
-    output.check(out, "stability")
-    with progress(len(picks) * len(stability.POINTS)) as tell:
-        rows = stability.stability_map(picks, stability.POINTS, tell)
-    told = provenance(command, rtol=stability.RTOL)
-    with output.folder(out, "stability") as made:
-        study.write(made, [], study.judge([], {}), told)
-        study.write_table(made / "stability", rows, told)
-        site.write(made)
-    surprises = stability.surprises(rows)
-    if not voice.told_as_json({"stability": rows, "surprises": surprises}):
-        show_stability(rows, surprises, out)
-    return int(len(surprises) > 0)
-
-
 def repeat(
     case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
 ) -> str:
@@ -197,12 +135,6 @@ def show_controllers(out: Path) -> None:
             print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")
 
 
-def where(out: Path) -> None:
-    """The path of the report, unless nothing but what is wrong is to be said."""
-    if not voice.silent():
-        print(f"Report: {(out / site.PAGE).absolute()}")
-
-
 def _summary(rows: pd.DataFrame, walls: Mapping[tuple[str, str], float]) -> Any:
     from rich.table import Table
 
@@ -230,22 +162,3 @@ def _short(value: float = math.nan, known: float = math.nan) -> str:
 
 def _count(count: int, word: Word) -> str:
     return f"[{COLOURS[word]}]{count}[/]" if count else "[dim]0[/]"
-
-
-def show_gap_map(lines: pd.DataFrame, out: Path) -> None:
-    """One line an engine in the terminal, then what those say that failed or were skipped."""
-    if not voice.quiet():
-        print(lines.drop(columns="why").to_string(index=False, float_format=lambda x: f"{x:.4g}"))
-    for line in lines[lines["why"] != ""].to_dict(orient="records"):
-        print(f"{line['n']} balls, {line['engine']}:{line['profile']}, {line['machine']}: {line['why']}")
-    where(out)
-
-
-def show_stability(rows: pd.DataFrame, surprises: pd.DataFrame, out: Path) -> None:
-    """One line a scene in the terminal, then those that ended otherwise than published."""
-    if not voice.quiet():
-        table = rows.drop(columns=["change", "why"])
-        print(table.to_string(index=False, float_format=lambda x: f"{x:.4g}"))
-    for row in surprises.to_dict(orient="records"):
-        print(f"outside: {row['engine']}:{row['profile']} {row['scene']}: {row['expected']} expected. {row['why']}")
-    where(out)

@@ -14,7 +14,7 @@ from crossbody import hw
 from crossbody.cases import CaseUnsupported
 from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import voice
-from crossbody.reports.commands import identity, where
+from crossbody.reports.commands.shared import identity, where
 from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison as replay

@@ -64,7 +64,7 @@ def _time_limit(text: str) -> Callable[[_Work], _Work]:
 @speaks
 def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, **log: Any) -> int:
     """Replay LOG on a model and say how well it matches."""
-    from crossbody.reports.replay.command import Ask, run_replay
+    from crossbody.reports.commands.replay import Ask, run_replay
 
     return run_replay(Ask(**log), "closed_loop" if closed_loop else "forward", wanted, out, _command(), limit)
 
@@ -82,7 +82,7 @@ def identify(
     free: tuple[str, ...], hold: int, starts: str, stride: int, budget: float, limit: float, out: Path, **log: Any
 ) -> int:
     """Identify parameters of a model from LOG, with intervals, judged on windows that were held out."""
-    from crossbody.reports.replay.command import Ask, run_identify
+    from crossbody.reports.commands.replay import Ask, run_identify
 
     return run_identify(Ask(**log), free, hold, starts, stride, budget, out, _command(), limit)
 

@@ -11,9 +11,9 @@ import numpy as np
 from crossbody.cases import InvalidValue, SceneError, arguments
 from crossbody.hw.models._contract import Floats, Model, Segment
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.impacts import impacts, least_of
-from crossbody.hw.replaying.rates import rates_by_fit
-from crossbody.hw.replaying.turns import advanced
+from crossbody.hw.windows.impacts import impacts, least_of
+from crossbody.hw.windows.rates import rates_by_fit
+from crossbody.hw.windows.turns import advanced
 
 FEWEST = 8
 """Samples of a window."""

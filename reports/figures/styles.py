@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 
-TRUTH = "truth"
 # Okabe and Ito's colours: told apart by colour-blind readers, on light and on dark.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00", "#7F7FFF", "#9B59D0")
 DASHES = ("solid", "dash", "dot", "dashdot")

@@ -14,8 +14,8 @@ from numba import types
 
 from crossbody.reference import kernels
 from crossbody.reference.cache import compiled
-from crossbody.reference.kinds import Floats
-from crossbody.reference.systems._delta_kinematics import (
+from crossbody.reference.delta.kernels.arm import inertia
+from crossbody.reference.delta.kernels.kinematics import (
     SINGULAR,
     control_jacobian,
     flange,
@@ -25,9 +25,9 @@ from crossbody.reference.systems._delta_kinematics import (
     posture,
     spread,
 )
-from crossbody.reference.systems._delta_linear import dot
-from crossbody.reference.systems._delta_servo import END as FIRST
-from crossbody.reference.systems.delta_arm import inertia
+from crossbody.reference.delta.kernels.linear import dot
+from crossbody.reference.delta.kernels.servo import END as FIRST
+from crossbody.reference.kinds import Floats
 
 HEADER = ("period", "quantum", "delay", "limit", "ticks", "knots", "clamp", "exact", "feedforward", "friction")
 _PERIOD, _QUANTUM, _DELAY, _LIMIT, _TICKS, _KNOTS, _CLAMP, _EXACT, _FORWARD, _FRICTION = range(

@@ -14,9 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference import kernels
-from crossbody.reference.kinds import Floats, Index
-from crossbody.reference.systems._delta_linear import diagonal, factor6, ill_posed, outer, plus, scaled, solve6
-from crossbody.reference.systems.delta_arm import (
+from crossbody.reference.delta.kernels.arm import (
     curvature,
     geometry,
     inertia,
@@ -27,6 +25,8 @@ from crossbody.reference.systems.delta_arm import (
     tip,
     turn,
 )
+from crossbody.reference.delta.kernels.linear import diagonal, factor6, ill_posed, outer, plus, scaled, solve6
+from crossbody.reference.kinds import Floats, Index
 
 
 @kernels.helper

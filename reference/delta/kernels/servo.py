@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
+from crossbody.reference.delta.kernels.arm import SIZE, geometry, weights
 from crossbody.reference.kinds import Array
-from crossbody.reference.systems.delta_arm import SIZE, geometry, weights
 
 # Places in the parameter array, behind those of the mechanism.
 NAMES = ("servo_kp", "servo_kd", "servo_start", "servo_end", "servo_feedforward")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from crossbody.hw.replaying.whiteness import noise_level
+from crossbody.hw.windows.whiteness import noise_level
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]

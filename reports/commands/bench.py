@@ -14,7 +14,7 @@ from crossbody.reports import voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
-from crossbody.reports.commands import identity, key, where
+from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.pages import site as page
 from crossbody.reports.runs import files, jobs, output, study
 from crossbody.reports.runs.parts import Parts

@@ -15,10 +15,10 @@ from numba import types
 
 from crossbody.reference import kernels
 from crossbody.reference.cache import compiled
+from crossbody.reference.delta.kernels.arm import geometry, inertia, psi, rotate, rotate_back, turn, weights
+from crossbody.reference.delta.kernels.linear import cross, dot
+from crossbody.reference.delta.kernels.solve import directions
 from crossbody.reference.kinds import Floats
-from crossbody.reference.systems._delta_linear import cross, dot
-from crossbody.reference.systems._delta_solve import directions
-from crossbody.reference.systems.delta_arm import geometry, inertia, psi, rotate, rotate_back, turn, weights
 
 SINGULAR = 1e-9
 """Below this |det D| (a product of unit vectors) the direct kinematics is singular."""

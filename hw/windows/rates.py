@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import InvalidValue
-from crossbody.hw.replaying.smooth_rates import smooth_rates
+from crossbody.hw.windows.smooth_rates import smooth_rates
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
