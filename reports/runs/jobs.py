@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from time import process_time
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -191,7 +191,9 @@ def run_case(
         tell(label)
         watch.limited(label, limit)
         why = watch.lost(label)
-        entries.append(ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine))
+        began = perf_counter()
+        entry = ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine)
+        entries.append(replace(entry, took_s=perf_counter() - began))
     watch.unlimited()
     _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
