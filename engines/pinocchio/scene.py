@@ -55,11 +55,15 @@ def build(case: Case, algebra: str) -> Prepared:
     to = Coordinates(scene)
     forces.spans = spans(scene, model, placed, to)
     centres = at_centres(scene, forces, model, model.createData(), placed)
+    lifting = bool(scene.pushes) or any(body.weightless for body in scene.bodies)
+    bends = any(armature[first : first + 3].any() for _, first in to.frees)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
-        ours = forces(to.ours(q), to.velocities(q, v)) - armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + centres(q)
+        ours = forces(to.ours(q), to.velocities(q, v))
+        if bends:
+            ours -= armature * to.bend(q, v)
+        tau[:] = to.back(q, ours) + centres(q) if lifting else to.back(q, ours)
 
     loops, strings = [loop for loop in scene.loops if loop.in_space], [one for one in scene.tendons if one.bodies]
     in_space: list[Joined | Strings] = [
@@ -67,14 +71,16 @@ def build(case: Case, algebra: str) -> Prepared:
     ]  # fmt: skip
     touching, order = ContactRows(scene, model, placed), _order(scene)
 
-    def heights(q: Floats) -> Floats:
+    def own_heights(q: Floats) -> Floats:
         own = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
-        return np.concatenate([own[order], touching.heights(q)])
+        return own[order]
 
+    @LastAsked
     def own_gradients(q: Floats) -> Gradients:
-        h = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
-        H = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
-        return h[order], H[order]
+        ours = to.ours(q)
+        own = (rows.heights(ours), to.back(q, rows.jacobian(ours)))
+        h, H = zip(own, *(part.gradients(q) for part in in_space), strict=True)
+        return np.concatenate(h)[order], np.concatenate(H)[order]
 
     @LastAsked
     def gradients(q: Floats) -> Gradients:
@@ -121,7 +127,7 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
+        rows=pinned, observe=_observe(scene, model, placed, forces, own_heights, touching, to),
         sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)),
         start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
@@ -244,7 +250,8 @@ def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed
 
 
 def _observe(
-    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, heights: Heights, to: Coordinates
+    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, heights: Heights, touching: ContactRows,
+    to: Coordinates,
 ) -> Any:  # fmt: skip
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
@@ -264,7 +271,8 @@ def _observe(
                     height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
                     energy[i, 1] += body.weightless * body.mass * height
         energy[:, 1] += forces.energy(to.ours(q))
-        return np.array([heights(one) for one in q]).reshape(len(q), -1), energy
+        own = np.array([heights(one) for one in q]).reshape(len(q), -1)
+        return np.concatenate([own, touching.recorded(q)], axis=1), energy
 
     return observe
 

@@ -25,7 +25,7 @@ from crossbody.cases import (
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
-from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
+from crossbody.reports.judging.truth import law_of, seconds, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 
@@ -270,9 +270,7 @@ def _dear(case: Case, pick: Pick, asked: Mapping[str, Value]) -> str:
     if case.scene is None or pick.engine == "reference":
         return ""
     prepared = prepare(replace(case, t_end=FIRST * case.t_end), pick, asked)
-    began = process_time()
-    prepared.run()
-    cost = (process_time() - began) / FIRST
+    cost = seconds(prepared)[0] / FIRST
     if cost <= DEAR_S:
         return ""
     return f"Too dear: it would take about {cost:.0f} s. -e {pick.engine}:{pick.profile} runs it all the same."
