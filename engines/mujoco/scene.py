@@ -40,7 +40,7 @@ two or three iterations, and without an end it takes a hundred. Where rows may, 
 STIFF = 1e3
 """Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
 method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
-1e-3, 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`). Loops in space bear many times what moves, and want 1e-7."""
+1e-3, 1e-4 by 1e-6 (`tests/reference/test_bounds_at_rest.py`). Loops in space bear many times what moves: 1e-7."""
 DEPENDENT = 1e-6
 """Singular value of the loops' rows, over the largest, below which one depends on the others."""
 SOFT = "The file's rows are soft: their law varies with depth."
