@@ -157,7 +157,8 @@ class Contacts:
             poses: of the bodies at all of them.
             before: how the shapes of the contacts in `turning` lay last, which is brought up to date.
         """
-        along, (R, p) = {}, self._placed(poses)
+        along: dict[int, NDArray[np.bool_]] = {}
+        R, p = self._placed(poses)
         for k in self.turning:
             pair = self.all[k]
             at, by = (
