@@ -140,6 +140,7 @@ class Forces:
             for name in ("stiffness", "damping")
         )
         self.slack = np.array([one.rest for one in scene.tendons]).reshape(-1, 2).T
+        self.along = any(scene.acts_along(tendon) for tendon in scene.tendons)
         self.spanning = [i for i, tendon in enumerate(scene.tendons) if tendon.bodies]
         self._lay_out_actuators()
         self._lay_out_bounds()
@@ -247,12 +248,12 @@ class Forces:
             moved, turn = self.moved(joint), self.turned(joint, q)
             angle = float(np.linalg.norm(turn)) or 1.0
             total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
-        stretch = self.stretch(q, v)
-        if self.scene.tendons:
-            lengths, rates, rows = stretch
-            spring = polynomial(self.tendon_stiffness, self.outside(lengths))
-            total -= (spring + drag(self.tendon_damping, rates)) @ rows
-        return total + self.actuated(x, v, stretch) if self.scene.actuators else total
+        if not self.along:
+            return total + self.actuated(x, v) if self.scene.actuators else total
+        lengths, rates, rows = self.stretch(q, v)
+        spring = polynomial(self.tendon_stiffness, self.outside(lengths))
+        total -= (spring + drag(self.tendon_damping, rates)) @ rows
+        return total + self.actuated(x, v, (lengths, rates, rows)) if self.scene.actuators else total
 
     def stretch(self, q: Floats, v: Floats) -> Stretch:
         """Return lengths of all tendons, their rates and derivatives."""
@@ -261,10 +262,10 @@ class Forces:
             lengths[self.spanning], rates[self.spanning], rows[self.spanning] = self.spans(q, v)
         return lengths, rates, rows
 
-    def strokes(self, x: Floats, v: Floats, stretch: Stretch) -> Stretch:
+    def strokes(self, x: Floats, v: Floats, stretch: Stretch | None) -> Stretch:
         """Return lengths of all actuators, their rates and their derivatives (nu, nv), gear included."""
         A, lengths = self.A.copy(), self.A @ x
-        if len(self.pulling):
+        if stretch is not None and len(self.pulling):
             gear, tendon = self.gear[self.pulling], self.pulled
             A[self.pulling], lengths[self.pulling] = gear[:, None] * stretch[2][tendon], gear * stretch[0][tendon]
         return lengths, A @ v, A
@@ -282,7 +283,7 @@ class Forces:
         out: Floats = lengths - clamped(lengths, self.slack)
         return out
 
-    def actuated(self, x: Floats, v: Floats, stretch: Stretch) -> Floats:
+    def actuated(self, x: Floats, v: Floats, stretch: Stretch | None = None) -> Floats:
         """Return what the actuators do (nv,), each within its bounds and their sum within the joint's; less damping."""
         lengths, rates, A = self.strokes(x, v, stretch)
         terms = np.array([np.ones(len(rates)), lengths, rates])
@@ -299,7 +300,7 @@ class Forces:
                 total += stored(joint.stiffness, x[:, self.place[joint.name]] - joint.rest[0])
             elif any(joint.stiffness):
                 total += stored(joint.stiffness, np.linalg.norm(self.turned(joint, q), axis=-1))
-        if self.scene.tendons:
+        if self.tendon_stiffness.any():
             lengths = np.array([self.stretch(one, np.zeros(self.scene.nv))[0] for one in q]).T
             for tendon, length in zip(self.scene.tendons, lengths, strict=True):
                 total += stored(tendon.stiffness, length - clamped(length, tendon.rest))

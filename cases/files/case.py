@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -168,18 +169,13 @@ def case_of(
     if rank >= 0 and not scene.loops:
         raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
-    names, laws, unilateral = rows_of(scene)
-    law = Law(
-        a0=np.array([one.a0 for one in laws]), a1=np.array([one.a1 for one in laws]),
-        a2=np.array([one.a2 for one in laws]), unilateral=np.array(unilateral, dtype=bool),
-    )  # fmt: skip
     return Case(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
-        contacts=tuple(names), q0=start,
+        contacts=tuple(rows_of(scene)[0]), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else cast(Floats, v0),  # arrays are checked there
-        act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law,
+        act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law_of(scene),
         inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
         limits=AS_IT_STANDS if file else (),
@@ -274,6 +270,31 @@ AS_IT_STANDS = (
     ),
 )  # fmt: skip
 """Of what an engine makes of a file by itself: its reader is judged, what it computes is told."""
+
+
+def law_of(scene: Scene) -> Law:
+    """Return the constants of a scene's rows."""
+    _, laws, unilateral = rows_of(scene)
+    a0, a1, a2, b0, b1 = np.array([dataclasses.astuple(one) for one in laws]).reshape(-1, 5).T
+    return Law(a0=a0, a1=a1, a2=a2, b0=b0, b1=b1, unilateral=np.array(unilateral, dtype=bool))
+
+
+def under_law(scene: Scene, law: Law) -> Scene:
+    """Return the scene whose parts have the constants of a law's rows, of several those of the first."""
+    names = [field.name for field in dataclasses.fields(RowLaw)]
+    rows = zip(*(getattr(law, name).tolist() for name in names), strict=True)
+    laws = (RowLaw(**dict(zip(names, row, strict=True))) for row in rows)
+
+    def put(part: Any, count: int) -> Any:
+        mine = [next(laws) for _ in range(count)]
+        return replace(part, law=mine[0]) if mine and mine[0] != part.law else part
+
+    loops = [put(loop, loop.width) for loop in scene.loops]
+    bounded = [put(part, int(np.isfinite(part.range).sum())) for part in scene.bounded]
+    places = {contact.pair.name: contact.places for contact in contacts(scene)}
+    pairs = [put(pair, places.get(pair.name, 0)) for pair in scene.pairs]
+    n = len(scene.joints)
+    return scene.replace(loops=loops, joints=bounded[:n], tendons=bounded[n:], pairs=pairs)
 
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")

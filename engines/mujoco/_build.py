@@ -16,6 +16,9 @@ from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
 POINT = 1e-15
 """Radius of a corner, m: below the rounding of any place, and above 0, which no ball has."""
 
+LEAST = 2e-15
+"""The smallest moment of inertia that MuJoCo admits, kg m^2 (twice mjMINVAL): it has no point masses."""
+
 
 def compiled(spec: Any, scene: Scene) -> Any:
     """Return the compiled model, with what no element of the format says.
@@ -59,8 +62,10 @@ def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
             name=body.name, pos=body.position, quat=body.orientation, mass=body.mass, ipos=body.com,
             gravcomp=body.weightless, explicitinertial=True,
         )  # fmt: skip
-        # The full inertia stands in the order xx yy zz xy xz yz.
-        added.fullinertia = body.inertia if body.mass > 0.0 else np.full(6, np.nan)
+        if body.mass > 0.0 and any(body.inertia):
+            added.fullinertia = body.inertia  # in the order xx yy zz xy xz yz
+        else:
+            added.inertia = (LEAST if body.mass > 0.0 else 0.0,) * 3
         bodies[body.name] = added
         for joint in scene.joints:
             if joint.body == body.name:

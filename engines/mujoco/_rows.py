@@ -11,6 +11,7 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
+from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact
 from crossbody.engines._contacts import Contacts, end_of
@@ -48,6 +49,7 @@ class Rows:
                 if np.isfinite(bound):
                     self.places[kind, i, bool(upper)] = row
                     row += 1
+        self.cubic = np.array([law.a2 for law in rows_of(scene)[1]])
         self.touching = Contacts(scene)
         self.nc = row + self.touching.count
         named = mjcf.names(model, "geom")
@@ -82,9 +84,9 @@ class Rows:
         solref += [bounds[kind][i] for kind, i, _ in self.places]
         solref += [model.pair_solref[i] for i in self.pair_ids()]
         pairs = np.array(solref).reshape(-1, 2)
-        if (pairs >= 0.0).any():
+        if (pairs > 0.0).any():
             return {"solref": pairs}
-        return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), np.zeros(len(pairs))), strict=True))
+        return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), self.cubic), strict=True))
 
     def present(self) -> Iterator[Present]:
         """Yield what MuJoCo has a row for now, of those that may open."""
@@ -103,6 +105,14 @@ class Rows:
         for j, row in self.present():
             lam[row] += data.efc_force[j]
         return lam
+
+    def jacobian(self) -> Floats:
+        """Return H (nc, nv); 0 of a row that is not there."""
+        J, H = np.array(self.data.efc_J).reshape(-1, self.model.nv), np.zeros((self.nc, self.model.nv))
+        H[: self.always] = J[: self.always]
+        for j, row in self.present():
+            H[row] = J[j]
+        return H
 
     def _geoms(self, part: int) -> frozenset[int]:
         """Return the shapes of a contact; in a file as it stands some meet whose pairs have no rows."""

@@ -24,6 +24,8 @@ REACH = 1e-12
 rounding."""
 WIDE = 0.1
 """How far above its surface a row that is on is still a row, m or rad: further than a step goes."""
+FAR = 1e9
+"""Margin with which there is a row at any gap, m or rad."""
 OFF = -1e12
 """Reference acceleration of a row that is off, m/s^2."""
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
@@ -109,22 +111,41 @@ class Switched(Rows):
         mujoco.mj_solveM(self.model, data, moved, J[None])
         return float((self.wanted[row] - J @ data.qacc) / (J @ moved[0]))
 
+    def approach(self) -> tuple[Floats, Floats, Floats]:
+        """Return gap, rate and acceleration (nc,) that every row has at the state of the data with no row acting."""
+        for margin, i in self.part:
+            margin[i] = FAR
+        mujoco.mj_forward(self.model, self.data)
+        data, found = self.data, np.zeros((3, self.nc))
+        J = np.array(data.efc_J).reshape(-1, self.model.nv)
+        for j, row in [*((k, k) for k in range(self.always)), *self.present()]:
+            gap = data.efc_pos[j] - self.surface[row]
+            found[:, row] = gap, data.efc_vel[j], J[j] @ data.qacc_smooth
+        self.arm(self.armed)
+        return found[0], found[1], found[2]
+
     def hook(self) -> Hook | None:
         """Return what has the law at its surface, adds H' v where MuJoCo has none, and puts rows out of force."""
         joints, tendons = self.scene.joints, self.scene.tendons
         bent = {(int(LIMITS[0]), i): i for i, joint in enumerate(joints) if joint.type == "ball" and joint.limited}
         bent |= {(int(LIMITS[1]), i): len(joints) + i for i, tendon in enumerate(tendons) if tendon.bodies}
-        if self.nc == self.always:
+        if self.nc == self.always and not self.cubic.any():
             return None
         drift, first = Drift(self.scene, self.model, self.touching), self.nc - self.touching.count
 
+        curved = self.cubic[: self.always]
+
         def hook(_model: Any, data: Any) -> None:
+            if curved.any():
+                data.efc_aref[: self.always] -= curved * data.efc_pos[: self.always] ** 3
+                data.efc_aref[: self.always] += data.efc_R[: self.always] * self.last[: self.always]
             present = list(self.present())
             if not present:
                 return
             at, rows = np.array(present).T
             gains = data.efc_KBIP[at]  # a0 is the first times the third
             data.efc_aref[at] -= gains[:, 0] * gains[:, 2] * (data.efc_margin[at] - self.surface[rows])
+            data.efc_aref[at] -= self.cubic[rows] * (data.efc_pos[at] - self.surface[rows]) ** 3
             closed = [(j, row) for j, row in present if self.armed[row] != FREE]
             acting = [(j, row, (int(data.efc_type[j]), int(data.efc_id[j]))) for j, row in closed]
             touched = [(j, row) for j, row, _ in acting if row >= first]

@@ -1,7 +1,8 @@
-"""Any scene in MuJoCo: matched, built from the scene; as_is, the file as it stands."""
+"""Any scene in MuJoCo: matched, built from the scene; default, with contacts as MuJoCo sets them; as_is, a file."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
@@ -11,12 +12,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Parameter, SceneError
+from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
+from crossbody.cases.files.case import under_law
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
+from crossbody.cases.scene_contacts import by_shapes
 from crossbody.engines._acting import Acting
+from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import without_regularisation
@@ -34,14 +38,18 @@ STIFF = 1e3
 """Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
 method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
 1e-3, 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`). Loops in space bear many times what moves, and want 1e-7."""
+SOLVES = 4
+"""Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
 SOFT = "The file's rows are soft: their law varies with depth."
 HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
 
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
-    if profile == "default":
-        return "What MuJoCo makes of a robot file by itself is the profile as_is; default is one of the shipped cases."
+    if profile == "default" and case.file:
+        return (
+            "What MuJoCo makes of a robot file by itself is the profile as_is; default is that of scenes without one."
+        )
     if profile != "as_is":
         return None
     if not case.file:
@@ -64,10 +72,37 @@ def default_step(case: Case, profile: str) -> float:
     """Return the file's own step, s, or for matched parts of the fastest time constants of forces and of rows."""
     if profile == "as_is":
         return float(_from_file(case).opt.timestep)
-    opening = case.law.unilateral
-    poles = [np.roots([1.0, a1, a0]) for a0, a1 in zip(case.law.a0[opening], case.law.a1[opening], strict=True)]
+    if profile == "default":
+        return float(mujoco.MjModel.from_xml_string("<mujoco/>").opt.timestep)
+    case = followed(case, profile) or case
+    law, opening = case.law, case.law.unilateral
+    stiffness = law.a0 + 3.0 * law.a2 * (_deepest(case) if law.a2.any() else 0.0) ** 2
+    poles = [np.roots([1.0, a1, k]) for k, a1 in zip(stiffness[opening], law.a1[opening], strict=True)]
     rate = float(np.abs(np.concatenate([np.zeros(1), *poles])).max())
     return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
+
+
+def followed(case: Case, profile: str) -> Case | None:
+    """Return the case whose equations the profile integrates, if not its own; None too for constants of MuJoCo's."""
+    return real_time(case) if profile == "matched" else None
+
+
+def _deepest(case: Case) -> Floats:
+    """Return how deep each row gets (nc,), m or rad, if what drives it at the start does so until it closes.
+
+    There a0 d^2/2 + a2 d^4/4 holds v^2/2 + |h'' h|, with what the row stores at a start off it.
+    """
+    scene, law = _scene(case), case.law
+    model = matched(scene)
+    data = mujoco.MjData(model)
+    rows = Switched(scene, model, data)
+    data.qpos[:], data.qvel[:] = case.q0, case.v0
+    h, hd, hdd = rows.approach()
+    energy = 0.5 * hd * hd + np.abs(hdd * h) + np.where(h < 0.0, law.a0 * h**2 / 2 + law.a2 * h**4 / 4, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depths = np.sqrt(2.0 * energy / law.a0), (4.0 * energy / law.a2) ** 0.25
+    found: Floats = np.nan_to_num(np.fmin(*depths), posinf=0.0)
+    return found
 
 
 def fastest(scene: Scene, q: Floats, v: Floats) -> float:
@@ -99,10 +134,13 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     Raises:
         ValueError: MuJoCo's own, for a model that it refuses.
     """
-    scene = _scene(case)
+    scene = _scene(followed(case, profile) or case)
     if profile == "as_is":
         model = held(_from_file(case))
         model = model if reader == "file" else rebuilt(scene, model)
+    elif profile == "default":
+        scene = by_shapes(scene)
+        model = _obvious(scene)
     else:
         model = matched(scene)
     data = mujoco.MjData(model)
@@ -127,7 +165,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
 def _scene(case: Case) -> Scene:
     if case.scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
-    return case.scene
+    return under_law(case.scene, case.law)
 
 
 def _from_file(case: Case) -> Any:
@@ -157,6 +195,20 @@ def matched(scene: Scene) -> Any:
     without_regularisation(model)
     model.dof_invweight0[:] *= STIFF
     model.tendon_invweight0[:] *= STIFF
+    return model
+
+
+def _obvious(scene: Scene) -> Any:
+    """Return the model built from the scene with rows, integrator and step as MuJoCo sets them."""
+    model = compiled(spec_of(scene), scene)
+    plain = mujoco.MjSpec()
+    plain.worldbody.add_geom(size=(1.0, 0.0, 0.0))
+    one = plain.compile()
+    for name in ("eq", "pair", "jnt", "tendon"):
+        ends = {"tendon": "_lim"}.get(name, "")
+        getattr(model, f"{name}_solref{ends}")[:] = one.geom_solref[0]
+        getattr(model, f"{name}_solimp{ends}")[:] = one.geom_solimp[0]
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model
 
 
@@ -209,12 +261,21 @@ def _change(scene: Scene, data: Any, acting: Acting, driver: Forces | None) -> C
 
 def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
     """Masses, M and bias at zero input; rows where all of them are always on."""
+    model = copy.copy(model)  # rows are put on here
     data = mujoco.MjData(model)
+    entered = profile == "matched" and not case.general  # of a robot the states are not those of rows that act
+    of_run, rows = rows, type(rows)(rows.scene, model, data)
+    if isinstance(rows, Switched) and isinstance(of_run, Switched):
+        rows.surface[:] = of_run.surface
+    hook = rows.hook() if entered and isinstance(rows, Switched) else None
 
     def look(q: Floats, v: Floats) -> None:
+        if isinstance(rows, Switched) and entered:
+            rows.arm((int(Mode.BILATERAL),) * rows.always + (int(Mode.CONTACT),) * (rows.nc - rows.always))
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = q, v
-        mujoco.mj_forward(model, data)
+        with hooked(hook):
+            mujoco.mj_forward(model, data)
 
     def M(q: Floats) -> Floats:
         look(q, np.zeros(model.nv))
@@ -226,19 +287,21 @@ def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
 
     def H(q: Floats) -> Floats:
         look(q, np.zeros(model.nv))
-        return np.array(data.efc_J).reshape(-1, model.nv)[: rows.nc]
+        return rows.jacobian()
 
     def lam(q: Floats, v: Floats) -> Floats:
-        look(q, v)
-        return np.array(data.efc_force[: rows.nc])
+        for _ in range(SOLVES if entered else 1):  # what softness leaves of it is R times the change since the last
+            look(q, v)
+            found = rows.lam()
+        return found
 
     found: dict[str, Any] = {
         "masses": model.body_mass[1:].copy(), "gravity": float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
-    if profile == "matched":
+    if profile != "as_is":
         found["constants"] = rows.constants()
     hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
-    if rows.nc > rows.always:
+    if rows.nc > rows.always and not entered:
         return found | {"hidden": {**hidden, "H": HIDDEN, "lam": HIDDEN}}
     return found | {"hidden": hidden, "H": H} | ({"lam": lam} if profile == "matched" else {})

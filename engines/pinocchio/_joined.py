@@ -80,6 +80,10 @@ class Joined:
             lambda one, two, scale: scale * self._map(one, two) @ (turned(one) - turned(two)),
         ).reshape(-1, self.model.nv)
 
+    def gradients(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return h (rows,) and H (rows, nv)."""
+        return self.heights(q), self.jacobian(q)
+
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (rows,)."""
         pin.forwardKinematics(self.model, self.data, q, v, self.none)
@@ -149,29 +153,6 @@ def moved(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
 class Spans:
     """Distances of two points: lengths, and their derivatives along Pinocchio's velocities.
 
-    Args:
-        model, placed: as of `Joined`.
-        tendons: those between points.
-    """
-
-    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
-        self.model, self.data = model, model.createData()
-        self.ends = [ends_of(placed, tendon) for tendon in tendons]
-
-    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return l (nt,) and dl/dv (nt, nv)."""
-        pin.computeJointJacobians(self.model, self.data, q)
-        lengths, rows = np.zeros(len(self.ends)), np.zeros((len(self.ends), self.model.nv))
-        for i, (one, two) in enumerate(self.ends):
-            lengths[i], n = apart(self.data, one, two)
-            J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
-            rows[i] = n @ (J[1] - J[0])
-        return lengths, rows
-
-
-class Strings:
-    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
-
     With W = v2 - v1 of the points and n from the first to the second, W_t what of W is not along n:
 
         d' = n.W,    d'' at v' = 0 = n.(a2 - a1) + |W_t|^2 / d
@@ -183,50 +164,75 @@ class Strings:
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
         self.model, self.data, self.none = model, model.createData(), np.zeros(model.nv)
-        self.rows: list[tuple[float, float, End, End]] = []  # sign, bound, ends
-        for tendon in tendons:
-            ends = ends_of(placed, tendon)
-            for sign, bound in zip((1.0, -1.0), tendon.range, strict=True):
-                if np.isfinite(bound):
-                    self.rows.append((sign, bound + sign * tendon.margin, ends[0], ends[1]))
+        points = [tuple(zip(tendon.bodies, tendon.positions, strict=True)) for tendon in tendons]
+        known = list(dict.fromkeys(point for pair in points for point in pair))
+        self.ends = [_end(placed[body], place, UPRIGHT) for body, place in known]
+        which = [[known.index(point) for point in pair] for pair in points]
+        self.one, self.two = np.array(which, dtype=int).reshape(-1, 2).T
+
+    def _apart(self) -> tuple[Floats, Floats, Floats]:
+        """Return the points of the ends (ne, 3), distances (nt,), and directions from first to second (nt, 3)."""
+        points = np.array([at(self.data, end).translation for end in self.ends])
+        way = points[self.two] - points[self.one]
+        d = np.sqrt(np.einsum("ij,ij->i", way, way))
+        return points, d, way / d[:, None]
+
+    def lengths(self, q: Floats) -> Floats:
+        """Return l (nt,)."""
+        pin.forwardKinematics(self.model, self.data, q)
+        return self._apart()[1]
+
+    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return l (nt,) and dl/dv (nt, nv)."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        points, d, n = self._apart()
+        ends = zip(self.ends, points, strict=True)
+        J = np.array([point_jacobian(self.model, self.data, end.joint, point) for end, point in ends])
+        return d, np.einsum("ij,ijk->ik", n, J[self.two] - J[self.one])
+
+    def bend(self, q: Floats, v: Floats) -> Floats:
+        """Return d'' at v' = 0 (nt,)."""
+        pin.forwardKinematics(self.model, self.data, q, v, self.none)
+        _, d, n = self._apart()
+        rates, own = np.array([moved(self.model, self.data, end) for end in self.ends]).swapaxes(0, 1)
+        W, a = (part[self.two] - part[self.one] for part in (rates, own))
+        across = W - np.einsum("ij,ij->i", n, W)[:, None] * n
+        total: Floats = np.einsum("ij,ij->i", n, a) + np.einsum("ij,ij->i", across, across) / d
+        return total
+
+
+class Strings:
+    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
+
+    Args:
+        model, placed, tendons: as of `Spans`.
+    """
+
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
+        self.spans = Spans(model, placed, tendons)
+        rows = [
+            (i, sign, bound + sign * tendon.margin)
+            for i, tendon in enumerate(tendons)
+            for sign, bound in zip((1.0, -1.0), tendon.range, strict=True)
+            if np.isfinite(bound)
+        ]
+        of, self.sign, self.bound = np.array(rows).reshape(-1, 3).T
+        self.of = of.astype(int)
 
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q)
-        return np.array([sign * (apart(self.data, one, two)[0] - bound) for sign, bound, one, two in self.rows])
+        found: Floats = self.sign * (self.spans.lengths(q)[self.of] - self.bound)
+        return found
 
-    def jacobian(self, q: Floats) -> Floats:
-        """Return H (rows, nv)."""
-        pin.computeJointJacobians(self.model, self.data, q)
-        found = []
-        for sign, _, one, two in self.rows:
-            J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
-            found.append(sign * apart(self.data, one, two)[1] @ (J[1] - J[0]))
-        return np.array(found).reshape(-1, self.model.nv)
+    def gradients(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return h (rows,) and H (rows, nv)."""
+        lengths, rows = self.spans(q)
+        return self.sign * (lengths[self.of] - self.bound), self.sign[:, None] * rows[self.of]
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q, v, self.none)
-        found = []
-        for sign, _, one, two in self.rows:
-            (v1, a1), (v2, a2) = (moved(self.model, self.data, end) for end in (one, two))
-            d, n = apart(self.data, one, two)
-            across = (v2 - v1) - n @ (v2 - v1) * n
-            found.append(sign * (n @ (a2 - a1) + across @ across / d))
-        return np.array(found)
-
-
-def apart(data: Any, one: End, two: End) -> tuple[float, Floats]:
-    """Return the distance of two ends, and the direction from the first to the second."""
-    way = at(data, two).translation - at(data, one).translation
-    d = float(np.linalg.norm(way))
-    return d, way / d
-
-
-def ends_of(placed: dict[str, tuple[int, Any]], tendon: Tendon) -> tuple[End, End]:
-    """Return the ends of a tendon between points."""
-    one, two = (_end(placed[body], place, UPRIGHT) for body, place in zip(tendon.bodies, tendon.positions, strict=True))
-    return one, two
+        found: Floats = self.sign * self.spans.bend(q, v)[self.of]
+        return found
 
 
 def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:

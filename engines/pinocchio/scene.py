@@ -13,7 +13,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
-from crossbody.engines.pinocchio._contacts import ContactRows
+from crossbody.engines._real_time import followed as real_time
+from crossbody.engines.pinocchio._contacts import ContactRows, Points
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
@@ -36,9 +37,14 @@ Placed = dict[str, tuple[int, Any]]
 
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: bounds and loops follow the law alone."""
-    if profile != "law":
+    if profile != "law" and case.general:
         return "The rows of a scene follow the law: impacts in no time and time stepping have none."
     return None
+
+
+def followed(case: Case, profile: str) -> Case | None:
+    """Return the case whose equations the profile integrates, if not its own; None for the other profiles."""
+    return real_time(case, two_sets=True) if profile == "law" else None
 
 
 def build(case: Case, algebra: str) -> Prepared:
@@ -46,6 +52,7 @@ def build(case: Case, algebra: str) -> Prepared:
     scene = case.scene
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
+    law = (real_time(case, two_sets=True) or case).law
     forces = parts.Forces(scene)
     rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space)), forces)
     model, placed = tree(scene)
@@ -71,9 +78,9 @@ def build(case: Case, algebra: str) -> Prepared:
         return np.concatenate([own[order], touching.heights(q)])
 
     def own_gradients(q: Floats) -> Gradients:
-        h = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
-        H = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
-        return h[order], H[order]
+        own = (rows.heights(to.ours(q)), to.back(q, rows.jacobian(to.ours(q))))
+        h, H = zip(own, *(part.gradients(q) for part in in_space), strict=True)
+        return np.concatenate(h)[order], np.concatenate(H)[order]
 
     @LastAsked
     def gradients(q: Floats) -> Gradients:
@@ -106,7 +113,7 @@ def build(case: Case, algebra: str) -> Prepared:
 
     pinned = PinRows(
         model, lambda q: gradients(q)[1], lambda q: gradients(q)[0], lambda q, v: drift_of(q, v, slice(None)),
-        law=case.law, algebra=algebra, forces=apply, drift_of=drift_of, gradient_of=gradient_of,
+        law=law, algebra=algebra, forces=apply, drift_of=drift_of, gradient_of=gradient_of,
     )  # fmt: skip
     pinned.near[len(order) :] = DIPS
     if touching.contacts.turning:
@@ -120,9 +127,10 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
+        rows=pinned, points=Points(scene, model, placed), observe=_observe(scene, model, placed, forces, heights, to),
         sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)),
-        start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
+        start=(start, to.back(start, case.v0)),
+        chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip

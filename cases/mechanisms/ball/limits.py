@@ -37,10 +37,6 @@ CLAIMS = {
     "penetration": (1e-5, "the deepest sample, not the deepest instant"),
 }
 
-MEMORYLESS = (
-    "MuJoCo's contact is memoryless and ends at h = 0: it has no ballistic state, pushes wherever the law is "
-    "positive below the surface, and makes no energy where the law does."
-)
 OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and a step of 2 ms, not the case's law."
 IMPACT = (
     "An impact in no time has no contact phase: a restitution replaces the law, so the ball neither sinks in nor stays "
@@ -51,7 +47,6 @@ STEPPING = (
 )
 
 _KNOWN = (
-    ("mujoco", "matched", MEMORYLESS),
     ("mujoco", "default", OBVIOUS),
     ("pinocchio", "impulse", IMPACT),
     ("pinocchio", "admm", STEPPING),
@@ -87,8 +82,7 @@ def _all(wanted: dict[str, tuple[float, str]], bilateral: bool, height: float) -
     for metric, (value, why) in wanted.items():
         yield Limit(metric=metric, value=value, why=why)
     for engine, profile, known in _KNOWN:
-        if not bilateral or known != MEMORYLESS:
-            yield Limit(metric="*", engine=engine, profile=profile, known=known)
+        yield Limit(metric="*", engine=engine, profile=profile, known=known)
     yield from peer_limits.ball(wanted, bilateral)
     if bilateral:
         yield Limit(metric="energy_drift", value=2e-5, why=_SMALL)
