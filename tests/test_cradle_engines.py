@@ -104,9 +104,7 @@ def test_momentum_is_kept_to_rounding(name: str, profile: str) -> None:
     assert np.abs(p - p[0]).max() < 1e-12 * np.abs(p[0])
 
 
-@pytest.mark.parametrize(
-    ("n", "s", "percent"), [(5, 0.1, 41.4), (3, 0.2, 16.1), (3, 0.285, 16.7), (5, 0.3, 45.0)]
-)
+@pytest.mark.parametrize(("n", "s", "percent"), [(5, 0.1, 41.4), (3, 0.2, 16.1), (3, 0.285, 16.7), (5, 0.3, 45.0)])
 @each_law
 def test_overlapping_collisions_make_the_energy_of_their_machine(
     name: str, profile: str, n: int, s: float, percent: float

@@ -52,10 +52,8 @@ def level(case: Case) -> Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]:
         t, y = arc.t[-1], arc.y[:, -1]
         if arc.status == 0:
             break
-        if mode == CONTACT:
-            mode = FREE if y[0] > 0.0 else BALLISTIC
-        else:
-            mode = CONTACT if mode == FREE else FREE
+        released = FREE if y[0] > 0.0 else BALLISTIC
+        mode = {FREE: CONTACT, CONTACT: released, BALLISTIC: FREE}[mode]
 
     def at(times: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         out = np.empty(len(times))

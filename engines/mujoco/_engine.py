@@ -85,7 +85,7 @@ class Mujoco(Engine):
 
     name = "mujoco"
     profiles: Mapping[str, str] = {
-        "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events; memoryless",
+        "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events",
         "default": "the obvious model: contact constants, integrator (Euler) and step (2 ms) as MuJoCo sets them",
         "as_is": "a robot file as it stands: its own step, integrator, solref, solimp and cone",
     }
