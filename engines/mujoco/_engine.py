@@ -54,7 +54,8 @@ class MujocoRun(Run):
         heard = (f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys((*self.said, *warned)))
         message = " ".join(w for w in (march.message, self.rounded, *heard) if w)
         counts = {"located": march.trials}
-        found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
+        with captured():  # gaps are looked at with the same model, and have no more to say
+            found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
         return found if scene.acting is None else scene.acting.told(found)
 
     def native(self) -> float:
