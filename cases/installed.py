@@ -1,23 +1,156 @@
-"""Plug-ins that other distributions bring: modules named by entry points, in a group called like our package.
+"""Plug-ins from elsewhere: modules that other distributions name by entry points, and files of a user's own.
 
-The pyproject.toml of one says, for example,
+The pyproject.toml of a distribution says, for example,
 
     [project.entry-points."crossbody.cases"]
     gripper = "my_package.gripper"
 
 and likewise for "crossbody.engines", "crossbody.reports.metrics", "crossbody.hw.formats" and every other folder of
-plug-ins.
+plug-ins. A file is given to `use`, as the commands do with --plugin FILE, pytest with --crossbody-plugin FILE, and both
+with the files that the pyproject.toml of the folder one works in names, or of the nearest folder above it:
+
+    [tool.crossbody]
+    plugins = ["engines/euler.py"]  # from the folder of the pyproject.toml
+
+A plug-in is called like its file, and is of every kind whose public names it has (`KINDS`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+import hashlib
+import os
+import sys
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, partial
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple, TypeVar
+
+from crossbody.cases import arguments
+from crossbody.cases.errors import InvalidValue, shown
+from crossbody.cases.own_file import from_file
+
+_Made = TypeVar("_Made")
+
+
+class Kind(NamedTuple):
+    """What plug-ins of one group are called, and the public names that make a module one."""
+
+    name: str
+    defines: tuple[str, ...]
+
+
+KINDS = {
+    "crossbody.cases": Kind("case", ("PARAMETERS", "VARIANTS", "build")),
+    "crossbody.engines": Kind("engine", ("ENGINE",)),
+    "crossbody.hw.formats": Kind("log format", ("SUFFIXES", "Options", "recognises", "open_log")),
+    "crossbody.hw.models": Kind("model", ("MODEL",)),
+    "crossbody.reports.metrics": Kind("metric", ("UNIT", "CLAIMED", "measure")),
+    "crossbody.reports.scenes": Kind("picture", ("stage", "poses", "arrows")),
+    "crossbody.reports.sections": Kind("study", ("TITLE", "sections")),
+    "crossbody.reports.suites": Kind("suite", ("SUITE",)),
+}
+"""Group -> the kind of its plug-ins."""
+_FILES: dict[Path, ModuleType] = {}
+
+
+def modules(group: str) -> Mapping[str, str]:
+    """Return the module of each plug-in by its name; what entry points name is not imported."""
+    own = {path.stem: module.__name__ for path, module in _FILES.items() if group in _groups(module)}
+    return {**_entry_points(group), **own}
 
 
 @cache
-def modules(group: str) -> Mapping[str, str]:
-    """Name of a plug-in -> its module; nothing is imported."""
+def _entry_points(group: str) -> Mapping[str, str]:
     from importlib.metadata import entry_points  # reads what is installed: once a process and group
 
     return {point.name: point.module for point in entry_points(group=group)}
+
+
+def _groups(module: ModuleType) -> list[str]:
+    return [group for group, kind in KINDS.items() if all(hasattr(module, name) for name in kind.defines)]
+
+
+def use(files: Iterable[str | os.PathLike[str]]) -> None:
+    """Import files as plug-ins of this process; one that it has already is left as it is.
+
+    Raises:
+        InvalidValue: for a path that is no Python file, a file that defines no plug-in, or a name that is taken.
+        SceneError: if a file cannot be imported, with the line.
+    """
+    for file in files:
+        path = Path(arguments.path("plug-in", file)).expanduser().resolve()
+        if path not in _FILES:
+            _FILES[path] = _opened(path)
+
+
+def _opened(path: Path) -> ModuleType:
+    if path.suffix != ".py" or not path.stem.isidentifier():
+        raise InvalidValue(f"The plug-in {path} is not called NAME.py, with a NAME of letters, digits and _.")
+    if not os.path.isfile(path):
+        raise InvalidValue(f"There is no plug-in file {path}.")
+    if same := [other for other in _FILES if other.stem == path.stem]:
+        raise InvalidValue(f"The plug-ins {same[0]} and {path} have one name: rename one of the files.")
+    module = from_file("plugin", path)
+    try:
+        _check(path, _groups(module))
+    except InvalidValue:
+        del sys.modules[module.__name__]
+        raise
+    return module
+
+
+def _check(path: Path, groups: list[str]) -> None:
+    if not groups:
+        wanted = "; ".join(f"{kind.name}: {', '.join(kind.defines)}" for kind in KINDS.values())
+        raise InvalidValue(f"The plug-in file {path} defines none. Public names of a plug-in, by its kind: {wanted}.")
+    for group in groups:
+        package = f"{group}.library" if group == "crossbody.cases" else group
+        if find_spec(f"{package}.{path.stem}") or path.stem in _entry_points(group):
+            raise InvalidValue(f"The {KINDS[group].name} {path.stem!r} is there already: rename the plug-in {path}.")
+
+
+def configured(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """Return the files that the pyproject.toml of a folder names, or of the nearest one above it.
+
+    Raises:
+        InvalidValue: if it cannot be read, or [tool.crossbody] says what it cannot say.
+    """
+    given = Path(folder).absolute()
+    places = (here / "pyproject.toml" for here in (given, *given.parents))
+    found = next(filter(os.path.isfile, places), None)
+    return () if found is None else tuple(found.parent / Path(name).expanduser() for name in _named_in(found))
+
+
+def _named_in(path: Path) -> list[str]:
+    try:
+        tool = tomllib.loads(path.read_text(encoding="utf-8")).get("tool", {})
+    except (OSError, ValueError) as error:  # TOML and UTF-8 that are none are a ValueError
+        raise InvalidValue(f"{path} cannot be read: {error}.") from None
+    table = tool.get("crossbody", {}) if isinstance(tool, dict) else {}
+    names = table.get("plugins", []) if isinstance(table, dict) and set(table) <= {"plugins"} else None
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InvalidValue(f'{path}: [tool.crossbody] is {shown(table)}; valid: plugins = ["FILE.py", ...] alone.')
+    return names
+
+
+def options() -> list[str]:
+    """Return the words of a command line that give this process's files to another."""
+    return [word for path in _FILES for word in ("--plugin", str(path))]
+
+
+def digests() -> dict[str, str]:
+    """Return what tells this process's files from others of their names, by their paths."""
+    return {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in _FILES}
+
+
+def shared(function: Callable[..., _Made]) -> Callable[..., _Made]:
+    """Return a function to be called in another process, which knows the files of this one there."""
+    return partial(_knowing, tuple(map(str, _FILES)), function) if _FILES else function
+
+
+def _knowing(files: Iterable[str], function: Callable[..., _Made], *given: Any) -> _Made:
+    use(files)
+    return function(*given)

@@ -16,7 +16,7 @@ def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
     """Import a file of a user's own.
 
     Args:
-        kind: what it holds, "case", "mechanism" or "controller".
+        kind: what it holds, for example "case", "plugin" or "controller".
         path: of the file.
         known: names that would be valid in its place.
 

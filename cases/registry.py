@@ -1,7 +1,7 @@
 """The folder is the registry: a module without a leading underscore is a plug-in.
 
 Names are read from the folder, modules are imported only when asked for. Other distributions add theirs by entry
-points (`crossbody.cases.installed`); of two of one name ours is taken.
+points, and users by files (`crossbody.cases.installed`); of two of one name ours is taken.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import importlib
 import pkgutil
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.machinery import PathFinder
@@ -61,8 +62,9 @@ class Registry:
         """Return the first line of a plug-in's docstring without importing it; of an installed one where it is from."""
         spec = PathFinder.find_spec(f"{self.package}.{name}", self._path())
         if spec is None or spec.origin is None:
-            module = self._installed().get(name)
-            return f"from {module}" if module else ""
+            module = self._installed().get(name, "")
+            told = getattr(sys.modules.get(module), "__doc__", None)
+            return told.partition("\n")[0] if told else f"from {module}" if module else ""
         text = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
         return text.partition("\n")[0]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import MappingProxyType
@@ -106,6 +106,8 @@ class Trajectory:
         counts: further counters of the solver (right-hand sides, rejections, ...).
         ledger: work of every row, if it was asked for.
         inputs: what acted on it, where a controller of the user's own gave some of it; None where the case says it.
+        sol: sol(t) gives q (..., nq) and v (..., nv) at instants t (...), s, between the samples too, and
+            sol(t, side="left") what they are before an event there; None where not asked for, by `dense=True`.
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 
@@ -126,6 +128,7 @@ class Trajectory:
     ledger: Ledger | None = None
     inputs: Inputs | None = None
     control_s: float = 0.0
+    sol: Callable[..., tuple[Floats, Floats]] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check every shape once and make every array read-only."""

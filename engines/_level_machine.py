@@ -136,11 +136,15 @@ class LevelMachine:
                 passed.append((i, mode, after[i], 0.0))
         return shared(self.rows, after), passed
 
+    def _known(self, q: Floats) -> float:
+        """Return to what gaps are known, as far as the tolerance of the positions tells."""
+        return self.rtol * float(np.abs(q).max())
+
     def _touching_too(self, q: Floats, h: Floats, hd: Floats, modes: Modes, fired: Fired) -> Fired:
         """The free rows that touch together with one that was located to."""
         if not any(modes[i] == FREE and which == GAP for i, which in fired):
             return frozenset()
-        closing = (np.abs(h) <= self.rtol * np.abs(q).max()) & (hd < -self.slow)
+        closing = (np.abs(h) <= self._known(q)) & (hd < -self.slow)
         return frozenset((i, GAP) for i in self.own if modes[i] == FREE and closing[i])
 
     def _iterate(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> tuple[Modes, list[Passed], bool]:
@@ -149,7 +153,7 @@ class LevelMachine:
         Then the set of the least motion, if it is consistent: many rows of one body, of which few can follow their law.
         """
         seen, passed, one_by_one = {modes}, list[Passed](), False
-        deep = max(DEEP, self.rtol * float(np.abs(q).max()))
+        deep = max(DEEP, self._known(q))
         while True:
             wanted = self._wanted(self._look(q, v, h, hd, modes), modes, deep)
             moved = [i for i in self.own if wanted[i] != modes[i]][: 1 if one_by_one else None]

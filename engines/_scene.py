@@ -16,7 +16,7 @@ import numpy as np
 from crossbody.cases import CaseUnsupported
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import turned
-from crossbody.cases.scene import WIDTHS, Actuator, Joint, Scene, Tendon, Vector
+from crossbody.cases.scene import WIDTHS, Actuator, Joint, Scene, Vector
 
 
 def polynomial(constants: Any, x: Any) -> Any:
@@ -322,25 +322,18 @@ class Rows:
         self.scene, self.forces = scene, forces
         self.ends = [(self._end(loop.type, loop.first), self._end(loop.type, loop.second)) for loop in scene.loops]
         self.curves = [derivatives(loop.polynomial) for loop in scene.loops]
-        self._bound()
+        self._straighten()
 
-    def _bound(self) -> None:
-        """Lay out the bounds: their gaps are straight x + offset, and of a ball joint its angle with a sign more."""
-        straight, offset = list[Floats](), list[float]()
-        self.balls: list[tuple[int, Joint, float]] = []
-        unit, forces = np.eye(self.forces.nv), self.forces
-        rows: list[tuple[Joint | Tendon, Floats]] = []
-        rows += [(joint, unit[forces.place[joint.name]]) for joint in self.scene.joints]
-        rows += [(tendon, row) for tendon, row in zip(self.scene.tendons, forces.T, strict=True) if tendon.joints]
-        for part, row in rows:
-            for sign, bound in zip((1.0, -1.0), part.range, strict=True):
-                if np.isfinite(bound):
-                    straight.append(sign * row)
-                    if isinstance(part, Joint) and part.type == "ball":
-                        self.balls.append((len(offset), part, sign))
-                        straight[-1] = np.zeros(len(row))
-                    offset.append(-sign * bound - part.margin)
-        self.straight, self.offset = np.array(straight).reshape(-1, forces.nv), np.array(offset)
+    def _straighten(self) -> None:
+        """Take the bounds, less those between points: gaps are straight x + offset, of a ball joint its angle's."""
+        forces, turning = self.forces, dict(self.forces.balls)
+        spanning = np.array(forces.spanning, dtype=int) + len(self.scene.joints)
+        taken = ~np.isin(forces.bound_of, spanning)
+        along = np.concatenate([np.eye(forces.nv)[forces.firsts], forces.T])
+        along[list(turning)] = 0.0
+        of, sign = forces.bound_of[taken], forces.bound_sign[taken]
+        self.straight, self.offset = sign[:, None] * along[of], forces.bound_at[taken]
+        self.balls = [(row, self.scene.joints[i], float(sign[row])) for row, i in enumerate(of) if i in turning]
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""

@@ -12,7 +12,7 @@ from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Shape
-from crossbody.engines import _settings
+from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, line
 from crossbody.engines._peer import HIDDEN, PeerRun, why_not
 from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped

@@ -42,8 +42,12 @@ def known(case: Case) -> bool:
     return case.scene is not None or builder(case.mechanism) is not None
 
 
-def system_of(case: Case) -> System:
+def system_of(case: Case, traced: bool | None = None) -> System:
     """The mechanism with the law of its rows: kernels of its own, where there are some, or those of every scene.
+
+    Args:
+        case: whose.
+        traced: of a scene: whether code is compiled for it alone; None takes it where it was compiled before.
 
     Raises:
         CaseUnsupported: if the reference has no equations of it.
@@ -55,4 +59,4 @@ def system_of(case: Case) -> System:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")
     from crossbody.reference.tree.system import system
 
-    return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank)
+    return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank, traced)

@@ -16,7 +16,8 @@ from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.engines import _scale, _settings
+from crossbody.engines import _scale
+from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
 from crossbody.engines.contract import Engine

@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, SceneError, Trajectory
 from crossbody.cases.arrays import is_number
-from crossbody.engines import _settings
+from crossbody.engines import settings as _settings
 from crossbody.engines._reference_audit import audit, listed
 from crossbody.engines._rolling import determined
 from crossbody.engines.contract import Engine, Run
@@ -28,6 +28,9 @@ _ROBOT = (
 )
 UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
 """(mechanism, solver) -> why it is not run."""
+KEPT = "kept"
+TRACED = {KEPT: None, "yes": True, "no": False}
+"""Which code of a scene's sweeps is taken: that which was compiled for this model before; or now, if need be; none."""
 SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
@@ -54,12 +57,12 @@ class ReferenceRun(Run):
     def motion(self) -> Trajectory:
         """Integrate from the start, whatever shapes meet that have no rows."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
-        return trajectory if self.case.scene is None else determined(self.case.scene, trajectory)
+        return trajectory if self.case.scene is None or not self.case.general else determined(self.case.scene, trajectory)
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""
         own = audit(self.system, self.case.q0, self.case.v0)
-        if self.case.scene is not None:
+        if self.case.general and self.case.scene is not None:
             return own | listed(self.case.scene)
         told = getattr(module(self.case.mechanism), "listed", None)
         return own | (told(self.system.p) if told else {})
@@ -116,7 +119,8 @@ class Reference(Engine):
             case: the scene.
             profile: one of `profiles`.
             settings: rtol, atol, ledger, samples, fsm, max_steps, time_limit; shortcuts and implicit of `compiled`,
-                index of `ida`. `samples` is a number of equidistant rows, or their times.
+                and of a scene in it traced, "kept", "yes" or "no"; index of `ida`. `samples` is a number of equidistant
+                rows, or their times.
 
         Raises:
             UnknownName: for a profile or setting that does not exist.
@@ -130,9 +134,9 @@ class Reference(Engine):
         solver = _settings.profile_of(self.name, self.profiles, profile)
         times = {k: v for k, v in settings.items() if k == "samples" and not (v is None or is_number(v))}
         numbers = {k: v for k, v in settings.items() if k not in times}
-        used = _settings.chosen(self.name, solver, _known(solver), numbers)
-        options = _options(case, solver, {**used, **times})
-        system = system_of(case)
+        used = _settings.chosen(self.name, solver, _known(case, solver), numbers)
+        options = _options(case, solver, {k: v for k, v in {**used, **times}.items() if k != "traced"})
+        system = system_of(case, TRACED[str(used.get("traced", KEPT))])
         check = getattr(module(case.mechanism), "check_start", None)
         if check is not None:
             check(case.parameters, case.q0, case.v0)
@@ -144,7 +148,7 @@ class Reference(Engine):
         return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
 
 
-def _known(solver: str) -> dict[str, Parameter]:
+def _known(case: Case, solver: str) -> dict[str, Parameter]:
     low, high = TOLERANCES
     known = {
         "rtol": Parameter(default=1e-9, doc="relative tolerance", low=low, high=high),
@@ -158,6 +162,8 @@ def _known(solver: str) -> dict[str, Parameter]:
     if solver == "compiled":
         known["shortcuts"] = Parameter(default=True, doc="closed-form arcs where the scene is affine", low=0, high=1)
         known["implicit"] = Parameter(default=True, doc="the implicit method where the law is stiff", low=0, high=1)
+    if solver == "compiled" and case.general:
+        known["traced"] = Parameter(default=KEPT, doc="code compiled for this model alone", choices=tuple(TRACED))
     if solver == "ida":
         known["index"] = Parameter(default=1, doc="1, or 3 for bilateral rows", low=1, high=3)
     return known

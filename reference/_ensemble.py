@@ -76,7 +76,7 @@ def ensemble(
         parameters: name -> (N,) values of the system's named parameters.
         law: a0, a1, a2, b0, b1, b2 -> (N,) or (N, nc).
         threads: at most the processors at hand, which is the default.
-        options: as in `Options`, without samples and events: nothing is recorded on the way.
+        options: as in `Options`, without samples, events and dense: nothing is recorded on the way.
 
     Raises:
         SceneError: for an array of another shape, if a kernel is wrong at the first start (`System.check`), or if a
@@ -86,7 +86,7 @@ def ensemble(
     """
     if isinstance(system.control, Control):
         raise SceneError("ensemble: the system has a controller in Python, one for every run; run them by `simulate`.")
-    for name in {"samples", "events"} & options.keys():
+    for name in {"samples", "events", "dense"} & options.keys():
         raise InvalidValue(f"ensemble: {name} is given; nothing is recorded on the way (`simulate` does, of one run).")
     settings = replace(checked(t_end, options), samples=(), events=False)
     job = _Job(system, q0, v0, parameters or {}, law or {})

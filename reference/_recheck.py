@@ -197,7 +197,7 @@ class _Recheck:
             found = share(e, run.t[first], q, v, contact, always, ())
             if found is not None and not found.lifted:
                 e.activate(modes, {*e.active}.difference(found.basis))
-                e.spread = found.spread
+                e.beside = found.beside
         guards = [self._terms(i, Mode(modes[i])) for i in self.rows]
         self.looks.begin(guards, self.frozen)
         y = np.hstack([run.q, run.v])
@@ -245,7 +245,7 @@ class _Recheck:
         """What the tolerance leaves open in a multiplier, N: as rounding does, but by errors of the motion."""
         e, run = self.equations, self.run
         active = e.active
-        if e.spread is not None:  # rows that share a load share their noise
+        if e.beside is not None:  # rows that share a load share their noise
             most = float(e.noise(run.t[row], run.q[row].copy(), run.v[row].copy())[0].max())
             return UNDECIDED * self.rtol / (8.0 * ULP) * most
         modes = [*run.mode[row].tolist()]

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.cases.control import Control, NotFinite
+from crossbody.reference import _dense
 from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
+from crossbody.reference._dense import Marks, Motion
 from crossbody.reference._interrupt import LONG_S, Interrupts
 from crossbody.reference._program import entry, program
 from crossbody.reference._redundant import watched
@@ -89,7 +91,9 @@ class CompiledRun:
         self._bytes, self._blank = (array.view(np.uint8) for array in (self.state, self.template))
         self._modes = initial_modes(system)
         self.callback: Any = None
-        self.call: Callable[..., int] = partial(program(), *system.kernels.values())
+        self.marks: Marks | None = None
+        kernels = tuple(system.kernels.values())  # step by step 0.5 ms would be lost at each call
+        self.call: Callable[..., int] = entry(kernels) if options.dense else partial(program(), *kernels)
 
     def _state_template(self, natural: bool) -> Any:
         system, options = self.system, self.options
@@ -139,6 +143,7 @@ class CompiledRun:
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
         self._begin_control()
+        self.marks = Marks(self, _dense.ROOM) if self.options.dense else None
         began = time.perf_counter()
         self.start()
         outcome = self._slices(began, progress)
@@ -176,7 +181,8 @@ class CompiledRun:
             steps, before = int(self.state["steps"][0]), time.perf_counter()
             if steps >= limit:
                 return Outcome.STEP_LIMIT
-            code = self.slice(min(budget, limit - steps))
+            some = budget if self.marks is None else min(budget, self.marks.put())
+            code = self.slice(min(some, limit - steps))
             if code == layout.DONE:
                 return Outcome.FINISHED
             if code < 0:
@@ -188,7 +194,7 @@ class CompiledRun:
                 return Outcome.TIME_LIMIT
             if now - before > LONG_S and self.callback is None:  # a controller in Python may hang
                 interrupts.hold()
-            if code == layout.MORE:
+            if code == layout.MORE and self.marks is None:
                 budget = max(1, int(budget * min(4.0, SLICE_S / (now - before))))
             if progress is not None:
                 progress(float(self.state["t"][0]) / self.options.t_end)
@@ -259,6 +265,11 @@ class CompiledRun:
             controller = self.callback.controller
             given = controller.given(self.buffers["inputs_t"], self.buffers["inputs_u"])
             run = replace(run, inputs=given, control_s=controller.seconds)
+        if self.marks is not None:
+            self.marks.put()
+            q0, v0 = np.split(self.start_state, [nq])
+            player = CompiledRun(self.system, q0, v0, self.options)
+            run = replace(run, sol=Motion(self.marks, player, self.start_state))
         return watched(self.system, run)
 
     def _event_list(self) -> tuple[Event, ...]:

@@ -179,7 +179,7 @@ class _Overloads:
     def key(self, content: str, sig: Any) -> str:
         """Return the name of a file: readable, then a digest of all that the code depends on."""
         function, options = self._dispatcher.py_func, sorted(self._dispatcher.targetoptions.items())
-        what = (str(function.__module__), function.__qualname__, content, str(sig), repr(options), *_machine())
+        what = (str(function.__module__), function.__qualname__, content, str(sig), repr(options), *machine())
         digest = hashlib.sha256("\0".join(what).encode("utf-8", "surrogatepass")).hexdigest()[:32]
         return f"{re.sub(r'[^A-Za-z0-9_.-]', '', function.__name__)[:40]}-{digest}"
 
@@ -212,8 +212,8 @@ class _Overloads:
 
 
 @cache
-def _machine() -> tuple[str, ...]:
-    """What the code depends on beside the function: versions, processor, settings of numba."""
+def machine() -> tuple[str, ...]:
+    """Return what compiled code depends on beside its source: versions, processor, settings of numba."""
     target = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
     settings = [f"{name}={getattr(numba_config, name, None)}" for name in _SETTINGS]
     return (numba.__version__, llvmlite.__version__, platform.python_version(), str(target), *settings)

@@ -34,6 +34,7 @@ class Chosen(TypedDict, total=False):
     collisions: str
     solver: str
     samples: ArrayLike | None
+    dense: bool
     inputs: tuple[ArrayLike, ArrayLike] | None
     consistent: bool
     ledger: bool
@@ -59,6 +60,10 @@ class Options:
             "resolved" in real time (spec 1.2). Rows with one set of constants are always resolved.
         solver: "compiled", "ida" or "cvode".
         samples: times of the rows; None for every step and both sides of every event.
+        dense: give the motion `sol`, q and v at any instant of it by the integrator's own dense output. The run keeps
+            what it needs to go on from the ends of its steps, 64 MB of it at most (beyond that of every second step, of
+            every fourth, ..., which are taken again when they are asked for; where a controller in Python gives
+            inputs, of every step).
         inputs: (times, values) held from each time on; None for zero.
         consistent: the start stands on the rows that are always on, h = 0 and H v = 0, up to 1000 times the tolerance
             and rounding; one that does not is refused, and the nearest that does is offered (`System.project`). False
@@ -81,6 +86,7 @@ class Options:
     collisions: str = "sequential"
     solver: str = "compiled"
     samples: ArrayLike | None = None
+    dense: bool = False
     inputs: tuple[ArrayLike, ArrayLike] | None = None
     consistent: bool = True
     ledger: bool = False
@@ -111,10 +117,12 @@ class Options:
         if math.isfinite(self.max_steps) and self.max_steps != int(self.max_steps):
             raise InvalidValue(f"max_steps is {self.max_steps!r}; it must be a whole number, or infinite.")
         within("time_limit", self.time_limit, 0.0, math.inf, open_low=True, infinite=True)
-        for name in ("consistent", "ledger", "events", "shortcuts", "implicit"):
+        for name in ("consistent", "ledger", "events", "shortcuts", "implicit", "dense"):
             object.__setattr__(self, name, flag(name, getattr(self, name)))
         for name in ("t_end", "rtol", "max_step", "time_limit"):
             object.__setattr__(self, name, float(getattr(self, name)))
+        if self.dense and self.solver != "compiled":
+            raise InvalidValue(f"dense is True with solver {self.solver!r}; valid: with 'compiled', or samples.")
         if (
             not isinstance(self.index, (int, np.integer))
             or self.index not in (1, 3)

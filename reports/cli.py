@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 
 import click
 
-from crossbody.cases import CrossbodyError
+from crossbody.cases import CrossbodyError, installed
 from crossbody.reports.replay.cli import identify, memory_option, replay
 from crossbody.reports.runs.watch import stopping
 from crossbody.reports.voice import as_json, quiet, speaks
@@ -32,7 +32,30 @@ _Work = TypeVar("_Work", bound=Callable[..., int])
 DEFAULT_OUT = Path("out")
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+def _plug(context: click.Context, _: click.Parameter, given: tuple[str, ...]) -> None:
+    if not context.resilient_parsing:
+        with suppress(FileNotFoundError):  # the folder one works in may be gone
+            installed.use(installed.configured(Path.cwd()))
+        installed.use(given)
+
+
+class _Commands(click.Group):
+    """Commands that all take --plugin, and the plug-ins that the configuration names."""
+
+    group_class = type
+
+    def add_command(self, cmd: click.Command, name: str | None = None) -> None:
+        """Add a command, or a group of such."""
+        text = "Engine, metric, log format, case, ... in a file of your own; repeatable, as [tool.crossbody] plugins."
+        option = click.Option(
+            ["--plugin"], metavar="FILE", multiple=True, is_eager=True, expose_value=False, callback=_plug, help=text
+        )
+        if not isinstance(cmd, click.Group):
+            cmd.params.append(option)
+        super().add_command(cmd, name)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(package_name="crossbody")
 def cli() -> None:
     """Cross-check a reference model of contact and constrained dynamics against rigid-body engines."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from crossbody import engines
-from crossbody.cases import Case, InvalidValue
+from crossbody.cases import Case, InvalidValue, installed
 from crossbody.cases.files.reading import SUFFIXES
 from crossbody.engines.equations import known, system_of
 from crossbody.reports import voice
@@ -97,7 +97,7 @@ def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any
     paths = [*(name for name in names if name.endswith(OF_USERS)), *_acting(cases)]
     own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in paths]
     scenes = [[case.label, dict(case.parameters)] for case in cases]
-    return {"kind": kind, "code": code(), "cases": scenes, "files": own, **more}
+    return {"kind": kind, "code": code(), "cases": scenes, "files": own, "plugins": installed.digests(), **more}
 
 
 def _acting(cases: Sequence[Case]) -> list[str]:
@@ -157,7 +157,8 @@ def repeat(
     words = ["crossbody", "run", source, "--variant", case.variant]
     words += [word for pair in pairs for word in ("--set", pair)]
     words += [word for pair in settings for word in ("--setting", pair)]
-    return shlex.join(words + (["--rtol", f"{rtol:g}"] if rtol is not None else []))
+    words += ["--rtol", f"{rtol:g}"] if rtol is not None else []
+    return shlex.join(words + installed.options())
 
 
 def show(rows: pd.DataFrame, out: Path) -> None:

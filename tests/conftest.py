@@ -3,7 +3,22 @@
 from __future__ import annotations
 
 import signal
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from crossbody.cases import installed
 
 # Interrupts are tested by sending them. A shell without job control starts what it puts in the background with SIGINT
 # ignored, and children inherit that; a handler is not inherited.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def own_plugins() -> Iterator[None]:
+    """Let a test have plug-ins that the others do not see."""
+    yield
+    for module in installed._FILES.values():
+        sys.modules.pop(module.__name__, None)
+    installed._FILES.clear()

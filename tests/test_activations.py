@@ -13,7 +13,8 @@ from published import moves_as_in_mujoco
 
 from crossbody import cases, engines
 from crossbody.cases import Control, Outcome, SceneError
-from crossbody.cases.files.mjcf import model_of, scene_of
+from crossbody.cases.files.mjcf import scene_of
+from crossbody.cases.files.reading import model_of
 from crossbody.cases.scene import Actuator
 from crossbody.engines.mujoco._build import compiled as build
 from crossbody.engines.mujoco._build import spec_of

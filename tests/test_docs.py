@@ -1,8 +1,7 @@
 """Every code block of the documentation runs, page by page, in the order in which it stands there.
 
-Python and bash blocks run; a block with a title is a file and is written, one under `engines/`, `reports/metrics/` or
-`hw/formats/` into a folder that is added to that registry. In bash, `crossbody` and `pytest` lines run, each with the
-exit code that its comment names, 0 if none.
+Python and bash blocks run outside the repository; a block with a title is a file and is written. In bash, `crossbody`
+and `pytest` lines run, each with the exit code that its comment names, 0 if none.
 """
 
 from __future__ import annotations
@@ -11,9 +10,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +21,6 @@ from crossbody.reports.cli import cli, main
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-REGISTRIES = {
-    "engines": "crossbody.engines",
-    "reports/metrics": "crossbody.reports.metrics",
-    "hw/formats": "crossbody.hw.formats",
-}
 COMMENT = re.compile(r"#\s*exit code (\d)(?:: (.*))?$")
 
 
@@ -58,25 +50,9 @@ def test_every_command_is_in_the_reference() -> None:
     assert named == set(cli.commands)
 
 
-@pytest.fixture
-def registered(tmp_path: Path) -> Iterator[None]:
-    """Folders of the page's own plug-ins beside those of the project."""
-    packages = {folder: import_module(name) for folder, name in REGISTRIES.items()}
-    known = set(sys.modules)
-    for folder, package in packages.items():
-        (tmp_path / folder).mkdir(parents=True)
-        package.__path__.append(str(tmp_path / folder))
-    yield
-    for folder, package in packages.items():
-        package.__path__.remove(str(tmp_path / folder))
-    for name in set(sys.modules) - known:
-        if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
-            del sys.modules[name]
-
-
 @pytest.mark.parametrize("page", RUN)
 def test_every_block_runs(
-    page: str, registered: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    page: str, own_plugins: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if any("cache clear" in block.text for block in blocks(page)):  # not that of all other tests
         monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path / "cache"))

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from joblib.externals.loky import get_reusable_executor
 from rig_data import run_as_log
 
 from crossbody import cases, hw
@@ -28,6 +29,13 @@ from crossbody.reports import cli
 from crossbody.reports.replay.kept import keeper
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.parts import Parts
+
+
+@pytest.fixture(autouse=True, scope="module")
+def alone() -> None:
+    """End the workers that tests before have left: what is forked here would take them for its own and wait."""
+    get_reusable_executor(max_workers=1).shutdown(wait=True, kill_workers=True)
+
 
 STUCK = Path(__file__).parent / "stuck_engine.py"
 SECOND = 1.0

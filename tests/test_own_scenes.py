@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from crossbody import cases, engines
 from crossbody.cases import Case, InvalidValue, SceneError
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import suites
 from crossbody.reports.cli import cli
 from crossbody.reports.suites._axis import Levels, Linear
@@ -92,3 +93,17 @@ def test_the_command_runs_it(path: str, tmp_path: Path) -> None:
     assert told.exit_code == 0, told.output
     told = CliRunner().invoke(cli, ["analyse", path])
     assert told.exit_code == 0, told.output
+
+
+def bounded(law: RowLaw) -> Scene:
+    cart = Body(name="cart", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    rail = Joint(name="x", body="cart", type="slide", axis=(1.0, 0.0, 0.0), range=(-1.0, 1.0), law=law)
+    return Scene(bodies=(cart,), joints=(rail,))
+
+
+def test_constants_that_nobody_would_follow_are_refused() -> None:
+    with pytest.raises(SceneError, match="b0, b1 must be 0"):
+        cases.from_scene(bounded(RowLaw(a0=1e4, a1=1.0, b0=1e6)))
+    cubic = cases.from_scene(bounded(RowLaw(a0=1e4, a1=1.0, a2=1e3)))
+    assert "a2 must be 0" in str(engines.load("mujoco").why_not(cubic, "matched"))
+    assert engines.load("pinocchio").why_not(cubic, "law") is None

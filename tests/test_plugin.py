@@ -234,3 +234,21 @@ def test_plug_ins_of_another_distribution_are_found_by_their_entry_points(
     monkeypatch.setenv("PYTHONPATH", str(pytester.path))
     done = run(pytester, "--crossbody-case", "their_case:right", *REFERENCE, "-k", "position or named")
     done.assert_outcomes(passed=2, deselected=10)
+
+
+@pytest.mark.parametrize("by", ["option", "configuration"])
+def test_plug_ins_are_files_too(pytester: pytest.Pytester, by: str) -> None:
+    pytester.makepyfile(their_case=OWN.read_text(), their_engine=ENGINE, their_metric=METRIC)
+    files = ["their_case.py", "their_engine.py", "their_metric.py"]
+    words = [word for file in files for word in ("--crossbody-plugin", file)] if by == "option" else []
+    if not words:
+        pytester.makepyprojecttoml(f"[tool.crossbody]\nplugins = {files}\n[tool.pytest.ini_options]\n")
+    named = ("--crossbody-case", "their_case:right", "--crossbody-engine", "their_engine:compiled")
+    done = run(pytester, *words, *named, "-k", "position or finished")
+    done.assert_outcomes(passed=2, deselected=9)
+
+
+def test_a_plug_in_that_is_not_there_is_wrong_use(pytester: pytest.Pytester) -> None:
+    done = run(pytester, "--crossbody-plugin", "absent.py")
+    done.stderr.fnmatch_lines(["ERROR: There is no plug-in file *absent.py."])
+    assert done.ret == pytest.ExitCode.USAGE_ERROR

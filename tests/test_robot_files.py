@@ -677,6 +677,20 @@ def test_a_file_that_is_not_there_is_told() -> None:
         cases.load("none.xml")
 
 
+def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = cases.from_file(write(tmp_path), "raised")
+    monkeypatch.setattr(jobs, "DEAR_S", 0.0)
+    wanted = [next(iter(jobs.picks([name]))) for name in ("pinocchio", "pinocchio:law")]
+    every, asked = jobs.run_case(case, wanted).entries
+    assert every.run is None
+    assert "Too dear: it would take about" in every.skipped
+    assert "-e pinocchio:law" in every.skipped
+    assert asked.run is not None
+    assert asked.run.outcome is Outcome.FINISHED
+
+
 def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path) -> None:
     """`default` is that of shipped cases, and each sentence names the other."""
     engine, case, shipped = engines.load("mujoco"), cases.load(write(tmp_path), "raised"), cases.load("bouncing_ball")

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Mode, Outcome
+from crossbody.cases import Case, Mode, Outcome, Tier
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
+from crossbody.reports import metrics
+from crossbody.reports.judging.truth import from_run
 
 
 def squatting(seed: int) -> tuple[Case, int]:
@@ -81,3 +83,6 @@ def test_every_solver_keeps_it(engine: str, profile: str, seed: int) -> None:
     assert uneven(run, legs) <= 1e-6
     assert run.lam.min() >= -1e-6 * run.lam.max(), "no foot pulls"
     assert np.abs(run.q[-1] - exact.q[-1]).max() <= 1e-6
+    off = metrics.load("law_residual").measure(from_run(exact, Tier.D, "compiled"), run, case)
+    assert off is not None
+    assert off <= 1e-8, "how rows depend on each other turns with the legs, and with it how they share a load"

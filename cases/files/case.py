@@ -18,7 +18,7 @@ from crossbody.cases.control import Control
 from crossbody.cases.errors import SceneError, UnknownName
 from crossbody.cases.files.assemble import assembled
 from crossbody.cases.files.controls import pushed, read_control, read_controls, under
-from crossbody.cases.files.reading import findings_of, model_of, scene_of
+from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
@@ -69,7 +69,7 @@ class FileCase:
         index = list(self.VARIANTS).index(variant) if self.model.nkey else -1
         q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
-        model = model_of(self.path, str(p["without"]))
+        model, told = read(self.path, str(p["without"]))
         if p["assemble"]:
             q0, v0 = assembled(model, q0, v0)
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
@@ -79,8 +79,7 @@ class FileCase:
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
             scene, name=self.path.name, variant=variant, q0=q0, v0=v0, act0=act0, rank=int(p["rank"]),
-            t_end=float(p["t_end"]),
-            findings=findings_of(self.path, str(p["without"])),
+            t_end=float(p["t_end"]), findings=(*told, *findings_of(self.path)),
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
         return under(case, read_control(str(p["control"]), float(p["tick"]))) if p["control"] else case
@@ -169,6 +168,12 @@ def case_of(
     if rank >= 0 and not scene.loops:
         raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
+    names, laws, _ = rows_of(scene)
+    fast = [name for name, one in zip(names, laws, strict=True) if one.b0 or one.b1]
+    if fast:
+        raise SceneError(
+            f"Row {fast[0]!r} has constants of COLLISION, which no row of a scene follows: b0, b1 must be 0."
+        )
     return Case(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),

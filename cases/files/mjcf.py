@@ -40,18 +40,15 @@ WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
 JOINT_WRAP, SITE_WRAP = 1, 3
 
 
-def model_of(path: Path, without: str = "") -> mujoco.MjModel:
+def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     """Return MuJoCo's model of a file as it stands but for what has to be left out before it is compiled.
+
+    With it what MuJoCo warns of, and which meshes are not there.
 
     Raises:
         SceneError: with MuJoCo's own sentence.
         InvalidValue: for a pair of bodies that the file does not have.
     """
-    return _compiled(path, without)[0]
-
-
-def _compiled(path: Path, without: str) -> tuple[mujoco.MjModel, list[str]]:
-    """Return the model, and what is told of it: what MuJoCo warns of, and meshes that are left out."""
     import mujoco
 
     told: list[str] = []
@@ -74,11 +71,6 @@ def _compiled(path: Path, without: str) -> tuple[mujoco.MjModel, list[str]]:
 
     model, warned = compiled(path, compiler)
     return model, [*sentences(warned), *told]
-
-
-def findings(path: Path, without: str = "") -> list[str]:
-    """Return what MuJoCo warns of, and which meshes are not there."""
-    return _compiled(path, without)[1]
 
 
 def scene_of(model: mujoco.MjModel) -> Scene:

@@ -24,16 +24,23 @@ def is_urdf(path: Path) -> bool:
         return path.suffix == ".urdf" or b"<robot" in file.read(HEAD)
 
 
-def model_of(path: Path, without: str = "") -> mujoco.MjModel:
+def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     """Return the compiled model whose tree, shapes and filters are the file's; inertias of a URDF are placeholders.
+
+    With it sentences on what the compiler found strange.
 
     Raises:
         SceneError: with the compiler's own sentence.
         InvalidValue: for a word in `without` that names nothing.
     """
-    model = (urdf if is_urdf(path) else mjcf).model_of(path, without)
+    model, told = (urdf if is_urdf(path) else mjcf).read(path, without)
     strip(model, without)
-    return model
+    return model, told
+
+
+def model_of(path: Path, without: str = "") -> mujoco.MjModel:
+    """Return the model that `read` does."""
+    return read(path, without)[0]
 
 
 def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
@@ -46,6 +53,6 @@ def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
     return urdf.with_inertias(path, scene) if is_urdf(path) else scene
 
 
-def findings_of(path: Path, without: str = "") -> tuple[str, ...]:
-    """Return sentences on what is strange in a file but taken as it stands."""
-    return tuple((urdf if is_urdf(path) else mjcf).findings(path, without))
+def findings_of(path: Path) -> list[str]:
+    """Return sentences on what its compiler does not see to be strange in a file, but is taken as it stands."""
+    return urdf.findings(path) if is_urdf(path) else []

@@ -42,18 +42,15 @@ def parsed(path: Path) -> ElementTree.Element:
     return root
 
 
-def model_of(path: Path, without: str = "") -> mujoco.MjModel:
+def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     """Return MuJoCo's model of the tree, with a placeholder for every inertia and without what is only drawn.
+
+    With it what MuJoCo warns of, which else goes to the terminal at every reading.
 
     Raises:
         SceneError: with MuJoCo's own sentence, or for a mesh that cannot be read.
         InvalidValue: for a pair of bodies that the file does not have.
     """
-    return _compiled(path, without)[0]
-
-
-def _compiled(path: Path, without: str) -> tuple[mujoco.MjModel, list[str]]:
-    """Return the model, and what MuJoCo warned of, which else goes to the terminal at every reading."""
     import mujoco
 
     root = parsed(path)
@@ -77,7 +74,8 @@ def _compiled(path: Path, without: str) -> tuple[mujoco.MjModel, list[str]]:
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         return apart(spec, without)
 
-    return compiled(path, compiler)
+    model, warned = compiled(path, compiler)
+    return model, sentences(warned)
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:
@@ -91,9 +89,9 @@ def with_inertias(path: Path, scene: Scene) -> Scene:
     return scene.replace(bodies=bodies, loops=(*scene.loops, *loops))
 
 
-def findings(path: Path, without: str = "") -> list[str]:
-    """Return what MuJoCo warns of, and a sentence for every link whose inertia no rigid body can have."""
-    told = sentences(_compiled(path, without)[1])
+def findings(path: Path) -> list[str]:
+    """Return a sentence for every link whose inertia no rigid body can have."""
+    told = []
     for link in parsed(path).findall("link"):
         if link.find("inertial") is None:
             continue

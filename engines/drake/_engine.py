@@ -11,7 +11,7 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.engines import _settings
+from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
 from crossbody.engines.contract import Engine, Run

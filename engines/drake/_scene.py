@@ -53,9 +53,9 @@ def why_not(scene: Scene) -> str | None:
 class Applied(LeafSystem):  # type: ignore[misc]
     """What acts on the bodies beside their weight, at the plant's force input."""
 
-    def __init__(self, scene: Scene, tree: Tree) -> None:
+    def __init__(self, scene: Scene, tree: Tree, forces: Forces) -> None:
         super().__init__()
-        self.tree, self.forces = tree, Forces(scene)
+        self.tree, self.forces = tree, forces
         self.context = tree.plant.CreateDefaultContext()
         own = {body.name: body for body in scene.bodies}
         gravity = np.array(scene.gravity)
@@ -88,16 +88,17 @@ class Applied(LeafSystem):  # type: ignore[misc]
     def spans(self, q: Floats, v: Floats) -> Stretch:
         """Return lengths, rates and derivatives of the tendons between points, in the scene's coordinates."""
         self.tree.put(self.context, q, v)
-        found = [self._span(tendon, q) for tendon in self.strings]
-        rows = np.array([row for _, row in found])
+        found = [self._span(tendon) for tendon in self.strings]
+        rows = np.array([row for _, row in found]) @ self.tree.J(q).T
         return np.array([length for length, _ in found]), rows @ v, rows
 
-    def _span(self, tendon: Tendon, q: Floats) -> tuple[float, Floats]:
+    def _span(self, tendon: Tendon) -> tuple[float, Floats]:
+        """Return the length, and its derivative (n,) along Drake's velocities."""
         (one, H), (two, G) = (
             self.tree.point(self.context, *end) for end in zip(tendon.bodies, tendon.positions, strict=True)
         )
         length = float(np.linalg.norm(one - two))
-        return length, self.tree.J(q) @ ((H - G).T @ (one - two) / length)
+        return length, (H - G).T @ (one - two) / length
 
 
 class Observer:
@@ -158,8 +159,9 @@ class SceneRun(Run):
         if scene is None:
             raise CaseUnsupported(f"{self.case.label} is not a scene.")
         dt = float(self.settings.get("dt", 0.0))
-        tree = Tree(scene, Forces(scene).armature, dt)
-        self.applied, self.acting = Applied(scene, tree), Acting(self.case)
+        forces = Forces(scene)
+        tree = Tree(scene, forces.armature, dt)
+        self.applied, self.acting = Applied(scene, tree, forces), Acting(self.case)
         self.observer = Observer(scene, self.applied)
         builder = DiagramBuilder()
         plant, applied = builder.AddSystem(tree.plant), builder.AddSystem(self.applied)

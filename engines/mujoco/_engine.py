@@ -14,7 +14,7 @@ import mujoco
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory
 from crossbody.cases.files.warned import captured
 from crossbody.cases.registry import Registry
-from crossbody.engines import _settings
+from crossbody.engines import settings as _settings
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.mujoco._globals import hooked

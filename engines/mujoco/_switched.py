@@ -39,6 +39,7 @@ class Switched(Rows):
         part: of every row that may open the array of margins and its place there.
         surface (nc,): margin at which its law has it at zero, m or rad.
         wanted (nc,): reference acceleration by the law, m/s^2 or rad/s^2.
+        converged: where Newton's method may end while no row that opens is there; with one it goes on while it can.
         last (nc,): multipliers at the end of the last step. J v' = a - R f, where MuJoCo keeps a softness R; with
             a + R f of the last step in the place of a, what is left of it is R times the change of f in a step.
     """
@@ -49,6 +50,7 @@ class Switched(Rows):
         self.part = [(margins[kind], i) for kind, i, _ in self.places]
         self.part += [(model.pair_margin, i) for i in self.pair_ids()]
         self.surface, self.wanted, self.last = np.zeros((3, self.nc))
+        self.converged = float(model.opt.tolerance)
         self.surface[self.always :] = [margin[i] for margin, i in self.part]
         self.arm((FREE,) * self.nc)
 
@@ -135,11 +137,12 @@ class Switched(Rows):
 
         curved = self.cubic[: self.always]
 
-        def hook(_model: Any, data: Any) -> None:
+        def hook(model: Any, data: Any) -> None:
             if curved.any():
                 data.efc_aref[: self.always] -= curved * data.efc_pos[: self.always] ** 3
                 data.efc_aref[: self.always] += data.efc_R[: self.always] * self.last[: self.always]
             present = list(self.present())
+            model.opt.tolerance = 0.0 if present else self.converged
             if not present:
                 return
             at, rows = np.array(present).T

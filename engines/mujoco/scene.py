@@ -11,6 +11,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.linalg import eig, null_space
 
 from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases.arrays import Floats
@@ -34,12 +35,20 @@ from crossbody.engines.mujoco._switched import Switched
 SLOWEST, OF_RATE, OF_ROWS = 1e-3, 0.02, 0.05
 """Largest step of the matched profile, s, and the parts that it is of the fastest time constant of forces and of that
 of rows that open: Runge-Kutta 4 leaves (1/50)^4 a time constant, and rows act for a few of theirs."""
+STABLE, DECAYS = 0.5, 0.5
+"""Largest product of the step and any rate, where Runge-Kutta 4 is stable up to 2.8 and rates change as bodies turn;
+and part of a rate by which a mode may swing at most that only decays."""
+CONVERGED = 1e-28
+"""Improvement at which Newton's method ends where no row may let go: its costs are quadratic then, it is there after
+two or three iterations, and without an end it takes a hundred. Where rows may, rounding that is left over lets them."""
 STIFF = 1e3
 """Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
 method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
 1e-3, 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`). Loops in space bear many times what moves, and want 1e-7."""
 SOLVES = 4
 """Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
+DEPENDENT = 1e-6
+"""Singular value of the loops' rows, over the largest, below which one depends on the others."""
 SOFT = "The file's rows are soft: their law varies with depth."
 HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
@@ -106,12 +115,32 @@ def _deepest(case: Case) -> Floats:
 
 
 def fastest(scene: Scene, q: Floats, v: Floats) -> float:
-    """Return the largest rate, 1/s, with which springs, dampers and actuators move the bodies from a state."""
+    """Return the rate, 1/s, that a step has to follow of how springs, dampers and actuators move bodies from a state.
+
+    Loops hold. Runge-Kutta 4 leaves about (h rate)^4 of what a mode moves. One that swings moves as much as all; one
+    that decays by what a unit position or a unit rate makes of it, 1/rate where a damper alone holds a light body.
+    """
+    A = _slopes(scene, q, v)
+    n = len(A) // 2
+    found: Any = eig(A, left=True, right=True)
+    rates, left, right = found
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what moves freely has one vector twice
+        moved = np.abs(right[:n]).max(axis=0) * np.abs(left).max(axis=0) / np.abs(np.sum(left.conj() * right, axis=0))
+    decays = np.abs(rates.imag) <= DECAYS * np.abs(rates.real)
+    counts = np.where(decays & (moved < 1.0), moved, 1.0) ** 0.25
+    size = np.abs(rates)
+    filters = [1.0 / actuator.time_constant for actuator in scene.actuators if actuator.time_constant > 0.0]
+    return max(float(np.max(size * np.maximum(counts, OF_RATE / STABLE), initial=0.0)), *filters, 1.0)
+
+
+def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
+    """Return d(v, v')/d(q, v) (2 nv, 2 nv) by springs, dampers and actuators alone, with the loops closed."""
     model = matched(scene)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = q, v
     mujoco.mj_forward(model, data)
     M, n, step = mass_matrix(model, data), model.nv, 1e-6
+    H = np.array(data.efc_J).reshape(-1, n)[: data.ne]
     lift = step * np.eye(n)
 
     def forces(d: Floats, rate: Floats) -> Floats:
@@ -123,9 +152,11 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     still = np.zeros(n)
     K = np.array([(forces(d, still) - forces(-d, still)) / (2.0 * step) for d in lift]).T
     D = np.array([(forces(still, d) - forces(still, -d)) / (2.0 * step) for d in lift]).T
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [np.linalg.solve(M, K), np.linalg.solve(M, D)]])
-    filters = [1.0 / actuator.time_constant for actuator in scene.actuators if actuator.time_constant > 0.0]
-    return max(float(np.abs(np.linalg.eigvals(A)).max()), *filters, 1.0)
+    root = np.linalg.inv(np.linalg.cholesky(M))
+    free = null_space(H @ root.T, rcond=DEPENDENT) if len(H) else np.eye(n)
+    mobility = root.T @ free @ free.T @ root
+    found: Floats = np.block([[np.zeros((n, n)), np.eye(n)], [mobility @ K, mobility @ D]])
+    return found
 
 
 def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared:
@@ -171,7 +202,7 @@ def _scene(case: Case) -> Scene:
 def _from_file(case: Case) -> Any:
     """Return MuJoCo's own reading of the file, less what is left out of every engine."""
     without = str(case.parameters.get("without", ""))
-    model = mjcf.model_of(Path(case.file), without)
+    model, _ = mjcf.read(Path(case.file), without)
     strip(model, without)
     return model
 
@@ -188,7 +219,7 @@ def matched(scene: Scene) -> Any:
     spec = spec_of(scene, by_corners=True)
     option = spec.option
     option.integrator, option.solver = mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_NEWTON
-    option.tolerance, option.jacobian = 0.0, mujoco.mjtJacobian.mjJAC_DENSE
+    option.tolerance, option.jacobian = CONVERGED, mujoco.mjtJacobian.mjJAC_DENSE
     off = mujoco.mjtDisableBit
     option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE)
     model = compiled(spec, scene)

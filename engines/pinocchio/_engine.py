@@ -14,7 +14,7 @@ import sksundae
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.registry import Registry
-from crossbody.engines import _settings
+from crossbody.engines import settings as _settings
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine

@@ -143,7 +143,8 @@ class PinRows:
 
     def gaps(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Gap and its rate of every row (nc,)."""
-        return self.heights(q), self.jacobian(q) @ v
+        h, H = self.gradient_of(q, slice(None))
+        return np.array(h), H @ v
 
     def gap_acceleration(self, q: Floats, v: Floats, vd: Floats) -> Floats:
         """H'' of every row (nc,)."""

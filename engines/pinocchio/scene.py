@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -146,8 +147,12 @@ def _may_depend(scene: Scene, touching: int) -> bool:
     return bool(scene.loops) or touching > 1 or (bool(bounds) and (touching > 0 or tendons))
 
 
+KEPT = 2
+"""Places at which answers are kept: the end of a step and its start, the end of the one before."""
+
+
 class LastAsked:
-    """The last answer of a function of q, which may only be read: a step asks several times at one place."""
+    """The last answers of a function of q, which may only be read: a step asks several times at both of its ends."""
 
     def __init__(self, function: Callable[[Floats], Gradients]) -> None:
         self.function = function
@@ -155,16 +160,18 @@ class LastAsked:
 
     def forget(self) -> None:
         """Ask anew next time, wherever it is."""
-        self.at: Floats = np.zeros(0)
+        self.known: deque[tuple[Floats, Gradients]] = deque(maxlen=KEPT)
 
     def __call__(self, q: Floats) -> Gradients:
         """Return the answer."""
-        if not np.array_equal(q, self.at):
-            self.found = self.function(q)
-            for part in self.found:
-                part.flags.writeable = False
-            self.at = np.array(q)
-        return self.found
+        for at, answer in self.known:
+            if np.array_equal(q, at):
+                return answer
+        found = self.function(q)
+        for part in found:
+            part.flags.writeable = False
+        self.known.append((np.array(q), found))
+        return found
 
 
 def spans(scene: Scene, model: Any, placed: Placed, to: Coordinates) -> Callable[[Floats, Floats], parts.Stretch]:

@@ -152,7 +152,7 @@ class Arc:
         """
         e, nc, nz = self.scene.equations, self.scene.equations.system.nc, self.scene.nz
         self.whole, self.kept = y.copy(), np.arange(len(y))
-        if nc < MANY or e.spread is not None:  # shared multipliers may stand in any row
+        if nc < MANY or e.beside is not None:  # shared multipliers may stand in any row
             return
         idle = np.setdiff1d(np.arange(nc), e.active)
         firsts = [self.ny + k * nc for k in range(carried)] + [len(y) - nz] * (nz > 0)
@@ -419,5 +419,5 @@ class IdaArc(Arc):
         if not self.rigid:
             return State(t, y[:nq], y[nq:ny], y[self.work])
         e = self.scene.equations
-        lam = y[self.lam] if e.spread is None else e.spread @ y[self.lam][e.active]
+        lam = e.share(t, y[:nq], y[nq:ny], y[self.lam])
         return State(t, y[:nq], y[nq:ny], y[self.work], lam)

@@ -47,8 +47,7 @@ class Equations:
         u (nu,): inputs in force. memory: state of the controller.
         active: indices of the active rows.
         law (nc, 3): a0, a1, a2 in force for every row.
-        spread (nc, na): multipliers of all rows from those of the active ones, where these hold others that depend on
-            them; None where there are none.
+        beside: rows that depend on the active ones and share their load; None where no row depends on others.
         evaluations: right-hand sides so far.
     """
 
@@ -62,7 +61,7 @@ class Equations:
         self.law = self.slow.copy()
         self.p, self.u, self.memory = np.array(system.p), np.zeros(system.inputs), np.zeros(system.memory)
         self.active: list[int] = []
-        self.spread: Floats | None = None
+        self.beside: list[int] | None = None
         self.evaluations = 0
         self._blocks, self._f, self._w = np.zeros((n, system.mass_block)), np.zeros(n), np.zeros(system.scratch)
         self._H, self._h, self._Hdv = np.zeros((nc, n)), np.zeros(nc), np.zeros(nc)
@@ -74,7 +73,7 @@ class Equations:
     def activate(self, modes: Sequence[int], without: Collection[int] = ()) -> None:
         """List the active rows of a mode set, less those that others hold, and put their constants in force."""
         self.active = [i for i, mode in enumerate(modes) if mode in ACTIVE and i not in without]
-        self.spread = None
+        self.beside = None
         self._index[: len(self.active)] = self.active
         self._H[:] = 0.0  # kernels need not write the zeros
         for i, mode in enumerate(modes):
@@ -127,6 +126,17 @@ class Equations:
         if self.active:
             lam[self.active] = solved[n:]
         return solved[:n], lam
+
+    def share(self, t: float, q: Floats, v: Floats, lam: Floats) -> Floats:
+        """Multipliers (nc,) of all rows, the least that exert the forces of those of the active ones alone (nc,)."""
+        if not self.beside:
+            return lam
+        every = [*self.active, *self.beside]
+        H = self.held(t, q, v, every)[1]
+        C = np.linalg.lstsq(H[: len(self.active)].T, H[len(self.active) :].T, rcond=None)[0]
+        shared = lam.copy()
+        shared[every] = np.linalg.lstsq(np.hstack([np.eye(len(C)), C]), lam[self.active], rcond=None)[0]
+        return shared
 
     def gaps(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Gaps h and rates h' of all rows (nc,); views that the next call overwrites."""

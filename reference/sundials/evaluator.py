@@ -58,14 +58,13 @@ class Evaluator:
         work, e = self.work, self.equations
         terms = [(g, term) for g, guard in enumerate(guards) for term in guard.terms]
         work["size"][4:7] = len(e.active), len(terms), len(guards)
-        work["size"][9] = e.spread is not None
-        if e.spread is not None:
-            work["spread"][:, : len(e.active)] = e.spread
+        sharing = [*e.active, *(e.beside or ())]
+        work["size"][9] = len(sharing) - len(e.active)
         work["tied"][:] = 0
         work["tied"][list(tied)] = 1
         for i in tied:
             work["let_go"][i] = tied[i]
-        work["idx"][: len(e.active)] = e.active
+        work["idx"][: len(sharing)] = sharing
         work["law"][:], work["law_if"][:] = e.law, e.law
         for i in range(e.system.nc):
             if i not in e.active and e.has_fast[i] and i not in frozen:

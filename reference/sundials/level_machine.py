@@ -136,6 +136,10 @@ class LevelMachine:
         """Whether gap i is closed."""
         return h <= 0.0
 
+    def _known(self, q: Floats) -> float:
+        """To what a gap is known, as far as the tolerance of the positions tells."""
+        return self.rtol * float(np.abs(q).max())
+
     def _approaches(self, i: int, rate: float) -> bool:
         """Whether gap i closes."""
         return rate < -self.slow
@@ -150,7 +154,7 @@ class LevelMachine:
         else:
             self.equations.activate(modes, {*range(len(modes))}.difference(self.sharing.basis, joins))
             if not joins:
-                self.equations.spread = self.sharing.spread
+                self.equations.beside = self.sharing.beside
 
     def _share(self, t: float, q: Floats, v: Floats) -> list[int]:
         """Find how the rows in contact hold each other where some depend on others; those that have to let go."""
@@ -183,9 +187,9 @@ class LevelMachine:
             self._rounding = 8.0 * ULP * float((np.abs(e.held(t, q, v, self.rows)[1]) @ np.abs(v)).max())
         noise, size = e.noise(t, q, v, self.fastest)
         vd, lam = e.accelerate(t, q, v)
-        if e.spread is None:
+        if e.beside is None:
             return View(gap, rate, vd, lam, noise, size, lam)
-        shared = e.spread @ lam[e.active]
+        shared = e.share(t, q, v, lam)
         return View(gap, rate, vd, shared, np.full(len(lam), noise.max()), np.full(len(lam), size.max()), lam)
 
     def pressure(self, i: int, t: float, q: Floats, v: Floats, error: float = 0.0) -> tuple[float, float]:
@@ -243,7 +247,7 @@ class LevelMachine:
             return self._active_mode(i) if closing and presses() else mode
         if closing:
             return self._active_mode(i)
-        if h < -max(self.deep, self.rtol * float(np.abs(q).max())):
+        if h < -max(self.deep, self._known(q)):
             return self._active_mode(i) if presses() else Mode.BALLISTIC
         return self._active_mode(i) if rate <= self.slow and presses() else mode
 
@@ -380,7 +384,7 @@ class LevelMachine:
             else:
                 self._switch(t, i, self._active_mode(i) if mode == Mode.FREE else Mode.FREE)
         if any(event.before == Mode.FREE for event in self.events[before:]):  # others may touch at the same instant
-            known = self.rtol * float(np.abs(q).max())
+            known = self._known(q)
             for i in self.rows:
                 closes = self.modes[i] == Mode.FREE and i not in self.frozen and rate[i] < -self.slow
                 if closes and abs(gap[i]) <= known:
@@ -404,7 +408,7 @@ class LevelMachine:
         # just opened, whose next values round to either side; a gap that was open cannot close without a rate below 0.
         still = view.rate[i] <= self.slow or (frozen and mode != Mode.FREE)
         closing = Term(Kind.RATE, i, self.slow if still and (closed or mode != Mode.FREE) else 0.0)
-        if mode in ACTIVE and self.sharing is not None and not self.sharing.spread[i].any():
+        if mode in ACTIVE and self.sharing is not None and i not in (*self.sharing.basis, *self.sharing.beside):
             return []  # others hold it
         if mode in ACTIVE:
             lam, noise = float(view.lam[i]), float(view.noise[i])

@@ -262,7 +262,7 @@ class SundialsRun:
         self.equations.project(s.q, s.v, rows, np.where(laws[:, 0] > 0.0, h, np.nan), rate)
         if not self.rigid:
             e, lam = self.equations, self.equations.accelerate(s.t, s.q, s.v)[1]
-            s.lam = lam if e.spread is None else e.spread @ lam[e.active]
+            s.lam = e.share(s.t, s.q, s.v, lam)
 
     def _follow_law(self, view: View, anew: bool) -> None:
         """Note from where each active row follows its law; one that did so before goes on, unless all begin anew."""

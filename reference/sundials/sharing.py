@@ -34,12 +34,12 @@ class Sharing:
 
     Attributes:
         basis: independent rows that hold all others.
-        spread (nc, nb): multipliers of all rows from those that the basis would have alone.
+        beside: rows that depend on the basis and bear a share of its load.
         lifted: rows that have to let go instead; the rest is not known then.
     """
 
     basis: list[int]
-    spread: Floats
+    beside: list[int]
     lifted: list[int]
 
 
@@ -119,25 +119,20 @@ def share(
     y = _nearest(at, one_sided, every)
     excess = at.A @ y - at.least
     lifted = [every[k] for k in np.flatnonzero(one_sided & (excess > at.allowed))]
-    nothing = np.zeros((0, 0))
     if lifted:
-        return Sharing([], nothing, lifted)
+        return Sharing([], [], lifted)
     carrying = _carrying(at, y, one_sided, every, spent, span)
     if carrying is None:
-        return Sharing([], nothing, [i for i in every if i in spent])
+        return Sharing([], [], [i for i in every if i in spent])
     pulling = _pulling(at, y, one_sided, carrying)
     if pulling:  # the least multipliers would pull, others that exert the same forces need not
         carrying = _pushing(at, y, one_sided, np.array([i in spent for i in every])) or carrying
         pulling = [k for k in carrying if every[k] in spent] or _pulling(at, y, one_sided, carrying)
     if pulling:  # a row that nothing presses, and that the others need to be held
-        return Sharing([], nothing, [every[k] for k in pulling])
+        return Sharing([], [], [every[k] for k in pulling])
     order = qr(at.A[carrying].T, mode="r", pivoting=True)[-1][:span]
     basis = sorted(carrying[k] for k in order)
-    lengths = at.length[:, None] / at.length[basis]
-    C = np.linalg.lstsq(at.A[basis].T, at.A[carrying].T, rcond=None)[0].T * lengths[carrying]
-    spread = np.zeros((e.system.nc, span))
-    spread[[every[k] for k in carrying]] = C @ np.linalg.inv(C.T @ C)
-    return Sharing([every[k] for k in basis], spread, [])
+    return Sharing([every[k] for k in basis], [every[k] for k in carrying if k not in basis], [])
 
 
 def _nearest(at: _Rows, one_sided: Flags, every: list[int]) -> Floats:

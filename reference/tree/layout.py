@@ -12,8 +12,9 @@ NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, 
 # Then how many pairs of shapes lie to each other in more than one way; how many kinks forces have, where these, the
 # sides on which they are, and their bands stand, and the tolerance that is in force: the inputs follow it.
 RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, LYING, KINKS, AT_KINK, AT_BEND, AT_BAND, AT_TOLD = range(14, 26)
-# How many of the kinks are those of sums of forces, of gaps, and of actuators on one hinge or slide each.
-SUMMED, GAPPED, PLAIN, HEAD = 26, 27, 28, 29
+# How many of the kinks are those of sums of forces, of gaps, and of actuators on one hinge or slide each; where the
+# code of the sweeps stands that was traced for the model, 0 for none.
+SUMMED, GAPPED, PLAIN, TRACED, HEAD = 26, 27, 28, 29, 30
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (

@@ -11,9 +11,10 @@ from crossbody.reference.kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.pairs.rows import gradient, touch
-from crossbody.reference.tree import balls, forces, layout, loops, strings, sweeps
+from crossbody.reference.tree import balls, forces, layout, loops, strings, sweeps, traced
 from crossbody.reference.tree.points import point, pull
 
+REAL = 8  # bytes of a number that is not complex
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
 
 
@@ -29,7 +30,9 @@ def _pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
 def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Array, w: Array) -> None:
     """M by composite inertias; f = springs, dampers, actuators less the bias."""
     forces.passive(q, v, p, f)
-    sweeps.outwards(q, v, p, w)
+    code = p[layout.TRACED].real if q.itemsize == REAL else 0.0
+    if code == 0.0 or p[layout.SPANNED].real > 0.0:
+        sweeps.outwards(q, v, p, w)
     if len(u) > 0:
         sums = w[len(w) - len(f) :]
         sums[:] = 0.0
@@ -38,7 +41,10 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
             f[j] += forces.bounded(p, sums, j)
     if p[layout.SPANNED].real > 0.0:
         forces.stretched(p, w, f)
-    sweeps.inwards(p, w, M, f)
+    if code != 0.0:
+        traced.call(np.int64(code), q.ctypes.data, v.ctypes.data, M.ctypes.data, f.ctypes.data, w.ctypes.data)
+    else:
+        sweeps.inwards(p, w, M, f)
     for i in range(int(p[layout.PUSHES].real)):
         node, x, force = _pushed(u, p, w, i)
         pull(p, w, node, 1.0, force, value(x), f)

@@ -15,9 +15,10 @@ from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._redundant import ranked
 from crossbody.reference.kinds import Floats
-from crossbody.reference.tree import switches
+from crossbody.reference.tree import layout, switches
 from crossbody.reference.tree.mechanism import KERNELS, velocity
 from crossbody.reference.tree.table import dof_parents, tabulate
+from crossbody.reference.tree.traced import compiled_sweeps
 
 
 def activations(scene: Scene, act0: Floats | None) -> Activations:
@@ -33,9 +34,9 @@ def activations(scene: Scene, act0: Floats | None) -> Activations:
 
 def system(
     scene: Scene, law: Law, q0: Floats | None = None, control: Control | None = None, act0: Floats | None = None,
-    rank: int = -1,
+    rank: int = -1, traced: bool | None = False,
 ) -> System:  # fmt: skip
-    """Return the equations of a scene; nothing is compiled for it.
+    """Return the equations of a scene; nothing is compiled for it but what `traced` asks for.
 
     Args:
         scene: bodies, joints and what acts between them.
@@ -45,6 +46,8 @@ def system(
         control: of the user's own, which gives the controls.
         act0: activations (na,) at the start; 0 if not given.
         rank: how many rows of loops hold; below 0 those whose pivot is above 1e-4 of the first.
+        traced: take code of the sweeps that is compiled for this model alone; None takes it if it was compiled before.
+            Results are the same to the last bit.
 
     Raises:
         SceneError: for a scene that the kernels cannot do, or a rank that the rows do not have.
@@ -62,9 +65,12 @@ def system(
             "latched": table.latched,
             "kinks": table.kinks,
         }
+    code = 0.0 if traced is False else compiled_sweeps(table.p, scene.nq, scene.nv, anew=bool(traced))
+    parameters = table.p[: table.constants].copy()
+    parameters[layout.TRACED] = code
     fields: dict[str, Any] = dict(
         n=scene.nv, nq=scene.nq, above=dof_parents(table),
-        parameters=table.p[: table.constants], **turning,
+        parameters=parameters, **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, b0=law.b0, b1=law.b1, unilateral=law.unilateral,
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS,

@@ -55,7 +55,8 @@ class Ladder:
     def __iter__(self) -> Iterator[tuple[str, float, Any]]:
         """(knob, setting, prepared run) of every rung; one without a knob for an engine that has none."""
         plain = engines.load(self.pick.engine).prepare(self.case, self.pick.profile)
-        lean = {"ledger": False} if "ledger" in plain.settings else {}  # nobody asked for the account
+        # Nobody asked for the account, and what is compiled for a model is compiled before it is timed.
+        lean = {name: value for name, value in (("ledger", False), ("traced", "yes")) if name in plain.settings}
         knob = next((name for name in LADDERS if name in plain.settings), "")
         if not knob:
             yield "", math.nan, plain

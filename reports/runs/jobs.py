@@ -44,6 +44,9 @@ STUDY_S = 20.0
 STUDIES_S, DEARER = 10.0, 3.0
 """Time that all runs of a study of a scene may take, s, by what its own run took; one at a tight tolerance is taken to
 cost so many times as much."""
+FIRST, DEAR_S = 0.02, 300.0
+"""Part of its horizon by which a run of a scene is estimated, and the time, s, beyond which it is not begun unless its
+profile is asked for: engines that follow the law take their steps in Python."""
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
 
@@ -235,6 +238,8 @@ def _entry(
 def _ran(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool
 ) -> Entry:  # fmt: skip
+    if pick.every and (dear := _dear(case, pick, asked)):
+        raise CaseUnsupported(dear)
     prepared = prepare(case, pick, asked)
     shown = prepared.audit()
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
@@ -255,6 +260,19 @@ def _ran(
         hidden=hidden,
         own=law_of(prepared.follows) if refine and prepared.follows is not None else None,
     )
+
+
+def _dear(case: Case, pick: Pick, asked: Mapping[str, Value]) -> str:
+    """Return what a run of a scene would cost where that is too much, by its first part; else nothing."""
+    if not case.general or pick.engine == "reference":
+        return ""
+    prepared = prepare(replace(case, t_end=FIRST * case.t_end), pick, asked)
+    began = process_time()
+    prepared.run()
+    cost = (process_time() - began) / FIRST
+    if cost <= DEAR_S:
+        return ""
+    return f"Too dear: it would take about {cost:.0f} s. -e {pick.engine}:{pick.profile} runs it all the same."
 
 
 def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:

@@ -12,6 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from crossbody.cases import installed
+
 PACKAGES = (
     "crossbody",
     "numpy",
@@ -40,6 +42,7 @@ def provenance(command: str, **more: Any) -> dict[str, Any]:
         "cpu": _cpu(),
         "cpus": os.cpu_count(),
         "threads": {k: v for k, v in os.environ.items() if k.endswith("_NUM_THREADS")},
+        "plugins": installed.digests(),
         **more,
     }
 

@@ -5,13 +5,12 @@ A suite is a module with a docstring whose first line says what it stresses, and
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING
 
-from crossbody.cases import InvalidValue, SceneError, UnknownName
+from crossbody.cases import InvalidValue, SceneError
+from crossbody.cases.own_file import from_file
 from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
     from crossbody.reports.suites._contract import Suite
 
     own = name.endswith(".py")
-    module = _file(Path(name)) if own else None
+    module = from_file("suite", Path(name), names()) if own else None
     if name.endswith(SUFFIXES) or (own and not hasattr(module, "SUITE") and hasattr(module, "build")):
         from crossbody.reports.suites._of_case import suite_of
 
@@ -60,12 +59,3 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
     if not isinstance(found, Suite):
         raise SceneError(f"Suite file {module.__file__} does not define SUITE, a crossbody.reports.suites Suite.")
     return found
-
-
-def _file(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"crossbody_suite_{path.stem}", path)
-    if spec is None or spec.loader is None or not path.is_file():
-        raise UnknownName("suite file", str(path), names())
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from crossbody.cases import InvalidValue, SchedulerUnavailable
+from crossbody.cases.installed import shared
 from crossbody.reports.sweep.execute import crashed, execute
 from crossbody.reports.sweep.spec import Spec
 
@@ -62,7 +63,7 @@ def surviving(function: Callable[[Task], Done], tasks: Sequence[Task], jobs: int
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=".*worker stopped while some jobs.*")
-            yield from parallel(delayed(function)(task) for task in tasks)
+            yield from parallel(delayed(shared(function))(task) for task in tasks)
     except BrokenProcessPool:
         return
 
@@ -171,7 +172,7 @@ def cluster(chunks: Sequence[Chunk], client: Any) -> Iterator[tuple[int, Rows]]:
     from distributed.scheduler import KilledWorker
 
     specs = dict(chunks)
-    futures = [client.submit(work, chunk, pure=False) for chunk in chunks]
+    futures = [client.submit(shared(work), chunk, pure=False) for chunk in chunks]
     numbers = {future.key: number for future, (number, _) in zip(futures, chunks, strict=True)}
     for future in as_completed(futures, loop=client.loop):  # this client is nobody's default
         error = future.exception()

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from crossbody.cases import Value
+from crossbody.cases import Value, installed
 from crossbody.reports.suites._contract import Ladder
 
 
@@ -68,7 +68,7 @@ class Spec:
             words += ["--set", f"{name}={_text(value)}"]
         for name, value in settings.items():
             words += ["--setting", f"{name}={_text(value)}"]
-        return shlex.join(words)
+        return shlex.join(words + installed.options())
 
 
 def _text(value: Value) -> str:

@@ -16,7 +16,7 @@ import pandas as pd
 from pyarrow import ArrowException
 
 from crossbody import cases, engines, hw, reference
-from crossbody.cases import OutputError
+from crossbody.cases import OutputError, installed
 from crossbody.reports import judging, metrics, sweep
 from crossbody.reports.runs import files, manifest, output
 from crossbody.reports.sweep.execute import COLUMNS, TIMES
@@ -42,7 +42,8 @@ def identity(specs: Sequence[Spec], chunk: int, about: Mapping[str, Any]) -> dic
     """What a sweep is: two with the same identity end with the same table."""
     digest = hashlib.sha256(pickle.dumps([repr(spec) for spec in specs], protocol=5)).hexdigest()[:16]
     return {"version": version("crossbody"), "code": code(), "runs": len(specs), "chunk": chunk, "draws": digest} | {
-        k: v for k, v in about.items()
+        "plugins": installed.digests(),
+        **about,
     }
 
 

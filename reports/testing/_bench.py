@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases import Case, CaseUnsupported, installed
 from crossbody.engines import Run
 from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
 from crossbody.reports.judging.truth import Truth, truth_of
@@ -93,4 +93,4 @@ class Bench:
 
 def repeat(scene: Scene) -> str:
     """The command that reproduces the verdicts of a case, but for its engine."""
-    return shlex.join(["crossbody", "run", scene.name, "--variant", scene.variant])
+    return shlex.join(["crossbody", "run", scene.name, "--variant", scene.variant, *installed.options()])

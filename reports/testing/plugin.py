@@ -7,7 +7,8 @@ Every run of pytest imports this module: whatever needs numpy or an engine is im
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -37,14 +38,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     ):
         group.addoption(f"--crossbody-{option}", action="append", default=[], metavar=word, help=text)
         parser.addini(f"crossbody_{option}s", f"where --crossbody-{option} is not given: {text}", type="linelist")
+    plugin = "a Python file that is an engine, a metric, a case, ...; repeatable, beside [tool.crossbody] plugins"
+    group.addoption("--crossbody-plugin", action="append", default=[], metavar="FILE", help=plugin)
     group.addoption("--crossbody-update", action="store_true", help="write baselines instead of comparing with them")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The mark of generated tests; a test of one's own uses it to name its cases and engines."""
+    """Add the mark of generated tests, by which a test of one's own names its cases and engines; import plug-ins."""
     config.addinivalue_line(
         "markers", f"{MARKER}(*cases, engines=()): cases and engines of a test that uses crossbody's fixtures"
     )
+    given, project = config.getoption("--crossbody-plugin"), config.rootpath / "pyproject.toml"
+    if given or (project.is_file() and b"crossbody" in project.read_bytes()):
+        _plug(config, [config.invocation_params.dir / Path(file).expanduser() for file in given])
+
+
+def _plug(config: pytest.Config, given: Sequence[Path]) -> None:
+    from crossbody.cases import CrossbodyError, installed
+
+    try:
+        installed.use([*installed.configured(config.rootpath), *given])
+    except CrossbodyError as error:
+        raise pytest.UsageError(str(error)) from None
 
 
 def _generates(config: pytest.Config) -> bool:

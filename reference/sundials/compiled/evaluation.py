@@ -66,7 +66,7 @@ CAUTION = 16.0  # errors along the step in units of those seen at two places
 class Workspace:
     """Everything that `evaluate` reads and writes."""
 
-    size: Index  # n, nc, k, nz, na, terms, guards, nq, 1 where q' is not v, and 1 where active rows hold others
+    size: Index  # n, nc, k, nz, na, terms, guards, nq, 1 where q' is not v, and how many rows stand beside the active
     count: Index  # evaluations, steps, steps in a row that stability binds, the most of these, guards undecided
     clock: Floats  # last instant, fastest damped pole, end of the last step and its start
     p: Floats
@@ -94,11 +94,12 @@ class Workspace:
     rigid: Index  # (nc,) place of a row's second multiplier there, -1 for a row held by its law
     law: Floats2  # (nc, 3) in force
     law_if: Floats2  # the same, with every inactive row as it would be
-    idx: Index
+    idx: Index  # the active rows; behind them those that share their load, and depend on them
     trial: Index
     let_go: Floats  # (nc,) instant at which others lifted a row off that shared a load with them
     tied: Index  # 1 for open rows that depend on the active ones
-    spread: Floats2  # (nc, nc) multipliers of all rows from those of the active ones, where these hold others
+    depends: Floats2  # (n + nc, nc) how a row beside the active ones depends on these, below n zeros; a column a row
+    share: Floats2  # (nc, 1) multipliers of the rows beside
     follows: Index
     watched: Floats  # (guards of the mechanism,)
     kind: Index  # of every term
@@ -257,17 +258,49 @@ def _put_on_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: 
     return GOOD
 
 
+@inlined
+def _share(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats) -> int:
+    """Let the rows beside the active ones bear their share of `lam`: the least multipliers that exert the same forces.
+
+    A row beside is H_d = C H_A: M x - H_A^T C^T = -H_d^T, H_A x = 0 has x = 0. Then lam_d = (1 + C C^T)^-1 C lam_A, and
+    lam_A less C^T lam_d. C turns with the configuration.
+    """
+    n, na, beside, A, C = s.size[0], s.size[4], s.size[9], s.matrix, s.depends
+    _assemble(dynamics, rows, s, t, q, v, s.idx[na:], beside)
+    for d in range(beside):
+        for c in range(n):
+            C[c, d] = -s.H[d, c]
+    _assemble(dynamics, rows, s, t, q, v, s.idx, na)
+    A[:n, n + na : n + na + beside] = C[:n, :beside]
+    A[n : n + na, n + na : n + na + beside] = 0.0
+    if _eliminate(A, C, n + na, beside) != 0:
+        return ILL_POSED
+    for d in range(beside):
+        A[d, beside] = 0.0
+        for e in range(beside):
+            A[d, e] = 1.0 if d == e else 0.0
+        for j in range(n, n + na):
+            A[d, beside] += C[j, d] * s.lam[s.idx[j - n]]
+            for e in range(beside):
+                A[d, e] += C[j, d] * C[j, e]
+    if _eliminate(A, s.share, beside, 1) != 0:
+        return ILL_POSED
+    for d in range(beside):
+        s.lam[s.idx[na + d]] = s.share[d, 0]
+        for j in range(na):
+            s.lam[s.idx[j]] -= C[n + j, d] * s.share[d, 0]
+    return GOOD
+
+
 @compiled
 def _accelerate(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, by_law: bool) -> int:
     """V' into `solution`, multipliers of all rows into `lam`."""
     code = _solve(dynamics, rows, s, t, q, v, s.idx, s.size[4], s.law, -1, by_law)
     s.lam[:] = 0.0
     for j in range(s.size[4]):
-        if s.size[9]:
-            for i in range(s.size[1]):
-                s.lam[i] += s.spread[i, j] * s.solution[s.size[0] + j, 0]
-        else:
-            s.lam[s.idx[j]] = s.solution[s.size[0] + j, 0]
+        s.lam[s.idx[j]] = s.solution[s.size[0] + j, 0]
+    if s.size[9] and code == GOOD:
+        code = _share(dynamics, rows, s, t, q, v)
     return int(code)
 
 
@@ -720,7 +753,7 @@ def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tupl
     ny = nq + n
     shapes: dict[str, tuple[int, ...]] = {
         "size": (10,), "count": (5,), "clock": (4,), "w": (system.scratch,), "blocks": (n, system.mass_block),
-        "spread": (nc, nc),
+        "depends": (all_, nc), "share": (nc, 1),
         **dict.fromkeys(("q", "qd", "law_q"), (nq,)), **dict.fromkeys(("f", "v", "law_v", "a0", "a1", "curve"), (n,)),
         "H": (nc, n), "two": (2,), "matrix": (all_, all_ + 2), "solution": (all_, 2), "law": (nc, 3),
         "law_if": (nc, 3), "arc": (nc, 3), "trial": (nc + 1,), "slopes": (ny + 2 * nc + nz,),
