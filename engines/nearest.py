@@ -244,8 +244,10 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Return vector products (..., 3); NumPy's own costs more than all else here for few vectors."""
-    (x, y, z), (u, v, w) = (np.moveaxis(part, -1, 0) for part in (a, b))
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+    x, y, z, u, v, w = (part[..., k] for part in (a, b) for k in range(3))
+    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    found[..., 0], found[..., 1], found[..., 2] = y * w - z * v, z * u - x * w, x * v - y * u
+    return found
 
 
 def _inside(rotation: Floats, world: Floats) -> Floats:

@@ -57,7 +57,8 @@ class ReferenceRun(Run):
     def motion(self) -> Trajectory:
         """Integrate from the start, whatever shapes meet that have no rows."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
-        return trajectory if self.case.scene is None or not self.case.general else determined(self.case.scene, trajectory)
+        scene = self.case.scene if self.case.general else None
+        return trajectory if scene is None else determined(scene, trajectory)
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""

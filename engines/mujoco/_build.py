@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from crossbody.cases.rotations import matrices
-from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Shape, Tendon
+from crossbody.cases.scene import Actuator, Body, Joint, Loop, RowLaw, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
 
@@ -44,12 +44,13 @@ def compiled(spec: Any, scene: Scene) -> Any:
     return model
 
 
-def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
+def spec_of(scene: Scene, *, by_corners: bool = False, solids: Collection[str] = ()) -> Any:
     """Return a scene as an editable model.
 
     Args:
         scene: what it is made of.
         by_corners: whether every corner of a hull is a shape of its own: MuJoCo has but a few contacts of a mesh.
+        solids: bodies whose mass and inertia MuJoCo takes from their shapes.
     """
     spec = mujoco.MjSpec()
     spec.compiler.balanceinertia = False
@@ -59,13 +60,10 @@ def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
     bodies = {"": spec.worldbody}
     for body in scene.bodies:
         added = bodies[body.parent].add_body(
-            name=body.name, pos=body.position, quat=body.orientation, mass=body.mass, ipos=body.com,
-            gravcomp=body.weightless, explicitinertial=True,
-        )  # fmt: skip
-        if body.mass > 0.0 and any(body.inertia):
-            added.fullinertia = body.inertia  # in the order xx yy zz xy xz yz
-        else:
-            added.inertia = (LEAST if body.mass > 0.0 else 0.0,) * 3
+            name=body.name, pos=body.position, quat=body.orientation, gravcomp=body.weightless
+        )
+        if body.name not in solids:
+            _add_inertia(added, body)
         bodies[body.name] = added
         for joint in scene.joints:
             if joint.body == body.name:
@@ -82,6 +80,14 @@ def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
         else:
             _add_contact(spec, bodies, contact)
     return spec
+
+
+def _add_inertia(added: Any, body: Body) -> None:
+    added.explicitinertial, added.mass, added.ipos = True, body.mass, body.com
+    if body.mass > 0.0 and any(body.inertia):
+        added.fullinertia = body.inertia  # in the order xx yy zz xy xz yz
+    else:
+        added.inertia = (LEAST if body.mass > 0.0 else 0.0,) * 3
 
 
 def _bounds(bounds: tuple[float, ...]) -> tuple[bool, tuple[float, ...]]:

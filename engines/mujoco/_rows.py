@@ -26,6 +26,7 @@ TOGETHER = 64
 """Instants at which gaps of shapes are computed at once."""
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
+FRICTIONAL = (mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL,)
 Present = tuple[int, int]
 """Where a row stands in MuJoCo's arrays, and among the scene's."""
 
@@ -35,10 +36,11 @@ class Rows:
 
     Attributes:
         always: number of rows that are always on; they stand first in both.
+        frictional: whether edges of friction pyramids, whose sum is the normal force, are rows of contacts too.
     """
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
-        self.scene, self.model, self.data = scene, model, data
+        self.scene, self.model, self.data, self.frictional = scene, model, data, False
         self.always = sum(loop.width for loop in scene.loops)
         self.places: dict[tuple[int, int, bool], int] = {}
         row = self.always
@@ -49,7 +51,9 @@ class Rows:
                 if np.isfinite(bound):
                     self.places[kind, i, bool(upper)] = row
                     row += 1
-        self.cubic = np.array([law.a2 for law in rows_of(scene)[1]])
+        ends = [(kind, i) for kind, i, _ in self.places]
+        self.sole = {(kind, i): row for (kind, i, _), row in self.places.items() if ends.count((kind, i)) == 1}
+        self.cubic, self.forces = np.array([law.a2 for law in rows_of(scene)[1]]), Forces(scene)
         self.touching = Contacts(scene)
         self.nc = row + self.touching.count
         named = mjcf.names(model, "geom")
@@ -82,7 +86,8 @@ class Rows:
         solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
         bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
         solref += [bounds[kind][i] for kind, i, _ in self.places]
-        solref += [model.pair_solref[i] for i in self.pair_ids()]
+        solref += [model.pair_solref[i] for i in self.pair_ids()] if model.npair else []
+        solref += [model.geom_solref[part] for part, _ in map(sorted, self.touches)] if not model.npair else []
         pairs = np.array(solref).reshape(-1, 2)
         if (pairs > 0.0).any():
             return {"solref": pairs}
@@ -91,11 +96,16 @@ class Rows:
     def present(self) -> Iterator[Present]:
         """Yield what MuJoCo has a row for now, of those that may open."""
         data = self.data
-        for j in range(data.ne, data.nefc):
-            kind, part = int(data.efc_type[j]), int(data.efc_id[j])
-            if kind in LIMITS:
+        first, last = data.ne, data.nefc
+        if first == last:
+            return
+        rows = zip(data.efc_type[first:last].tolist(), data.efc_id[first:last].tolist(), strict=True)
+        for j, (kind, part) in enumerate(rows, first):
+            if (row := self.sole.get((kind, part))) is not None:
+                yield j, row
+            elif kind in LIMITS:
                 yield j, self._place(j, kind, part)
-            elif kind == TOUCH and self._geoms(part) in self.touches:
+            elif (kind == TOUCH or (self.frictional and kind in FRICTIONAL)) and self._geoms(part) in self.touches:
                 yield j, self._touch(part)
 
     def lam(self) -> Floats:
@@ -152,7 +162,6 @@ class Rows:
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
         data = mujoco.MjData(self.model)
-        forces = Forces(self.scene)
 
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
             first = self.nc - self.touching.count
@@ -164,7 +173,7 @@ class Rows:
                 mujoco.mj_fwdVelocity(self.model, data)
                 mujoco.mj_energyPos(self.model, data)
                 mujoco.mj_energyVel(self.model, data)
-                gaps[i, :first] = [*data.efc_pos[: self.always], *forces.bounds(q[i], data.ten_length)]
+                gaps[i, :first] = [*data.efc_pos[: self.always], *self.forces.bounds(q[i], data.ten_length)]
                 spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
                 energy[i] = data.energy[1], data.energy[0] + spared.sum()
             return gaps, energy

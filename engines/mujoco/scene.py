@@ -16,18 +16,19 @@ from scipy.linalg import eig, null_space
 from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.files.case import under_law
+from crossbody.cases.files.case import rows_of, under_law
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
-from crossbody.cases.scene_contacts import by_shapes
 from crossbody.engines._acting import Acting
 from crossbody.engines._real_time import followed as real_time
+from crossbody.engines._scale import depths, resolving_step
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix, numbers
+from crossbody.engines.mujoco._obvious import Obvious, obvious
 from crossbody.engines.mujoco._rows import Rows
 from crossbody.engines.mujoco._scene import Scene as Prepared
 from crossbody.engines.mujoco._switched import Switched
@@ -45,6 +46,8 @@ STIFF = 1e3
 """Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
 method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
 1e-3, 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`). Loops in space bear many times what moves, and want 1e-7."""
+ROUNDS = 3
+"""Of PGS, with one row."""
 SOLVES = 4
 """Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
 DEPENDENT = 1e-6
@@ -84,8 +87,10 @@ def default_step(case: Case, profile: str) -> float:
     if profile == "default":
         return float(mujoco.MjModel.from_xml_string("<mujoco/>").opt.timestep)
     case = followed(case, profile) or case
+    if not case.general:  # as long as its fastest row wants them: nothing else moves its bodies fast
+        return min(SLOWEST, resolving_step(case.law, _reach(case)[0] if case.law.a2.any() else 0.0))
     law, opening = case.law, case.law.unilateral
-    stiffness = law.a0 + 3.0 * law.a2 * (_deepest(case) if law.a2.any() else 0.0) ** 2
+    stiffness = law.a0 + 3.0 * law.a2 * (_reach(case)[0] if law.a2.any() else 0.0) ** 2
     poles = [np.roots([1.0, a1, k]) for k, a1 in zip(stiffness[opening], law.a1[opening], strict=True)]
     rate = float(np.abs(np.concatenate([np.zeros(1), *poles])).max())
     return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
@@ -96,22 +101,15 @@ def followed(case: Case, profile: str) -> Case | None:
     return real_time(case) if profile == "matched" else None
 
 
-def _deepest(case: Case) -> Floats:
-    """Return how deep each row gets (nc,), m or rad, if what drives it at the start does so until it closes.
-
-    There a0 d^2/2 + a2 d^4/4 holds v^2/2 + |h'' h|, with what the row stores at a start off it.
-    """
+def _reach(case: Case) -> tuple[float, float]:
+    """Return how deep rows get, m or rad, and how fast, by what drives them at the start."""
     scene, law = _scene(case), case.law
     model = matched(scene)
     data = mujoco.MjData(model)
-    rows = Switched(scene, model, data)
     data.qpos[:], data.qvel[:] = case.q0, case.v0
-    h, hd, hdd = rows.approach()
-    energy = 0.5 * hd * hd + np.abs(hdd * h) + np.where(h < 0.0, law.a0 * h**2 / 2 + law.a2 * h**4 / 4, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        depths = np.sqrt(2.0 * energy / law.a0), (4.0 * energy / law.a2) ** 0.25
-    found: Floats = np.nan_to_num(np.fmin(*depths), posinf=0.0)
-    return found
+    h, hd, hdd = Switched(scene, model, data).approach()
+    deep, fast = depths(np.stack([law.a0, law.a1, law.a2]), h, hd, hdd, law.unilateral)
+    return float(deep.max(initial=0.0)), float(fast.max(initial=0.0))
 
 
 def fastest(scene: Scene, q: Floats, v: Floats) -> float:
@@ -170,13 +168,12 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         model = held(_from_file(case))
         model = model if reader == "file" else rebuilt(scene, model)
     elif profile == "default":
-        scene = by_shapes(scene)
-        model = _obvious(scene)
+        model = obvious(scene)
     else:
         model = matched(scene)
     data = mujoco.MjData(model)
     switched = Switched(scene, model, data) if profile == "matched" else None
-    rows, acting = switched or Rows(scene, model, data), Acting(case)
+    rows, acting = switched or (Obvious if profile == "default" else Rows)(scene, model, data), Acting(case)
     driver = Forces(scene) if profile == "matched" and scene.activated else None
     prepared = Prepared(
         model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting, driver),
@@ -184,12 +181,13 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
-        hook=_hook(scene, switched, driver) if switched else None, always=True,
+        hook=_hook(scene, switched, driver) if switched else None,
+        always=driver is not None or (switched is not None and switched.wakeful),
         machine="level" if switched else "memoryless",
     )  # fmt: skip
     if switched is not None and switched.nc > switched.always:
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
-    prepared.audit = _audit(case, profile, model, rows)
+    prepared.audit = _audit(case, profile, scene, model, rows)
     return prepared
 
 
@@ -224,22 +222,11 @@ def matched(scene: Scene) -> Any:
     option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE)
     model = compiled(spec, scene)
     without_regularisation(model)
+    if len(rows_of(scene)[0]) == 1:  # one row PGS solves exactly, however hard
+        model.opt.solver, model.opt.iterations = mujoco.mjtSolver.mjSOL_PGS, ROUNDS
+        return model
     model.dof_invweight0[:] *= STIFF
     model.tendon_invweight0[:] *= STIFF
-    return model
-
-
-def _obvious(scene: Scene) -> Any:
-    """Return the model built from the scene with rows, integrator and step as MuJoCo sets them."""
-    model = compiled(spec_of(scene), scene)
-    plain = mujoco.MjSpec()
-    plain.worldbody.add_geom(size=(1.0, 0.0, 0.0))
-    one = plain.compile()
-    for name in ("eq", "pair", "jnt", "tendon"):
-        ends = {"tendon": "_lim"}.get(name, "")
-        getattr(model, f"{name}_solref{ends}")[:] = one.geom_solref[0]
-        getattr(model, f"{name}_solimp{ends}")[:] = one.geom_solimp[0]
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model
 
 
@@ -290,12 +277,12 @@ def _change(scene: Scene, data: Any, acting: Acting, driver: Forces | None) -> C
     return change
 
 
-def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
+def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> dict[str, Any]:
     """Masses, M and bias at zero input; rows where all of them are always on."""
     model = copy.copy(model)  # rows are put on here
     data = mujoco.MjData(model)
     entered = profile == "matched" and not case.general  # of a robot the states are not those of rows that act
-    of_run, rows = rows, type(rows)(rows.scene, model, data)
+    of_run, rows = rows, type(rows)(scene, model, data)
     if isinstance(rows, Switched) and isinstance(of_run, Switched):
         rows.surface[:] = of_run.surface
     hook = rows.hook() if entered and isinstance(rows, Switched) else None

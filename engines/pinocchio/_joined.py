@@ -15,9 +15,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import nnls
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
+from crossbody.engines.nearest import cross as crossed
 from crossbody.engines.pinocchio._rows import ROUNDING, Solve, mass_matrix, point_jacobian, pose
 
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
@@ -163,17 +166,26 @@ class Spans:
     """
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
-        self.model, self.data, self.none = model, model.createData(), np.zeros(model.nv)
+        self.model, self.data = model, model.createData()
         points = [tuple(zip(tendon.bodies, tendon.positions, strict=True)) for tendon in tendons]
         known = list(dict.fromkeys(point for pair in points for point in pair))
         self.ends = [_end(placed[body], place, UPRIGHT) for body, place in known]
         which = [[known.index(point) for point in pair] for pair in points]
         self.one, self.two = np.array(which, dtype=int).reshape(-1, 2).T
+        self.joints, self.arms = [end.joint for end in self.ends], np.array([end.pose.translation for end in self.ends])
+        self.moving = np.zeros((len(self.ends), model.nv))  # 1 where a coordinate moves an end
+        for row, end in zip(self.moving, self.ends, strict=True):
+            for joint in list(model.supports[end.joint])[1:]:
+                row[model.joints[joint].idx_v :][: model.joints[joint].nv] = 1.0
 
     def _apart(self) -> tuple[Floats, Floats, Floats]:
         """Return the points of the ends (ne, 3), distances (nt,), and directions from first to second (nt, 3)."""
-        points = np.array([at(self.data, end).translation for end in self.ends])
-        way = points[self.two] - points[self.one]
+        poses = [self.data.oMi[joint] for joint in self.joints]
+        turned = np.array([pose.rotation for pose in poses]) @ self.arms[:, :, None]
+        origins, arms = np.array([pose.translation for pose in poses]), turned[:, :, 0]
+        points = origins + arms
+        # What moves alike stays as far apart to the last bit: bodies that hang side by side touch, or do not.
+        way = (origins[self.two] - origins[self.one]) + (arms[self.two] - arms[self.one])
         d = np.sqrt(np.einsum("ij,ij->i", way, way))
         return points, d, way / d[:, None]
 
@@ -183,19 +195,26 @@ class Spans:
         return self._apart()[1]
 
     def __call__(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return l (nt,) and dl/dv (nt, nv)."""
+        """Return l (nt,) and dl/dv (nt, nv): an end's n.v is n.(linear) + (x cross n).(angular), as of the origin."""
         pin.computeJointJacobians(self.model, self.data, q)
         points, d, n = self._apart()
-        ends = zip(self.ends, points, strict=True)
-        J = np.array([point_jacobian(self.model, self.data, end.joint, point) for end, point in ends])
-        return d, np.einsum("ij,ijk->ik", n, J[self.two] - J[self.one])
+        J = self.data.J.reshape(6, -1)  # of one column it is a vector
+
+        def along(ends: Any) -> Floats:
+            found: Floats = self.moving[ends] * (n @ J[:3] + crossed(points[ends], n) @ J[3:])
+            return found
+
+        return d, along(self.two) - along(self.one)
 
     def bend(self, q: Floats, v: Floats) -> Floats:
         """Return d'' at v' = 0 (nt,)."""
-        pin.forwardKinematics(self.model, self.data, q, v, self.none)
-        _, d, n = self._apart()
-        rates, own = np.array([moved(self.model, self.data, end) for end in self.ends]).swapaxes(0, 1)
-        W, a = (part[self.two] - part[self.one] for part in (rates, own))
+        pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
+        points, d, n = self._apart()
+        carried = self.moving * v
+        twist, change = (carried @ part.reshape(6, -1).T for part in (self.data.J, self.data.dJ))
+        rate = twist[:, :3] + crossed(twist[:, 3:], points)
+        own = change[:, :3] + crossed(change[:, 3:], points) + crossed(twist[:, 3:], rate)
+        W, a = (part[self.two] - part[self.one] for part in (rate, own))
         across = W - np.einsum("ij,ij->i", n, W)[:, None] * n
         total: Floats = np.einsum("ij,ij->i", n, a) + np.einsum("ij,ij->i", across, across) / d
         return total
@@ -218,6 +237,14 @@ class Strings:
         ]
         of, self.sign, self.bound = np.array(rows).reshape(-1, 3).T
         self.of = of.astype(int)
+
+    @property
+    def chained(self) -> bool:
+        """Whether the ends move apart from each other, or as one, and one bound each makes no ring of them."""
+        kinds, group = np.unique(self.spans.moving, axis=0, return_inverse=True)
+        one, two = (group[ends][self.of] for ends in (self.spans.one, self.spans.two))
+        joined = connected_components(coo_array((np.ones(len(one)), (one, two)), (len(kinds),) * 2), directed=False)[0]
+        return bool((np.count_nonzero(kinds, axis=0) <= 1).all()) and len(one) == len(kinds) - joined
 
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""

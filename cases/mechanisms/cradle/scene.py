@@ -128,24 +128,32 @@ def scene(parameters: Mapping[str, Value], mechanism: str, law: RowLaw) -> Scene
     kind, axis = kinds[mechanism]
     names = [f"ball {i}" for i in range(int(parameters["n"]))]
     placed = [(i * (2.0 * radius + gap), 0.0, -hung[2]) for i in range(len(names))]
+    reaches = [(b[0] - a[0] - gap, gap) for a, b in pairwise(placed)]  # 2 r as places are rounded: a gap of 0 is 0
+    between = zip(pairwise(names), reaches, strict=True)
     balls = zip(names, placed, masses(parameters).tolist(), strict=True)
     return Scene(
         bodies=tuple(Body(name=name, position=at, mass=mass, com=hung) for name, at, mass in balls),
         joints=tuple(Joint(name=name, body=name, type=kind, axis=axis) for name in names),
         shapes=tuple(Shape(name=name, body=name, size=(radius, 0.0, 0.0), position=hung) for name in names),
-        tendons=tuple(_between(pair, mechanism, (hung, hung), (radius, gap), law) for pair in pairwise(names)),
+        tendons=tuple(_between(mechanism, pair, hung, ends, law) for pair, ends in between),
         gravity=(0.0, 0.0, -float(parameters["gravity"]) if mechanism == "pendulums" else 0.0),
     )  # fmt: skip
 
 
-def _between(
-    pair: tuple[str, str], mechanism: str, points: tuple[Vector, Vector], size: tuple[float, float], law: RowLaw
-) -> Tendon:
-    """Return what lies between neighbours: a difference of coordinates, 0 of sliders that touch, or their distance."""
-    name = contact(pair)
+def _between(mechanism: str, pair: tuple[str, str], point: Vector, reach: tuple[float, float], law: RowLaw) -> Tendon:
+    """Return what lies between neighbours: a difference of coordinates, 0 of sliders that touch, or their distance.
+
+    Args:
+        mechanism: of the case.
+        pair: names of the neighbours.
+        point: where the ball is in its body, m.
+        reach: distance at which they touch, and their gap at rest, m.
+        law: of the row.
+    """
+    name, (touching, gap) = contact(pair), reach
     if mechanism == "sliders":
-        return Tendon(name=name, joints=pair, coefficients=(-1.0, 1.0), range=(-size[1], math.inf), law=law)
-    return Tendon(name=name, bodies=pair, positions=points, range=(2.0 * size[0], math.inf), law=law)
+        return Tendon(name=name, joints=pair, coefficients=(-1.0, 1.0), range=(-gap, math.inf), law=law)
+    return Tendon(name=name, bodies=pair, positions=(point, point), range=(touching, math.inf), law=law)
 
 
 def contact(pair: tuple[str, str]) -> str:
