@@ -110,7 +110,7 @@ def _solids(scene: Scene) -> dict[str, float]:
 def _elastic(scene: Scene) -> dict[str, tuple[float, float]]:
     """Return the solref of shapes of bodies that collide with each other, with the damping ratio of their law."""
     bodies = {shape.name: shape.body for shape in scene.shapes}
-    found = {}
+    found: dict[str, tuple[float, float]] = {}
     for pair in scene.pairs:
         if bodies[pair.first] and bodies[pair.second]:
             own = -USUAL, -2.0 * _ratio(pair.law) * USUAL**0.5

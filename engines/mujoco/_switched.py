@@ -212,7 +212,7 @@ class Switched(Rows):
         """
         at, rows = np.array(present).T
         first, kinds = self.nc - self.touching.count, (self.data.efc_type, self.data.efc_id)
-        acting = [(k, row, tuple(int(part[j]) for part in kinds)) for k, (j, row) in enumerate(present) if armed[row]]
+        acting = [(k, row, (int(kinds[0][j]), int(kinds[1][j]))) for k, (j, row) in enumerate(present) if armed[row]]
         pulled = [(k, row, kind) for k, row, kind in acting if kind in bent]
         touched = [(k, row) for k, row, _ in acting if row >= first]
         sign = [-1.0 if row == self.places.get((*kind, True)) else 1.0 for _, row, kind in pulled]

@@ -33,6 +33,8 @@ from crossbody.engines.mujoco._rows import Rows
 from crossbody.engines.mujoco._scene import Scene as Prepared
 from crossbody.engines.mujoco._switched import Switched
 
+FASTEST = 100.0
+"""Times the speed that a scene can have: a run has diverged."""
 SLOWEST, OF_RATE, OF_ROWS = 1e-3, 0.02, 0.05
 """Largest step of the matched profile, s, and the parts that it is of the fastest time constant of forces and of that
 of rows that open: Runge-Kutta 4 leaves (1/50)^4 a time constant, and rows act for a few of theirs."""
@@ -87,10 +89,14 @@ def default_step(case: Case, profile: str) -> float:
     if profile == "default":
         return float(mujoco.MjModel.from_xml_string("<mujoco/>").opt.timestep)
     case = followed(case, profile) or case
-    if not case.general:  # as long as its fastest row wants them: nothing else moves its bodies fast
-        return min(SLOWEST, resolving_step(case.law, _reach(case)[0] if case.law.a2.any() else 0.0))
     law, opening = case.law, case.law.unilateral
-    stiffness = law.a0 + 3.0 * law.a2 * (_reach(case)[0] if law.a2.any() else 0.0) ** 2
+    deep = 0.0
+    if law.a2.any():
+        model = matched(_scene(case))
+        deep = _reach(case, Switched(_scene(case), model, mujoco.MjData(model)))[0]
+    if not case.general:  # nothing but rows moves its bodies fast
+        return min(SLOWEST, resolving_step(law, deep))
+    stiffness = law.a0 + 3.0 * law.a2 * deep**2
     poles = [np.roots([1.0, a1, k]) for k, a1 in zip(stiffness[opening], law.a1[opening], strict=True)]
     rate = float(np.abs(np.concatenate([np.zeros(1), *poles])).max())
     return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
@@ -101,14 +107,11 @@ def followed(case: Case, profile: str) -> Case | None:
     return real_time(case) if profile == "matched" else None
 
 
-def _reach(case: Case) -> tuple[float, float]:
+def _reach(case: Case, rows: Switched) -> tuple[float, float]:
     """Return how deep rows get, m or rad, and how fast, by what drives them at the start."""
-    scene, law = _scene(case), case.law
-    model = matched(scene)
-    data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = case.q0, case.v0
-    h, hd, hdd = Switched(scene, model, data).approach()
-    deep, fast = depths(np.stack([law.a0, law.a1, law.a2]), h, hd, hdd, law.unilateral)
+    rows.data.qpos[:], rows.data.qvel[:] = case.q0, case.v0
+    law = case.law
+    deep, fast = depths(np.stack([law.a0, law.a1, law.a2]), *rows.approach(), law.unilateral)
     return float(deep.max(initial=0.0)), float(fast.max(initial=0.0))
 
 
@@ -178,7 +181,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     prepared = Prepared(
         model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting, driver),
         modes=rows.modes, lam=rows.lam,
-        safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
+        safe=_guard(followed(case, profile) or case, data, rows),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
         hook=_hook(scene, switched, driver) if switched else None,
@@ -189,6 +192,21 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
     prepared.audit = _audit(case, profile, scene, model, rows)
     return prepared
+
+
+def _guard(case: Case, data: Any, rows: Rows) -> Callable[[], bool]:
+    """Return what tells whether a state is finite and not 100 times faster than what drives the start explains.
+
+    Of a robot nobody knows what its inputs will do.
+    """
+    rates: Floats = data.qvel
+    if case.general:
+        return lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(rates).all())
+    speed = _reach(case, rows)[1] if isinstance(rows, Switched) else 0.0
+    data.qpos[:], data.qvel[:] = case.q0, case.v0
+    mujoco.mj_forward(rows.model, data)
+    fastest = FASTEST * (speed + float((np.abs(rates) + np.abs(data.qacc_smooth) * case.t_end).max())) or np.inf
+    return lambda: bool(np.abs(rates).max() < fastest)
 
 
 def _scene(case: Case) -> Scene:
