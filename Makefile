@@ -36,7 +36,7 @@ strict: $(READY)
 	$(BIN)/crossbody run --strict --out build/strict
 
 bands: $(READY)
-	$(BIN)/python -m crossbody.reports.judging.stored
+	$(BIN)/python -m crossbody.reports.commands.bands
 
 check: $(READY)
 	$(BIN)/ruff check .

@@ -20,6 +20,7 @@ from crossbody.cases.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from crossbody.cases.control import Control
+    from crossbody.cases.metric import CaseMetric
     from crossbody.cases.scene import Scene
 
 Value = float | int | str | bool
@@ -186,8 +187,8 @@ class Limit:
     """How large one metric may be for one engine and profile, and why.
 
     Attributes:
-        metric: name of a metric in reports/metrics; "*" for a known property that shows in any of them, with no value
-            of its own.
+        metric: name of a metric of every case (reports/metrics) or of this one; "*" for a known property that shows in
+            any of them, with no value of its own.
         value: the largest absolute value that is still within, in the metric's unit.
         engine, profile: which runs it judges; "*" is any.
         why: the reason for the number.
@@ -264,6 +265,7 @@ class Case:
         inputs: what acts from outside; None for nothing.
         control: a callable of the user's own that gives a scene's controls at its ticks, beside the inputs.
         claims: numbers that must come out.
+        metrics: numbers that runs of this case show beside those that every case has, by name.
         limits: how far engines may be from the truth.
         act0 (na,): activations at the start, of those actuators of the scene that have one; 0 if not given.
         rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
@@ -294,6 +296,7 @@ class Case:
     inputs: Inputs | None = None
     control: Control | None = None
     claims: tuple[Claim, ...] = ()
+    metrics: Mapping[str, CaseMetric] = field(default_factory=lambda: MappingProxyType({}))
     limits: tuple[Limit, ...] = ()
     discrete: tuple[str, ...] = ()
     tight: float = 1e-13
@@ -327,6 +330,7 @@ class Case:
         self._put_control()
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+        object.__setattr__(self, "metrics", MappingProxyType(dict(self.metrics)))
 
     def _put_control(self) -> None:
         """Tell a controller its inputs, and bring its ticks to the horizon and to the instants of the other inputs."""

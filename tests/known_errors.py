@@ -11,9 +11,9 @@ import numpy as np
 
 from crossbody import engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
+from crossbody.cases.contacts import AT_REST, CLOSED, LIGHT
 from crossbody.cases.mechanisms.delta import pose
-from crossbody.reports.judging.truth import Truth, from_run, sample_times
-from crossbody.reports.metrics._contacts import AT_REST, CLOSED, LIGHT
+from crossbody.reports.measuring.truth import Truth, from_run, sample_times
 
 OFF = 1e-3
 """Size of an error, over what it is measured by."""
@@ -333,7 +333,7 @@ def opened(s: Scene) -> tuple[Trajectory, float]:
 
 def aside(s: Scene) -> tuple[Trajectory, float]:
     """The flange beside its place at one sample."""
-    from crossbody.reports.metrics._delta import flange
+    from crossbody.cases.mechanisms.delta.metrics import flange
 
     p = {name: float(x) for name, x in s.case.parameters.items() if not isinstance(x, str)}
     k, way = s.sample(), np.zeros(3)

@@ -9,10 +9,10 @@ import numpy as np
 from known_errors import OFF, Known, Scene, changed, channel
 
 from crossbody.cases import Event, Mode, Switch, Trajectory
+from crossbody.cases.contacts import CLOSED
+from crossbody.cases.mechanisms.cradle.metrics import row
 from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.cases.mechanisms.red_body.order import STAGES
-from crossbody.reports.metrics._contacts import CLOSED
-from crossbody.reports.metrics._cradle import row
 
 
 def drawn(s: Scene, signal: str, low: float = -1.0, high: float = 1.0) -> Trajectory:
@@ -255,7 +255,6 @@ VALUES: dict[str, tuple[str, Known]] = {
     "pattern_distance": ("sliders", pattern),
     "pattern_distance of pendulums": ("pendulums", swung),
     "peak_lam3": ("box", peak(2)),
-    "peak_lam4": ("box", peak(3)),
     "penetration": ("box", value("gap", lambda _, run: -run.gap.min())),
     "rate_residual": ("box", faster),
     "ring_changes": ("maze", rings),

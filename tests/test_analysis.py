@@ -313,7 +313,7 @@ def test_every_place_of_a_case_is_an_equilibrium(name, variant):
 
 
 def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
-    from crossbody.reports.analysis.command import analyse as command
+    from crossbody.reports.commands.analyse import analyse as command
 
     out = tmp_path / "out"
     common = {"bode": True, "mapped": False, "out": out, "command": "crossbody analyse"}

@@ -14,8 +14,8 @@ from crossbody.cases import CaseUnsupported
 from crossbody.engines.linear import Chart
 from crossbody.reference.linear.differences import differences
 from crossbody.reports.analysis import counterparts as work
-from crossbody.reports.analysis.command import analyse
 from crossbody.reports.analysis.places import places
+from crossbody.reports.commands.analyse import analyse
 
 mujoco, pinocchio = (pytest.importorskip(name) for name in ("mujoco", "pinocchio"))
 SCENES = [

@@ -9,8 +9,8 @@ import pytest
 from numba import njit
 
 from crossbody.reference import delta
+from crossbody.reference.delta.kernels.robot import solve
 from crossbody.reference.linear import _many, _pattern, poses
-from crossbody.reference.systems.delta import solve
 
 ROBOT = delta.LIGHT
 

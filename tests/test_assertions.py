@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, Trajectory
-from crossbody.reports.judging.truth import sample_times
+from crossbody.reports.measuring.truth import sample_times
 from crossbody.reports.testing import Baseline, assert_agrees, assert_energy
 from crossbody.reports.testing._baseline import place
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Mode, Trajectory
-from crossbody.reports.judging._between import between
+from crossbody.cases.between import between
 
 
 def pieces(rng: np.random.Generator, twice: bool) -> tuple[Trajectory, np.ndarray, list[np.ndarray]]:

@@ -10,12 +10,12 @@ import pytest
 
 from crossbody import engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory
+from crossbody.cases.contacts import contacts
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Actuator, Body, Joint, Loop, Scene
 from crossbody.engines.mujoco import _switched
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import from_run
-from crossbody.reports.metrics._contacts import contacts
+from crossbody.reports.measuring.truth import from_run
 
 ENGINES = (("reference", "compiled"), ("reference", "cvode"), ("mujoco", "matched"), ("pinocchio", "law"))
 LEAST, MOST = -9.0, 0.0

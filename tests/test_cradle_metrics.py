@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
+from crossbody.cases import Case, Event, InvalidValue, Mode, Tier, Trajectory, load
+from crossbody.cases.mechanisms.cradle.metrics import row
 from crossbody.cases.mechanisms.cradle.rules import answer
+from crossbody.cases.metric import CaseMetric
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import from_run
-from crossbody.reports.metrics._cradle import row
+from crossbody.reports.measuring.truth import from_run
 
 PATTERNS = {
     "pattern_distance": "sequential", "pattern_simultaneous": "simultaneous", "pattern_linear": "linear",
@@ -33,7 +35,7 @@ def leaving(case: Case, speeds: np.ndarray) -> Trajectory:
 
 
 def measure(name: str, run: Trajectory, case: Case) -> float | None:
-    return metrics.load(name).measure(from_run(run, Tier.D, "itself"), run, case)
+    return metrics.of(case)[name].measure(from_run(run, Tier.D, "itself"), run, case)
 
 
 @pytest.mark.parametrize("metric", PATTERNS)
@@ -90,9 +92,19 @@ def test_energy_of_switching_needs_one_stiffness_in_real_time(case: Case) -> Non
 
 @pytest.mark.parametrize("metric", [*PATTERNS, "balls_out", "momentum", "energy_created"])
 def test_other_mechanisms_have_no_pattern(metric: str) -> None:
-    ball = load("bouncing_ball", "linear")
-    assert ball.closed_form is not None
-    assert measure(metric, ball.closed_form(np.linspace(0.0, 1.0, 5)), ball) is None
+    assert metric not in metrics.of(load("bouncing_ball", "linear"))
+
+
+def test_a_metric_of_a_case_has_a_name_of_its_own() -> None:
+    case = load("newtons_cradle")
+    with pytest.raises(InvalidValue, match=r"metrics position have the names of metrics that every case has"):
+        metrics.of(replace(case, metrics={"position": case.metrics["balls_out"]}))
+
+
+@pytest.mark.parametrize("given", [{}, {"number": len, "signal": len}])
+def test_a_metric_of_a_case_is_one_function(given: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValue, match="has one of number, signal and instants"):
+        CaseMetric(doc="", **given)
 
 
 def test_pendulums_are_judged_when_the_first_collisions_are_over() -> None:

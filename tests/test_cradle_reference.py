@@ -16,16 +16,17 @@ from scipy.special import ellipk
 
 from crossbody.cases import Case, Outcome, Tier, Trajectory, load
 from crossbody.cases import closed_forms as cf
+from crossbody.cases.mechanisms.cradle.metrics import row
 from crossbody.cases.mechanisms.cradle.motion import Motion
 from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.engines import load as engine
 from crossbody.reference import Options, prepare
 from crossbody.reference.systems import sliders
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import PARTED, from_run, truth_of
+from crossbody.reports.judging.truth import PARTED, truth_of
 from crossbody.reports.maps.gapmap import over
-from crossbody.reports.metrics._cradle import row
-from crossbody.reports.metrics._switching import made
+from crossbody.reports.measuring.switching import made
+from crossbody.reports.measuring.truth import from_run
 
 
 def run(case: Case, **settings: Any) -> Trajectory:
@@ -192,8 +193,8 @@ def test_touching_pendulums_collide_at_quarters_of_the_period(k: int) -> None:
     assert len(clusters) == 10
     np.testing.assert_allclose(clusters, expected, atol=1e-9)
     np.testing.assert_allclose(found.total_energy, found.total_energy[0], rtol=1e-9)
-    assert metrics.load("balls_out").measure(from_run(found, Tier.D, ""), found, case) == k
-    pattern = metrics.load("pattern_distance").measure(from_run(found, Tier.D, ""), found, case)
+    assert metrics.of(case)["balls_out"].measure(from_run(found, Tier.D, ""), found, case) == k
+    pattern = metrics.of(case)["pattern_distance"].measure(from_run(found, Tier.D, ""), found, case)
     assert pattern == pytest.approx(0.0, abs=1e-8)
 
 

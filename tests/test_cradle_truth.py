@@ -15,7 +15,7 @@ from crossbody.cases.mechanisms.cradle.rules import RULES, answer, block, simult
 from crossbody.cases.mechanisms.cradle.scene import Row
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import judged
-from crossbody.reports.judging.truth import from_run, sample_times
+from crossbody.reports.measuring.truth import from_run, sample_times
 from crossbody.reports.runs import jobs
 
 ONE = Row(masses=np.full(5, 0.1), lifted=1, speed=1.0, gap=0.0, a0=1e6, zeta=0.0)

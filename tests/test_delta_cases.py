@@ -15,10 +15,10 @@ from crossbody.reference.delta import scene
 from crossbody.reference.delta.kinematics import tips
 from crossbody.reference.delta.singularity import hanging_pose
 from crossbody.reference.delta.statics import closure_jacobian, gravity_gradient
+from crossbody.reports import metrics
 from crossbody.reports.cli import main
 from crossbody.reports.judging.comparison import compare
-from crossbody.reports.judging.truth import from_run
-from crossbody.reports.metrics import load as metric
+from crossbody.reports.measuring.truth import from_run
 
 REFERENCE = engines.load("reference")
 each_impulse = pytest.mark.parametrize("variant", cases.variants("delta_impulse"))
@@ -112,7 +112,7 @@ def test_swing_at_the_elbow_pose_has_the_period_of_the_closed_form(variant: str)
     assert run.outcome.ok, run.message
     x = delta.flanges(robot, run.q[run.t > 12.0])[:, 0]
     assert 0.0 < np.abs(x).max() < (0.02 if variant == "heavy" else 0.05) * robot.l2
-    period = metric("swing_period").measure(from_run(run, Tier.D, "itself"), run, case)
+    period = metrics.of(case)["swing_period"].measure(from_run(run, Tier.D, "itself"), run, case)
     assert period == pytest.approx(pose.swing_period(numbers(case)), rel=5e-3)
     H = closure_jacobian(robot, run.q[-1])
     assert np.linalg.matrix_rank(H, tol=1e-6) == 6
@@ -192,10 +192,12 @@ def test_truth_of_a_chaotic_fall_is_trusted_until_its_sources_part() -> None:
     assert truth.growth > 0.0
     assert f"{truth.parted:.4g}" in truth.source
     run = REFERENCE.prepare(case, rtol=1e-6).run()
-    parted = metric("divergence_time").measure(truth, run, case)
+    parted = metrics.load("divergence_time").measure(truth, run, case)
     assert parted is not None
     assert 0.5 < parted <= truth.trusted
-    assert metric("divergence_time").measure(truth, truth.trajectory, case) == pytest.approx(truth.trusted, abs=0.01)
+    assert metrics.load("divergence_time").measure(truth, truth.trajectory, case) == pytest.approx(
+        truth.trusted, abs=0.01
+    )
 
 
 BAD: list[tuple[str, dict[str, Any], str]] = [

@@ -16,9 +16,9 @@ from crossbody.cases import InvalidValue
 from crossbody.reference import delta
 from crossbody.reference.delta import control, paths
 from crossbody.reference.delta.control import Gains, Linearising, Proportional, Sampling
+from crossbody.reference.delta.kernels import control as compiled
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS
-from crossbody.reference.systems import _delta_control as compiled
-from crossbody.reference.systems import delta as kernels
 
 LAW = np.tile([25.0, 10.0, 0.0], (6, 1))
 ROBOTS = [replace(robot, sign=sign) for robot in delta.SETS.values() for sign in (1.0, -1.0)]

@@ -11,7 +11,7 @@ import pytest
 from crossbody.cases import Law
 from crossbody.engines._delta import chart
 from crossbody.reference import delta
-from crossbody.reference.systems import delta as kernels
+from crossbody.reference.delta.kernels import robot as kernels
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("pinocchio")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from crossbody.reference import delta
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.delta.robot import Servo
-from crossbody.reference.systems import delta as kernels
 
 STEP = 1e-30
 ROBOTS = [

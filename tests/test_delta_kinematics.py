@@ -11,11 +11,11 @@ from numba import njit
 
 from crossbody.cases import InvalidValue, SceneError
 from crossbody.reference import delta
+from crossbody.reference.delta.kernels import kinematics as compiled
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS, tips
 from crossbody.reference.delta.singularity import hanging_pose
 from crossbody.reference.delta.statics import closure_jacobian, gravity_gradient
-from crossbody.reference.systems import _delta_kinematics as compiled
-from crossbody.reference.systems import delta as kernels
 
 ROBOTS = [replace(robot, sign=sign) for robot in delta.SETS.values() for sign in (1.0, -1.0)]
 CENTRES = np.array([[0.0, 0.0, 0.6], [0.1, -0.05, 0.55], [-0.12, 0.1, 0.65], [0.02, 0.15, 0.5], [-0.05, -0.2, 0.6]])

@@ -13,11 +13,11 @@ from crossbody import cases
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta import control, paths
 from crossbody.reference.delta.control import Gains, Linearising, Proportional, Sampling
+from crossbody.reference.delta.kernels import control as compiled
+from crossbody.reference.delta.kernels.robot import solve
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS
 from crossbody.reference.delta.loop import characteristic, closed_loop
 from crossbody.reference.linear import linearise
-from crossbody.reference.systems import _delta_control as compiled
-from crossbody.reference.systems.delta import solve
 from crossbody.reports.analysis.numbers import coefficients
 from crossbody.reports.analysis.places import places
 

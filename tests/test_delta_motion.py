@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 from crossbody.cases import InvalidValue, Law, Outcome, SceneError
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta import control, kick, paths, system
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS
 from crossbody.reference.delta.singularity import hanging_pose
-from crossbody.reference.systems import delta as kernels
 
 P = 5.0
 

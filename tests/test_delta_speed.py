@@ -9,9 +9,9 @@ import pytest
 from numba import njit
 
 from crossbody.reference import delta
+from crossbody.reference.delta.kernels import kinematics as kinematics
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS
-from crossbody.reference.systems import _delta_kinematics as kinematics
-from crossbody.reference.systems import delta as kernels
 
 pytestmark = pytest.mark.bench
 solve, update = kernels.solve, kinematics.update

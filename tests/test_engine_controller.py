@@ -9,9 +9,9 @@ from crossbody import cases
 from crossbody.engines._delta import torque
 from crossbody.engines._delta.controller import controller
 from crossbody.reference.delta import control, scene
+from crossbody.reference.delta.kernels import kinematics as kinematics
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.delta.kinematics import inverse
-from crossbody.reference.systems import _delta_kinematics as kinematics
-from crossbody.reference.systems import delta as kernels
 
 VARIANTS = [("circle", "exact"), ("circle", "approximate"), ("pd", "exact")]
 

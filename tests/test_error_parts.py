@@ -18,8 +18,8 @@ from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
-from crossbody.reports.judging.truth import Truth, from_run
 from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.measuring.truth import Truth, from_run
 from crossbody.reports.runs import jobs
 
 BIPED = Path(__file__).parents[2] / "shared" / "data" / "robots" / "agility_cassie" / "cassie.xml"

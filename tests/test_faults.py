@@ -10,11 +10,12 @@ import pytest
 
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Mode, Outcome, Tier, Trajectory, UnknownName, load
 from crossbody.cases.arrays import Floats
+from crossbody.cases.contacts import CLOSED
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
-from crossbody.reports.judging.truth import Truth, _held_against, truth_of
+from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
-from crossbody.reports.metrics._contacts import CLOSED
+from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import jobs
 
 Fault = Callable[[Trajectory], Trajectory]
@@ -211,10 +212,10 @@ def test_a_claimed_number_that_is_missing_is_outside(recorded: Recorded) -> None
         assert "fifth_exit" in _outside(claimed, entry, truth)
 
 
-@pytest.mark.parametrize("metric", ["ring_changes", "largest position (model)"])
+@pytest.mark.parametrize("metric", ["collision_impulse", "largest position (model)"])
 def test_a_claim_that_judged_nothing_is_reported(metric: str, recorded: Recorded) -> None:
     case, truth, entries = recorded["bouncing_ball", "listing"]
-    claim = Claim(metric=metric, expected=4.0, tier=Tier.B, source="another mechanism")
+    claim = Claim(metric=metric, expected=4.0, tier=Tier.B, source="nothing collides in no time")
     alone = replace(entries["reference:compiled"], study=None)
     rows = judged(replace(case, claims=(*case.claims, claim)), [alone], truth, "")
     assert [row.metric for row in rows if row.verdict == Word.OUTSIDE] == [metric]
@@ -227,11 +228,12 @@ def test_a_claim_that_judged_nothing_is_reported(metric: str, recorded: Recorded
         ({"limits": (Limit(metric="position", value=1.0, engine="referense"),)}, UnknownName),
         ({"limits": (Limit(metric="position", value=-1.0),)}, InvalidValue),
         ({"claims": (Claim(metric="kontakts", expected=1.0, tier=Tier.A, source=""),)}, UnknownName),
+        ({"claims": (Claim(metric="ring_changes", expected=1.0, tier=Tier.A, source="a maze"),)}, UnknownName),
     ],
 )
 def test_names_in_claims_and_limits_exist(change: dict[str, object], error: type[Exception]) -> None:
     case = replace(load("bouncing_ball", "linear"), **change)  # type: ignore[arg-type]
-    with pytest.raises(error, match=r"kontakts|referense|-1"):
+    with pytest.raises(error, match=r"kontakts|referense|-1|ring_changes"):
         judged(case, [], truth_of(case), "")
 
 

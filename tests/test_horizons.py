@@ -18,8 +18,8 @@ from crossbody.engines.mujoco import soft_delta as robot
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.truth import _tight, truth_of
 from crossbody.reports.judging.verdict import limit_for
-from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.runs import jobs
 
 MAZES = cases.variants("ball_maze")

@@ -19,13 +19,13 @@ from scipy.spatial.transform import Rotation
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError
+from crossbody.cases.contacts import contacts as touched
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES, contacts, watched
 from crossbody.engines._contacts import Contacts
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.reports.cli import main
-from crossbody.reports.metrics._contacts import contacts as touched
 
 GRAVITY = 9.81
 LAW = RowLaw(a0=1e4, a1=20.0)

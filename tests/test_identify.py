@@ -11,7 +11,7 @@ from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw import models
 from crossbody.hw.fitting.derivative import Exact, apart
 from crossbody.hw.models._contract import Segment
-from crossbody.hw.replaying.windows import windows
+from crossbody.hw.windows.window import windows
 
 TRUE = {"k1": 5e-4, "s1": 8e-4, "k2": 2e-4, "s2": 3e-4, "slip": 0.05}
 

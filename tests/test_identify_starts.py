@@ -17,7 +17,7 @@ from crossbody.hw import models
 from crossbody.hw.fitting import deadline
 from crossbody.hw.fitting.derivative import Exact
 from crossbody.hw.fitting.start_noise import moves
-from crossbody.hw.replaying.windows import windows
+from crossbody.hw.windows.window import windows
 
 NOISE = 1e-3
 STEP = 5e-3

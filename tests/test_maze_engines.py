@@ -34,7 +34,7 @@ def run(engine, profile, variant, dt=None, **parameters):
 
 
 def measured(name, case, motion):
-    return metrics.load(name).measure(NO_TRUTH, motion, case)
+    return metrics.of(case)[name].measure(NO_TRUTH, motion, case)
 
 
 def ring_times(motion):

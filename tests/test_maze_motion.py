@@ -50,7 +50,7 @@ def test_a_cap_touches_the_flat_end_of_its_wall_and_both_faces(seed):
 
 
 def measure(name, motion, case):
-    return metrics.load(name).measure(None, motion, case)
+    return metrics.of(case)[name].measure(None, motion, case)
 
 
 def ledger_residual(motion):

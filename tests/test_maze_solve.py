@@ -14,7 +14,8 @@ from crossbody.cases import closed_forms as cf
 from crossbody.cases.mechanisms.maze import closed_forms as maze_forms
 from crossbody.reference import simulate
 from crossbody.reference.systems import maze
-from crossbody.reports import commands, metrics
+from crossbody.reports import metrics
+from crossbody.reports.commands import maps
 from crossbody.reports.maps import stability
 from crossbody.reports.runs import jobs
 
@@ -195,7 +196,7 @@ def test_map_is_a_command_with_a_section_of_the_page(tmp_path, monkeypatch, caps
     points = (stability.Point(change="omega", parameters={"omega": 0.8}), stability.Point(change="default"))
     absent = stability.Point(change="t_end", parameters={"t_end": 2.0})
     monkeypatch.setattr(stability, "POINTS", (*points, absent))
-    assert commands.stability_map((), tmp_path / "out", "crossbody stability") == 1
+    assert maps.stability_map((), tmp_path / "out", "crossbody stability") == 1
     said = capsys.readouterr().out
     assert "outside: reference:compiled t_end = 2: solved expected." in said
     page = (tmp_path / "out" / "index.html").read_text()
@@ -218,12 +219,13 @@ def test_metrics_of_ring_changes_compare_run_and_truth():
         trajectory = solved(1e-10)
 
     case = load("ball_maze", variant="solve")
-    assert metrics.load("ring_changes").measure(Truth, solved(), case) == 4.0
-    assert 0.0 < metrics.load("ring_change_times").measure(Truth, solved(), case) < 1e-6
-    assert metrics.load("ring_change_times").measure(Truth, solved(u_max=0.02), case) is None
-    ball = load("bouncing_ball")
-    for name in ("ring_changes", "ring_change_times", "leave_angle", "unstable_pole"):
-        assert metrics.load(name).measure(Truth, solved(), ball) is None
+    own = metrics.of(case)
+    assert own["ring_changes"].measure(Truth, solved(), case) == 4.0
+    assert 0.0 < own["ring_change_times"].measure(Truth, solved(), case) < 1e-6
+    assert own["ring_change_times"].measure(Truth, solved(u_max=0.02), case) is None
+    assert not {"ring_changes", "ring_change_times", "leave_angle", "unstable_pole"} & set(
+        metrics.of(load("bouncing_ball"))
+    )
 
 
 @pytest.mark.parametrize(

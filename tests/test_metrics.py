@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, Ledger, Tier, Trajectory, load
+from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import Truth, from_run, sample_times, truth_of
-from crossbody.reports.metrics._align import clock
-from crossbody.reports.metrics._contacts import contacts
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring.alignment import clock
+from crossbody.reports.measuring.truth import Truth, from_run, sample_times
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +82,7 @@ def test_scaled_force_scales_the_impulse_error(truth: Truth, case: Case) -> None
 
 
 def test_impulse_is_the_momentum_that_the_floor_gave(truth: Truth, case: Case) -> None:
-    from crossbody.reports.metrics._impulse import cumulative
+    from crossbody.reports.measuring.impulse import cumulative
 
     given = cumulative(truth.trajectory)[-1, 0]
     momentum = truth.trajectory.v[-1, 0] - truth.trajectory.v[0, 0] + 9.81 * case.t_end

@@ -11,13 +11,13 @@ from known_values import VALUES
 
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
+from crossbody.cases.contacts import contacts
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import Truth, from_run
-from crossbody.reports.metrics._align import matched
-from crossbody.reports.metrics._contacts import contacts
-from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.measuring.alignment import matched
+from crossbody.reports.measuring.impulse import with_collisions
+from crossbody.reports.measuring.truth import Truth, from_run
 from crossbody.reports.sweep.measure import residual
 
 SEEDS = range(8)
@@ -25,7 +25,7 @@ SEEDS = range(8)
 
 
 def measure(name: str, case: Case, truth: Truth, run: Trajectory) -> float:
-    value = metrics.load(name).measure(truth, run, case)
+    value = metrics.of(case)[name].measure(truth, run, case)
     assert value is not None
     return value
 
@@ -110,8 +110,9 @@ def test_every_metric_that_judges_is_held_against_a_known_error() -> None:
     judging = set[str]()
     for name in cases.names():
         for case in (load(name, variant) for variant in cases.variants(name)):
-            judging |= {each.metric.split()[0] for each in (*limits_of(case), *case.claims)}
-    assert (judging & set(metrics.names())) - {"tracking_error"} <= {name.split()[0] for name in (ERRORS | VALUES)}
+            asked = {each.metric.split()[0] for each in (*limits_of(case), *case.claims)}
+            judging |= asked & set(metrics.of(case))
+    assert judging - {"tracking_error"} <= {name.split()[0] for name in (ERRORS | VALUES)}
 
 
 @pytest.fixture(scope="module")

@@ -21,17 +21,17 @@ from ladder import ladder
 
 from crossbody.cases import OutputError, load
 from crossbody.reports.bench.order import observed_order
+from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.judging.comparison import Entry, table
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.pages import figures, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import file_name
-from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns
-from crossbody.reports.pages.thin import keep
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
+from crossbody.reports.runs.thin import keep
 
 HOSTILE = "<script>alert(1)</script>"
 LIMIT = 1.5e6

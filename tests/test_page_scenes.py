@@ -16,7 +16,7 @@ from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Trajectory
 from crossbody.cases.mechanisms.maze.geometry import maze_of
 from crossbody.reports import scenes
-from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.pages.case_page import PLOTTED
 from crossbody.reports.pages.figures import FIGURES, points_for
 from crossbody.reports.pages.playback import chosen, packed, peaks, playback

@@ -17,7 +17,7 @@ from crossbody import engines, hw
 from crossbody.cases import InvalidValue, Limit
 from crossbody.hw.models._contract import Segment
 from crossbody.reports.cli import main
-from crossbody.reports.replay import command
+from crossbody.reports.commands import replay as command
 from crossbody.reports.replay.comparison import verdicts
 from crossbody.reports.runs import watch
 

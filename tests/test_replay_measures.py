@@ -8,10 +8,10 @@ import pytest
 from crossbody.cases import InvalidValue
 from crossbody.hw import Sensor, unlagged
 from crossbody.hw.replaying import measures as _measures
-from crossbody.hw.replaying.impacts import Impacts, impacts, least_of, matched
-from crossbody.hw.replaying.rates import derivatives, felt
 from crossbody.hw.replaying.sensors import lagged
-from crossbody.hw.replaying.whiteness import autocorrelation, crosscorrelation
+from crossbody.hw.windows.impacts import Impacts, impacts, least_of, matched
+from crossbody.hw.windows.rates import derivatives, felt
+from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
 
 STEP = 0.88e-3
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from crossbody import engines, hw
 from crossbody.cases import SceneError
 from crossbody.hw.models._contract import Segment
-from crossbody.hw.replaying.windows import windows
+from crossbody.hw.windows.window import windows
 
 
 def minimal(p, th, w, times):

@@ -8,12 +8,12 @@ import pytest
 from crossbody import cases
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, UnknownName
 from crossbody.cases.mechanisms.soft import closed_forms as closed
+from crossbody.cases.mechanisms.soft.metrics import invariant
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.engines import load
 from crossbody.reference import simulate
 from crossbody.reference.systems import soft_contact as mechanism
-from crossbody.reports.metrics import _soft
-from crossbody.reports.metrics import load as metric
+from crossbody.reports import metrics
 
 STEP = 1e-30
 
@@ -108,7 +108,7 @@ def test_the_robot_moves_and_not_the_block(pushed, felt):
 @pytest.mark.parametrize("kstar", [0.0, 5.0, 20.0])
 def test_what_the_loop_keeps(kstar):
     case, found = run(kstar=kstar, offset=-5e-3)
-    kept = _soft.invariant(found, case)
+    kept = invariant(found, case)
     assert np.abs(kept - kept[0]).max() < 1e-12
 
 
@@ -130,7 +130,7 @@ def test_claims_come_out(pushed, felt):
         assert {c.metric for c in case.claims} >= {"touch_left", "touch_right", "tactile_invariant"}
         allowed = {limit.metric: limit.value for limit in case.limits}
         for claim in case.claims:
-            value = metric(claim.metric).measure(None, found, case)
+            value = metrics.of(case)[claim.metric].measure(None, found, case)
             assert abs(value - claim.expected) <= allowed[claim.metric], claim.metric
 
 

@@ -13,7 +13,7 @@ from crossbody.reference import delta
 from crossbody.reference.linear import linearise
 from crossbody.reference.systems import delta as arms
 from crossbody.reference.systems import soft_delta as mechanism
-from crossbody.reports.metrics import load as metric
+from crossbody.reports import metrics
 
 STEP = 1e-30
 MOTORS = [0, 3, 6]
@@ -120,7 +120,7 @@ def test_touches_are_those_of_the_axis(kstar, pushed, felt):
     axis = load("reference").prepare(cases.load("soft_contact", "axis", kstar=kstar), rtol=1e-8).run()
     for side in ("left", "right"):
         mine, alone = (
-            metric(f"touch_{side}").measure(None, motion, scene)
+            metrics.of(scene)[f"touch_{side}"].measure(None, motion, scene)
             for motion, scene in ((found, case), (axis, cases.load("soft_contact", "axis", kstar=kstar)))
         )
         assert mine == pytest.approx(alone, abs=1e-3)
@@ -157,7 +157,7 @@ def test_claims_come_out(pushed, felt):
         allowed = {limit.metric: limit.value for limit in case.limits}
         assert {c.metric for c in case.claims} >= {"touch_left", "touch_right", "tactile_invariant"}
         for claim in case.claims:
-            value = metric(claim.metric).measure(None, found, case)
+            value = metrics.of(case)[claim.metric].measure(None, found, case)
             assert abs(value - claim.expected) <= allowed[claim.metric], (claim.metric, value)
 
 

@@ -21,11 +21,11 @@ import pytest
 
 from crossbody.cases import OutputError, SchedulerUnavailable
 from crossbody.reports.cli import main
+from crossbody.reports.commands.stress import Ask, Pool, plan, sweep
 from crossbody.reports.runs.output import folder
 from crossbody.reports.suites._axis import Log
 from crossbody.reports.suites._contract import Family, Suite
 from crossbody.reports.sweep import draw, pools
-from crossbody.reports.sweep.command import Ask, Pool, plan, sweep
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.store import Store, identity
 

@@ -15,7 +15,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Outcome, Tier
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import from_run
+from crossbody.reports.measuring.truth import from_run
 
 
 def squatting(seed: int) -> tuple[Case, int]:

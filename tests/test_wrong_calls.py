@@ -19,11 +19,10 @@ from crossbody.engines.equations import system_of
 from crossbody.reference import simulate
 from crossbody.reports import cli, commands
 from crossbody.reports.analysis import bode
-from crossbody.reports.analysis import command as analyse
 from crossbody.reports.bench import measure, skip, throughput
+from crossbody.reports.commands import analyse, stress
 from crossbody.reports.maps import gapmap, stability
 from crossbody.reports.runs import jobs
-from crossbody.reports.sweep import command as stress
 
 LOG_CALLS = 300
 

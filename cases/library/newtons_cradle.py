@@ -16,6 +16,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
 from crossbody.cases.files.case import law_of
 from crossbody.cases.mechanisms.cradle.limits import limits
+from crossbody.cases.mechanisms.cradle.metrics import METRICS, SLIDING
 from crossbody.cases.mechanisms.cradle.motion import Motion
 from crossbody.cases.mechanisms.cradle.scene import FROZEN, Row, law, row, scene
 from crossbody.cases.parameters import NumberOrWord, Numbers
@@ -117,6 +118,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         collisions=rule,
         closed_form=motion if sliders and rule in FROZEN else None,
         claims=claims,
+        metrics={**METRICS, **(SLIDING if sliders else {})},
         limits=limits(mechanism, rule, balls.gap, claims),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

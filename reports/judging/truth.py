@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,8 @@ from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Outcome, T
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
-from crossbody.reports.judging._between import between
-from crossbody.reports.judging.modes import violated
+from crossbody.reports.measuring.modes import violated
+from crossbody.reports.measuring.truth import Truth, sample_times
 
 if TYPE_CHECKING:
     from crossbody.engines import Run
@@ -45,62 +44,6 @@ AGREES = STEPS * GROWTH
 """Largest disagreement of the two, in units of the looser tolerance; it is never more than `PARTED`."""
 GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Truth:
-    """A motion that is taken to be right.
-
-    Attributes:
-        tier: how it is known.
-        source: in words, with the agreement of tier C.
-        trajectory: the motion, dense enough to plot, both sides of every event.
-        at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
-        agreement: metric -> how far the two sources of tier C are apart; empty for the others.
-        trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
-        parted: when the two sources part, s; infinite if they never do.
-        allowed: largest disagreement of the two sources, relative; NaN where there is one source alone.
-        growth: rate at which the two part, 1/s; NaN unless they do.
-        grows: how many times more than in free flight an error of the start grows; 1 where it was not measured.
-        tight: tolerance of the compiled run; NaN of another source.
-        joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
-            each other and rest unloaded.
-    """
-
-    tier: Tier
-    source: str
-    trajectory: Trajectory
-    at: Callable[[Floats], Trajectory]
-    agreement: dict[str, float]
-    trusted: float = math.inf
-    parted: float = math.inf
-    allowed: float = math.nan
-    growth: float = math.nan
-    tight: float = math.nan
-    grows: float = 1.0
-    joined: bool = False
-
-
-def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
-    """Times that show a motion: a grid, more of them from each event to the next if that is short, events twice.
-
-    Args:
-        run: whose events.
-        t_end: horizon, s.
-        grid: points on the horizon.
-        inside: points on each interval between events that is shorter than a tenth of the horizon.
-    """
-    events = np.array([e.t for e in run.events if e.t <= t_end])
-    parts = [np.linspace(0.0, t_end, grid)]
-    edges = np.unique(np.concatenate([[0.0], events, [t_end]]))
-    parts += [np.linspace(a, b, inside)[1:-1] for a, b in pairwise(edges) if b - a < 0.1 * t_end]
-    times: Floats = np.sort(np.concatenate([np.unique(np.concatenate([*parts, events])), events]))
-    return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
-
-
-def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:
-    """A run as the truth for others: an engine refined against itself, or a measurement."""
-    return Truth(tier=tier, source=source, trajectory=run, at=between(run), agreement={})
 
 
 def truth_of(case: Case) -> Truth:
@@ -318,8 +261,8 @@ def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> 
 
 def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats]:
     """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
-    from crossbody.reports.metrics._align import aligned
-    from crossbody.reports.metrics._scale import RESTS
+    from crossbody.reports.measuring.alignment import aligned
+    from crossbody.reports.measuring.scale import RESTS
 
     inside, exact = aligned(truth, second)
     scale = max(float(np.max(np.abs(truth.trajectory.q), initial=0.0)), RESTS)

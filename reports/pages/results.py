@@ -11,9 +11,9 @@ import pandas as pd
 from pyarrow import ArrowException
 
 from crossbody.cases import OutputError
+from crossbody.reports.figures.section import records
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.pages.html import file_name
-from crossbody.reports.pages.section import records
 from crossbody.reports.runs.files import listed
 from crossbody.reports.runs.output import is_staged, recover
 from crossbody.reports.runs.store import Trace, load, peek

@@ -25,7 +25,8 @@ from crossbody.cases import (
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
-from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
+from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
+from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 
 DEFAULT_CASES = ("bouncing_ball",)

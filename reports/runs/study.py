@@ -18,14 +18,13 @@ from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import contacts
 from crossbody.cases.scene_plain import plain
 from crossbody.reports.judging.comparison import Entry, judged, table
-from crossbody.reports.judging.truth import Truth
 from crossbody.reports.judging.verdict import Verdict
-from crossbody.reports.metrics._align import aligned
-from crossbody.reports.pages.styles import TRUTH
-from crossbody.reports.pages.thin import keep
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.truth import TRUTH, Truth
 from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, save
+from crossbody.reports.runs.thin import keep
 
 CASE = "case.json"
 AUDIT = ["case", "engine", "profile", "quantity", "reference", "value", "difference", "tolerance", "same"]
