@@ -19,8 +19,8 @@ from crossbody.engines.mujoco._rows import Rows
 USUAL = 1e4
 """Stiffness over mass of bodies that collide with each other, 1/s^2: about the largest that a step of 2 ms resolves.
 MuJoCo's own constants (solref 0.02 1) would have them stick together."""
-SMALL = 1e-12
-"""Gap that rounding may make of bodies that touch, m or rad."""
+SMALL, SLIGHT = 1e-12, 1e-8
+"""Gap that rounding may make of bodies that touch, m or rad; acceleration of the heaviest that its push is then."""
 EDGES = 4
 """Of the pyramid of friction of a contact with two tangents."""
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
@@ -37,7 +37,7 @@ class Obvious(Rows):
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
         super().__init__(by_shapes(scene), model, data)
-        self.bounds, self.frictional = Forces(scene), True
+        self.bounds, self.frictional, self.slight = Forces(scene), True, SLIGHT * float(model.body_mass.max())
         # Contacts stand behind bounds: where all bounds are shapes, in the order in which these were bounds.
         self.known = self.nc - self.always == len(self.bounds.bound_at) == self.touching.count
         self.alone = {tuple(sorted(geoms)): rows[0] for geoms, (_, rows) in self.touches.items() if len(rows) == 1}
@@ -69,7 +69,7 @@ class Obvious(Rows):
         if min(gaps, default=1.0) > SMALL:
             return always + (FREE,) * len(gaps)
         pushes = self.lam()[self.always :].tolist()
-        closed = (CONTACT if push > 0.0 else BALLISTIC for push in pushes)
+        closed = (CONTACT if push > self.slight else BALLISTIC for push in pushes)
         return always + tuple(FREE if gap > SMALL else mode for gap, mode in zip(gaps, closed, strict=True))
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact
+from crossbody.cases.scene_rows import rows_of
 from crossbody.engines._contacts import Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
@@ -80,8 +80,8 @@ class Rows:
         ]
         return [int(self.model.pair(name).id) for part in names for name in part]
 
-    def constants(self) -> dict[str, Any]:
-        """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
+    def constants(self, *, own: bool = False) -> dict[str, Any]:
+        """Return the law of every row as the model has it: a0, a1, a2 where it is the case's, else the pairs."""
         model = self.model
         solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
         bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
@@ -89,7 +89,7 @@ class Rows:
         solref += [model.pair_solref[i] for i in self.pair_ids()] if model.npair else []
         solref += [model.geom_solref[part] for part, _ in map(sorted, self.touches)] if not model.npair else []
         pairs = np.array(solref).reshape(-1, 2)
-        if (pairs > 0.0).any():
+        if own or (pairs > 0.0).any():
             return {"solref": pairs}
         return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), self.cubic), strict=True))
 

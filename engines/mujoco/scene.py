@@ -16,9 +16,9 @@ from scipy.linalg import eig, null_space
 from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.files.case import rows_of, under_law
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
+from crossbody.cases.scene_rows import rows_of, under_law
 from crossbody.engines._acting import Acting
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scale import depths, resolving_step
@@ -336,7 +336,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
     if profile != "as_is":
-        found["constants"] = rows.constants()
+        found["constants"] = rows.constants(own=profile == "default")
     hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
     if rows.nc > rows.always and not entered:
         return found | {"hidden": {**hidden, "H": HIDDEN, "lam": HIDDEN}}

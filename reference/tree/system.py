@@ -9,8 +9,8 @@ import numpy as np
 
 from crossbody.cases import Law
 from crossbody.cases.control import Control
-from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Scene
+from crossbody.cases.scene_rows import rows_of
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._redundant import ranked
