@@ -64,7 +64,8 @@ class Parameter:
         """
         if isinstance(self.default, str):
             if not isinstance(value, str) or (self.choices and value not in self.choices):
-                raise InvalidValue(f"{where} is {shown(value)}; valid: {', '.join(self.choices)}.")
+                valid = ", ".join(self.choices) or f"a text ({self.doc})"
+                raise InvalidValue(f"{where} is {shown(value)}; valid: {valid}.")
             return value
         try:
             if not isinstance(value, (int, float, str, np.number, np.bool_)):

@@ -24,6 +24,8 @@ TURN = 1e-3
 """Angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it."""
 SHARP = 30.0
 """Times the tilt of a cap, or the squared sine at which capsules cross: part of TURN that H is differenced over."""
+TOGETHER = 64
+"""Recorded states whose gaps are computed at once: some hundred pairs are as many arrays as memory's cache holds."""
 Poses = Callable[[str], Pose]
 """Body -> its pose, or its poses at some instants (..., 3, 3) and (..., 3)."""
 Indices = NDArray[np.intp]

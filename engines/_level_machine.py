@@ -93,8 +93,8 @@ class LevelMachine:
         for i in self._closed.intersection(free.tolist()):
             out[WATCHED * i + GAP] = max(h[i], hd[i] + self.slow)
         out[WATCHED * np.array([*self._unmoved], dtype=int) + PUSH] = 1.0
-        below = any(modes[i] not in ACTIVE for i in others)
-        pressure = rows.pressure(q, v, vd)[0] if vd is not None and below else h
+        below = [i for i in others if modes[i] not in ACTIVE]
+        pressure = dict(zip(below, rows.pressure(q, v, vd, below)[0], strict=True)) if vd is not None and below else {}
         for i in others:
             mode, at = modes[i], WATCHED * i
             if mode in ACTIVE and lam is not None:
@@ -192,8 +192,12 @@ class LevelMachine:
         return shared(self.rows, found)
 
     def _look(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> View:
+        """Only of what is held or may come to be does it count how it presses."""
         vd, lam = self.rows.accelerate(q, v, modes)
-        press, noise = self.rows.pressure(q, v, vd)
+        asked = [i for i in self.own if modes[i] in ACTIVE or h[i] <= 0.0]
+        press, noise = np.zeros(len(h)), np.zeros(len(h))
+        if asked:
+            press[asked], noise[asked] = self.rows.pressure(q, v, vd, asked)
         G = np.diag(self.rows.delassus(q))
         self._unmoved = set(np.flatnonzero(UNMOVED * G.max(initial=0.0) >= G).tolist())
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any

@@ -278,11 +278,11 @@ class Forces:
         return lengths, A @ v, A
 
     def bounds(self, q: Floats, lengths: Floats) -> Floats:
-        """Return the gaps of all bounds at a state, in the order of their rows; lengths (nt,) are of the tendons."""
-        found = np.concatenate([self.x(q)[self.firsts], lengths])
+        """Return the gaps (..., n) of all bounds, in the order of their rows; lengths (..., nt) are of the tendons."""
+        found = np.concatenate([self.x(q)[..., self.firsts], lengths], axis=-1)
         for i, at in self.balls:
-            found[i] = np.linalg.norm(angle_of(q[at:][:4]))
-        gaps: Floats = self.bound_sign * found[self.bound_of] + self.bound_at
+            found[..., i] = np.linalg.norm(angle_of(q[..., at : at + 4]), axis=-1)
+        gaps: Floats = self.bound_sign * found[..., self.bound_of] + self.bound_at
         return gaps
 
     def outside(self, lengths: Floats) -> Floats:

@@ -648,16 +648,44 @@ def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"shoulder": 'frictionloss=".1"'}, "shoulder.*friction"),
+        ({"shoulder": 'frictionloss=".1"'}, "shoulder.*friction.*without=friction"),
         ({"shoulder": 'actuatorgravcomp="true" actuatorfrclimited="true" actuatorfrcrange="-1 1"'}, "shoulder"),
-        ({"integrator": 'RK4" wind="1 0 0'}, "wind"),
-        ({"integrator": 'RK4" density="1'}, "medium"),
+        ({"integrator": 'RK4" wind="1 0 0'}, "wind.*without=medium"),
+        ({"integrator": 'RK4" density="1'}, "density 1.*without=medium"),
+        ({"integrator": 'RK4" viscosity="1'}, "viscosity 1.*without=medium"),
         ({"shoulder": "/><<"}, "compiler refuses"),
     ],
 )
 def test_what_a_scene_does_not_have_is_refused_by_name(tmp_path: Path, fields: dict[str, str], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         cases.load(write(tmp_path, **fields))
+
+
+def test_a_medium_is_left_out_of_every_engine(tmp_path: Path) -> None:
+    thick = write(tmp_path, integrator='RK4" density="1e3" viscosity="1" wind="1 0 0')
+    (tmp_path / "thin").mkdir()
+    thin = write(tmp_path / "thin", integrator="RK4")
+    for engine, profile in (("reference", "compiled"), ("mujoco", "as_is")):
+        runs = [
+            engines.load(engine).prepare(cases.load(path, without=word), profile).run()
+            for path, word in ((thick, "medium"), (thin, ""))
+        ]
+        assert np.array_equal(runs[0].q, runs[1].q)
+
+
+def test_contacts_with_a_height_field_are_refused_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "ground.xml"
+    path.write_text("""<mujoco><asset><hfield name="hills" nrow="2" ncol="2" size="1 1 1 .1"/></asset><worldbody>
+        <geom name="ground" type="hfield" hfield="hills"/><body><joint/><geom name="foot" size=".1"/></body>
+        </worldbody></mujoco>""")
+    with pytest.raises(SceneError, match=r"'ground' is a height field.*'foot'.*without=contacts"):
+        cases.load(str(path))
+    assert cases.load(str(path), without="contacts").scene is not None
+
+
+def test_what_is_left_out_is_a_text(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValue, match=r"without is .*valid: a text .*friction"):
+        cases.from_file(write(tmp_path), without=["friction"])
 
 
 def test_friction_is_left_out_when_asked(tmp_path: Path) -> None:

@@ -28,7 +28,9 @@ OF_THE_FILE = -1.0
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
-    "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
+    "without": Parameter(
+        default="", doc="left out of every engine: friction, contacts, medium, loop:NAME, ..., a comma between them"
+    ),
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
@@ -194,11 +196,17 @@ def check_runnable(scene: Scene) -> None:
     """
     for part in scene.bounded:
         if part.friction_loss:
-            raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
+            raise SceneError(
+                f"{type(part).__name__} {part.name!r} has dry friction (frictionloss), which cannot be run; "
+                "without=friction leaves all friction out of every engine."
+            )
     spans = {tendon.name for tendon in scene.tendons if tendon.bodies}
     for loop in scene.loops:
         for name in {loop.first, loop.second} & spans if loop.type == "tendon" else ():
-            raise SceneError(f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple it.")
+            raise SceneError(
+                f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple it; without=loop:"
+                f"{loop.name} leaves that out of every engine."
+            )
 
 
 ENTRIES = {

@@ -14,7 +14,7 @@ from crossbody.cases.files import mjcf
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact
 from crossbody.cases.scene_rows import rows_of
-from crossbody.engines._contacts import Contacts, end_of
+from crossbody.engines._contacts import TOGETHER, Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import corner_names
@@ -22,8 +22,6 @@ from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._observe import numbers
 from crossbody.engines.nearest import corners
 
-TOGETHER = 64
-"""Instants at which gaps of shapes are computed at once."""
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 FRICTIONAL = (mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL,)
@@ -166,16 +164,17 @@ class Rows:
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
             first = self.nc - self.touching.count
             gaps, energy = np.empty((len(q), self.nc)), np.empty((len(q), 2))
-            gaps[:, first:] = self._apart(q, data)
+            gaps[:, first:], lengths = self._apart(q, data), np.empty((len(q), self.model.ntendon))
             for i in range(len(q)):
                 data.qpos[:], data.qvel[:] = q[i], v[i]
                 mujoco.mj_fwdPosition(self.model, data)
                 mujoco.mj_fwdVelocity(self.model, data)
                 mujoco.mj_energyPos(self.model, data)
                 mujoco.mj_energyVel(self.model, data)
-                gaps[i, :first] = [*data.efc_pos[: self.always], *self.forces.bounds(q[i], data.ten_length)]
+                gaps[i, : self.always], lengths[i] = data.efc_pos[: self.always], data.ten_length
                 spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
                 energy[i] = data.energy[1], data.energy[0] + spared.sum()
+            gaps[:, self.always : first] = self.forces.bounds(q, lengths)
             return gaps, energy
 
         return observe

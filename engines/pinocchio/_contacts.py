@@ -11,7 +11,7 @@ import pinocchio as pin
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import by_shapes
-from crossbody.engines._contacts import Contacts, Indices, Poses, closing, drift
+from crossbody.engines._contacts import TOGETHER, Contacts, Indices, Poses, closing, drift
 from crossbody.engines.nearest import Pose, cross
 
 WORLD = pin.LOCAL_WORLD_ALIGNED
@@ -36,6 +36,16 @@ class ContactRows:
     def heights(self, q: Floats, rows: Sequence[int] | None = None) -> Floats:
         """Return h (n,) of some rows, or of all."""
         return self.contacts.touches(self._now(q), rows, self.along).gap if self.count else np.zeros(0)
+
+    def recorded(self, q: Floats) -> Floats:
+        """Return h (m, n) of recorded positions (m, nq), as the shapes lie there."""
+        bodies, gaps = self.contacts.bodies, [np.zeros((0, self.count))]
+        for first in range(0, len(q) if self.count else 0, TOGETHER):
+            found = [[now(body) for body in bodies] for now in map(self._now, q[first : first + TOGETHER])]
+            R, p = (np.array([[pose[k] for pose in one] for one in found]) for k in (0, 1))
+            placed = {body: (R[:, i], p[:, i]) for i, body in enumerate(bodies)}
+            gaps.append(self.contacts.touches(placed.__getitem__).gap)
+        return np.concatenate(gaps) if self.count else np.zeros((len(q), 0))
 
     def parted(self, q: Floats) -> tuple[Floats, Floats]:
         """Return by how much the shapes that may lie along each other do not, and to which side (`Contacts.parted`)."""

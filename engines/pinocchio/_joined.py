@@ -9,11 +9,12 @@ A = s/2 (e0 1 - [e]x) R2', h = s e, H = A (J1 - J2) of the angular velocities w1
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -21,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
 from crossbody.engines.nearest import cross as crossed
-from crossbody.engines.pinocchio._rows import ROUNDING, Solve, mass_matrix, point_jacobian, pose
+from crossbody.engines.pinocchio._rows import ROUNDING, Solve, pose
 
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
@@ -29,80 +30,73 @@ NEAR = (1e-8, 1e-4)  # what a row adds to the others, over the first: below it f
 AXES = pin.LOCAL_WORLD_ALIGNED
 
 
-@dataclass(frozen=True, slots=True)
-class End:
-    """One end of a loop: the joint that carries it, and its pose in that joint's frame."""
-
-    joint: int
-    pose: Any
-
-
 class Joined:
     """Rows of the loops in space: three of points, and three of axes where it is a weld.
 
     Args:
-        model: Pinocchio's.
+        model: Pinocchio's; a copy gets a frame for every end.
         placed: body -> joint that carries it, and its pose in that joint's frame.
         loops: of type connect or weld.
     """
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], loops: Sequence[Loop]) -> None:
-        self.model, self.data = model, model.createData()
-        self.none, self.loops = np.zeros(model.nv), loops
+        self.loops, self.model = loops, model.copy()
         self.ends = [
             (
-                _end(placed[loop.first], loop.first_position, loop.orientation),
-                _end(placed[loop.second], loop.second_position, UPRIGHT),
+                _end(self.model, placed[loop.first], loop.first_position, loop.orientation),
+                _end(self.model, placed[loop.second], loop.second_position, UPRIGHT),
             )
             for loop in loops
         ]
+        self.data, self.none = self.model.createData(), np.zeros(model.nv)
 
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q)
-        return self._stacked(
-            lambda one, two: at(self.data, one).translation - at(self.data, two).translation,
-            lambda one, two, scale: scale * self._between(one, two)[1],
-        )
-
-    def jacobian(self, q: Floats) -> Floats:
-        """Return H (rows, nv)."""
-        pin.computeJointJacobians(self.model, self.data, q)
-
-        def carried(end: End) -> Floats:
-            return point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation)
-
-        def turned(end: End) -> Floats:
-            none: Floats = np.zeros((3, self.model.nv))
-            return (
-                pin.getJointJacobian(self.model, self.data, end.joint, AXES).reshape(6, -1)[3:] if end.joint else none
-            )
-
-        return self._stacked(
-            lambda one, two: carried(one) - carried(two),
-            lambda one, two, scale: scale * self._map(one, two) @ (turned(one) - turned(two)),
-        ).reshape(-1, self.model.nv)
+        pin.framesForwardKinematics(self.model, self.data, q)
+        return self._heights()
 
     def gradients(self, q: Floats) -> tuple[Floats, Floats]:
         """Return h (rows,) and H (rows, nv)."""
-        return self.heights(q), self.jacobian(q)
+        model, data = self.model, self.data
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+
+        def of_both(one: int, two: int) -> Floats:
+            return _velocity_of(model, data, one) - _velocity_of(model, data, two)
+
+        H = self._stacked(
+            lambda one, two: of_both(one, two)[:3],
+            lambda one, two, scale: scale * self._map(one, two) @ of_both(one, two)[3:],
+        )
+        return self._heights(), H.reshape(-1, model.nv)
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q, v, self.none)
+        model, data = self.model, self.data
+        moving(model, data, q, v, self.none)
 
-        def bent(one: End, two: End, scale: float) -> Floats:
-            (w1, c1), (w2, c2) = (angular(self.model, self.data, end) for end in (one, two))
-            own: Floats = self._map(one, two) @ (c1 - c2 - cross(w2, w1))
-            return scale * (own - 0.25 * (w1 - w2) @ (w1 - w2) * self._between(one, two)[1])
+        def bent(one: int, two: int, scale: float) -> Floats:
+            w1, w2 = (pin.getFrameVelocity(model, data, end, AXES).angular for end in (one, two))
+            c1, c2 = (pin.getFrameClassicalAcceleration(model, data, end, AXES).angular for end in (one, two))
+            own = self._map(one, two) @ (c1 - c2 - cross(w2, w1))
+            bent: Floats = scale * (own - 0.25 * (w1 - w2) @ (w1 - w2) * self._between(one, two)[1])
+            return bent
 
-        def pulled(end: End) -> Floats:
-            return moved(self.model, self.data, end)[1]
+        def pulled(end: int) -> Floats:
+            found: Floats = pin.getFrameClassicalAcceleration(model, data, end, AXES).linear
+            return found
 
         return self._stacked(lambda one, two: pulled(one) - pulled(two), bent)
 
+    def _heights(self) -> Floats:
+        poses = self.data.oMf
+        return self._stacked(
+            lambda one, two: poses[one].translation - poses[two].translation,
+            lambda one, two, scale: scale * self._between(one, two)[1],
+        )
+
     def _stacked(
-        self, points: Callable[[End, End], Floats], axes: Callable[[End, End, float], Floats]
+        self, points: Callable[[int, int], Floats], axes: Callable[[int, int, float], Floats]
     ) -> Floats:  # fmt: skip
         """Return what each loop's rows are, one below the other."""
         parts: list[Floats] = []
@@ -110,16 +104,17 @@ class Joined:
             parts += [points(one, two)] + ([axes(one, two, loop.torque_scale)] if loop.type == "weld" else [])
         return np.concatenate(parts)
 
-    def _between(self, one: End, two: End) -> tuple[float, Floats]:
+    def _between(self, one: int, two: int) -> tuple[float, Floats]:
         """Return e0 and e of the first's axes seen from the second's."""
-        x, y, z, w = pin.Quaternion(at(self.data, two).rotation.T @ at(self.data, one).rotation).coeffs()
+        poses = self.data.oMf
+        x, y, z, w = pin.Quaternion(poses[two].rotation.T @ poses[one].rotation).coeffs()
         sign = 1.0 if w >= 0.0 else -1.0
         return sign * w, sign * np.array([x, y, z])
 
-    def _map(self, one: End, two: End) -> Floats:
+    def _map(self, one: int, two: int) -> Floats:
         """Return A over the torque scale."""
         e0, e = self._between(one, two)
-        found: Floats = 0.5 * (e0 * np.eye(3) - pin.skew(e)) @ at(self.data, two).rotation.T
+        found: Floats = 0.5 * (e0 * np.eye(3) - pin.skew(e)) @ self.data.oMf[two].rotation.T
         return found
 
 
@@ -129,28 +124,16 @@ def cross(a: Floats, b: Floats) -> Floats:
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
-def at(data: Any, end: End) -> Any:
-    """Return the pose of an end in the world."""
-    return data.oMi[end.joint] * end.pose
+def moving(model: Any, data: Any, q: Floats, v: Floats, none: Floats) -> None:
+    """Let the frames move with v, and with no more acceleration (nv,) than that makes of itself."""
+    pin.forwardKinematics(model, data, q, v, none)
+    pin.updateFramePlacements(model, data)
 
 
-def angular(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
-    """Return its angular velocity and acceleration."""
-    if end.joint == 0:
-        return np.zeros(3), np.zeros(3)
-    rate = pin.getVelocity(model, data, end.joint, AXES)
-    return rate.angular, pin.getClassicalAcceleration(model, data, end.joint, AXES).angular
-
-
-def moved(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
-    """Return velocity and acceleration of its point."""
-    if end.joint == 0:
-        return np.zeros(3), np.zeros(3)
-    arm = data.oMi[end.joint].rotation @ end.pose.translation
-    turn, spin = angular(model, data, end)
-    rate = pin.getVelocity(model, data, end.joint, AXES).linear
-    own = pin.getClassicalAcceleration(model, data, end.joint, AXES).linear
-    return rate + cross(turn, arm), own + cross(spin, arm) + cross(turn, cross(turn, arm))
+def _velocity_of(model: Any, data: Any, end: int) -> Floats:
+    """Return the Jacobian (6, nv) of the velocity of a frame, after computeJointJacobians."""
+    found: Floats = pin.getFrameJacobian(model, data, end, AXES).reshape(6, -1)  # of one column it is a vector
+    return found
 
 
 class Spans:
@@ -169,13 +152,13 @@ class Spans:
         self.model, self.data = model, model.createData()
         points = [tuple(zip(tendon.bodies, tendon.positions, strict=True)) for tendon in tendons]
         known = list(dict.fromkeys(point for pair in points for point in pair))
-        self.ends = [_end(placed[body], place, UPRIGHT) for body, place in known]
+        ends = [(placed[body][0], placed[body][1] * pose(place, UPRIGHT)) for body, place in known]
         which = [[known.index(point) for point in pair] for pair in points]
         self.one, self.two = np.array(which, dtype=int).reshape(-1, 2).T
-        self.joints, self.arms = [end.joint for end in self.ends], np.array([end.pose.translation for end in self.ends])
-        self.moving = np.zeros((len(self.ends), model.nv))  # 1 where a coordinate moves an end
-        for row, end in zip(self.moving, self.ends, strict=True):
-            for joint in list(model.supports[end.joint])[1:]:
+        self.joints, self.arms = [joint for joint, _ in ends], np.array([at.translation for _, at in ends])
+        self.moving = np.zeros((len(ends), model.nv))  # 1 where a coordinate moves an end
+        for row, carrier in zip(self.moving, self.joints, strict=True):
+            for joint in list(model.supports[carrier])[1:]:
                 row[model.joints[joint].idx_v :][: model.joints[joint].nv] = 1.0
 
     def _apart(self) -> tuple[Floats, Floats, Floats]:
@@ -262,9 +245,12 @@ class Strings:
         return found
 
 
-def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:
+def _end(model: Any, placed: tuple[int, Any], position: Any, orientation: Any) -> int:
+    """Return the number of a new frame at a pose on a body."""
     joint, where = placed
-    return End(joint, where * pose(position, orientation))
+    frame = pin.Frame(f"end {model.nframes}", joint, where * pose(position, orientation), pin.FrameType.OP_FRAME)
+    number: int = model.addFrame(frame)
+    return number
 
 
 def loose_rows(A: Floats, widths: Sequence[int], rank: int) -> tuple[list[int], float]:
@@ -309,12 +295,16 @@ def by_least_norm(
         dependent: singular value of the rows, over the largest, that counts as zero.
     """
 
+    @cache
+    def holding(count: int) -> NDArray[np.intp]:
+        return np.setdiff1d(np.arange(count), left_out)
+
     def solve(q: Floats, v: Floats, J: Floats, gamma: Floats) -> tuple[Floats, Floats]:
-        holds = np.ones(len(J), dtype=bool)
-        holds[list(left_out)] = False
-        root = np.linalg.cholesky(mass_matrix(model, data, q))
-        free = np.linalg.solve(root, tau - pin.nonLinearEffects(model, data, q, v))
-        A = np.linalg.solve(root, J[holds].T).T
+        holds = holding(len(J))
+        root = np.linalg.cholesky(pin.crba(model, data, q).T)  # which reads what is below the diagonal alone
+        right = np.vstack([tau - pin.nonLinearEffects(model, data, q, v), J[holds]])
+        parts = np.linalg.solve(root, right.T)
+        free, A = parts[:, 0], parts[:, 1:].T
         U, s, Vt = np.linalg.svd(A, full_matrices=False)
         kept = s > dependent * s[0]
         missing = -gamma[holds] - A @ free

@@ -62,14 +62,17 @@ def build(case: Case, algebra: str) -> Prepared:
     to = Coordinates(scene)
     forces.spans = spans(scene, model, placed, to)
     centres = at_centres(scene, forces, model, model.createData(), placed)
+    lifting = bool(scene.pushes) or any(body.weightless for body in scene.bodies)
+    bends = any(armature[first : first + 3].any() for _, first in to.frees)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
-        ours = forces(to.ours(q), to.velocities(q, v)) - armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + centres(q)
+        ours = forces(to.ours(q), to.velocities(q, v))
+        if bends:
+            ours -= armature * to.bend(q, v)
+        tau[:] = to.back(q, ours) + centres(q) if lifting else to.back(q, ours)
 
-    spared = any(body.weightless for body in scene.bodies)
-    acting = None if forces.none and to.same and not (scene.pushes or spared) else apply
+    acting = None if forces.none and to.same and not lifting else apply
     gaps = Gaps(scene, forces, (model, placed), to)
     pinned = PinRows(
         model, lambda q: gaps.gradients(q)[1], gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
@@ -88,7 +91,7 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.shared = none_pulling
     return Prepared(
         rows=pinned, points=Points(scene, model, placed),
-        observe=_observe(scene, model, placed, forces, gaps.heights, to),
+        observe=_observe(scene, model, placed, forces, gaps, to),
         sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)) if case.general else _sizes(pinned, *start),
         start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
@@ -98,10 +101,10 @@ def build(case: Case, algebra: str) -> Prepared:
 
 def _sizes(rows: PinRows, q: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Return how far coordinates move while a row is closed (nq,), and how fast (nv,), by what the start drives."""
-    (h, hd), free = rows.gaps(q, v), rows.accelerate(q, v, (int(Mode.FREE),) * rows.nc)[0]
-    deep, fast = depths(rows.entered, h, hd, rows.gap_acceleration(q, v, free), rows.unilateral)
+    (h, H), free = rows.gradient_of(q, slice(None)), rows.accelerate(q, v, (int(Mode.FREE),) * rows.nc)[0]
+    deep, fast = depths(rows.entered, h, H @ v, H @ free + rows.drift(q, v), rows.unilateral)
     depth, speed = float(deep.max(initial=0.0)), float(fast.max(initial=0.0))
-    across = float(np.abs(rows.jacobian(q)).max(initial=0.0)) or 1.0
+    across = float(np.abs(H).max(initial=0.0)) or 1.0
     far = depth or float(np.abs(q).max(initial=0.0)) or 1.0
     return np.full(len(q), far / across), np.full(len(v), (speed or 1.0) / across)
 
@@ -125,17 +128,29 @@ class Gaps:
         self.touching, self.order = ContactRows(scene, *tree), _order(scene)
         self.own = len(self.order)
         self.steady = to.same and not (self.rows.bends or self.in_space or self.touching.count)
-        self.gradients = LastAsked(self._gradients)
+        self.gradients, self._own = LastAsked(self._gradients), LastAsked(self._all_own)
         self.still = np.zeros(self.own)
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""
+        own = self._heights(q)
+        return np.concatenate([own, self.touching.heights(q)]) if self.touching.count else own
+
+    def _heights(self, q: Floats) -> Floats:
         if self.steady:
             return self.rows.heights(q)
         own = [self.rows.heights(self.to.ours(q)), *(part.heights(q) for part in self.in_space)]
-        return np.concatenate([np.concatenate(own)[self.order], self.touching.heights(q)])
+        return np.concatenate(own)[self.order]
 
-    def _own(self, q: Floats) -> Gradients:
+    def recorded(self, q: Floats) -> Floats:
+        """Return h (m, nc) of recorded positions (m, nq)."""
+        if self.steady:
+            found: Floats = q @ self.rows.straight.T + self.rows.offset
+            return found
+        own = np.array([self._heights(one) for one in q]).reshape(len(q), -1)
+        return np.concatenate([own, self.touching.recorded(q)], axis=1)
+
+    def _all_own(self, q: Floats) -> Gradients:
         """Return h and H of the rows before those of contacts."""
         if not len(self.rows.offset) and len(self.in_space) == 1:
             return self.in_space[0].gradients(q)
@@ -161,7 +176,7 @@ class Gaps:
         wanted = np.array(chosen)
         before = wanted < self.own
         if before.all():
-            h, H = self.gradients(q) if not self.touching.count else self._own(q)
+            h, H = self._own(q)
             return h[wanted], H[wanted]
         h, H = np.empty(len(wanted)), np.empty((len(wanted), self.nv))
         h[~before], H[~before] = self.touching.gradients(q, (wanted[~before] - self.own).tolist())
@@ -315,7 +330,7 @@ def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed
 
 
 def _observe(
-    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, heights: Heights, to: Coordinates
+    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, gaps: Gaps, to: Coordinates
 ) -> Any:  # fmt: skip
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
@@ -335,7 +350,7 @@ def _observe(
                     height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
                     energy[i, 1] += body.weightless * body.mass * height
         energy[:, 1] += forces.energy(to.ours(q))
-        return np.array([heights(one) for one in q]).reshape(len(q), -1), energy
+        return gaps.recorded(q), energy
 
     return observe
 

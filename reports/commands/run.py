@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid, html, results, site
-from crossbody.reports.runs import files, jobs, output, store, study
+from crossbody.reports.runs import files, jobs, output, store, study, watch
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 from crossbody.reports.commands.shared import OF_USERS, identity, key, where
 
 WRONG = [Word.OUTSIDE, Word.CRASHED]
-WIDTH = 140  # of the table in a file or a pipe
+WIDTH = 150  # of the table in a file or a pipe
 SHOWN = {"position": "position", **{part_of("position", part): part for part in PARTS}}
 """Metrics in the terminal and their heads: the parts of the worst error of position add up to it."""
 COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
@@ -40,13 +41,13 @@ COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold r
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
     rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
-    limit: float = LIMIT, strict: bool = False,
+    limit: float = LIMIT, strict: bool = False, at_once: int = 1,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
     `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one;
     `limit` is the time that an engine may take for one case, s; `strict` makes a number wrong that left its
-    regression band.
+    regression band; `at_once` is how many cases are run at once, in processes of their own.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -61,12 +62,17 @@ def run(
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
     with Parts(out, command, identity("run", cases, names, picks=picks, rtol=rtol, settings=asked)) as parts:
+
+        def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
+            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit)
+            with parts.put(key(i, cases[i])) as made:
+                study.write_case(made, result, repeat(cases[i], names, pairs, rtol, settings))
+            return 0
+
+        lost = _beside(cases, parts, do, at_once)
         with progress(len(cases) * (len(picks) + 1)) as tell:
-            for i, case in enumerate(cases):
-                if not parts.has(key(i, case)):
-                    result = jobs.run_case(case, picks, rtol, tell, asked, limit=limit)
-                    with parts.put(key(i, case)) as made:
-                        study.write_case(made, result, repeat(case, names, pairs, rtol, settings))
+            for i in _missing(cases, parts):
+                do(i, tell)
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
             site.write(made, against=against, others=others)
@@ -76,7 +82,21 @@ def run(
         if any(case.control is not None for case in cases) and not voice.quiet():
             show_controllers(out)
         show(rows, out)
-    return exit_code(rows["verdict"], rows["regression"] if strict else ())
+    return max(lost, exit_code(rows["verdict"], rows["regression"] if strict else ()))
+
+
+def _missing(cases: Sequence[Case], parts: Parts) -> list[int]:
+    """Cases whose part is not there."""
+    return [i for i, case in enumerate(cases) if not parts.has(key(i, case))]
+
+
+def _beside(cases: Sequence[Case], parts: Parts, do: Callable[[int], int], at_once: int) -> int:
+    """Run the missing cases in processes beside this one; 1 if a run in one of them had to be ended, else 0."""
+    missing = _missing(cases, parts)
+    if min(at_once, len(missing)) < 2:
+        return 0
+    with progress(len(missing)) as tell:
+        return min(watch.beside([partial(do, i) for i in missing], at_once, lambda k: tell(cases[missing[k]].label)), 1)
 
 
 def findings(case: Case) -> tuple[str, ...]:
@@ -105,7 +125,7 @@ def show(rows: pd.DataFrame, out: Path) -> None:
 
     console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
     if not voice.quiet():
-        console.print(_summary(rows, results.walls_of(out)))
+        console.print(_summary(rows, results.times_of(out)))
         counts = rows["verdict"].value_counts()
         console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
     told = rows[rows["verdict"].isin(WRONG if voice.quiet() else [Word.SKIPPED, *WRONG])]
@@ -135,20 +155,21 @@ def show_controllers(out: Path) -> None:
             print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")
 
 
-def _summary(rows: pd.DataFrame, walls: Mapping[tuple[str, str], float]) -> Any:
+def _summary(rows: pd.DataFrame, times: Mapping[tuple[str, str], tuple[float, float | None]]) -> Any:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("case", "engine"):
         table.add_column(name, no_wrap=True)
-    for name in (*SHOWN.values(), "run time", Word.WITHIN, "expected", Word.OUTSIDE):
+    for name in (*SHOWN.values(), "run time", "in all", Word.WITHIN, "expected", Word.OUTSIDE):
         table.add_column(name, justify="right", no_wrap=True)
     for (case, variant, engine, profile), run in rows.groupby(["case", "variant", "engine", "profile"], sort=False):
         values = run.drop_duplicates("metric").set_index("metric")[["value", "known"]].T.to_dict()
         counts = run["verdict"].value_counts()
         label, who = f"{case}:{variant}", f"{engine}:{profile}"
         table.add_row(
-            label, who, *(_short(**values.get(metric, {})) for metric in SHOWN), grid.duration(walls.get((label, who))),
+            label, who, *(_short(**values.get(metric, {})) for metric in SHOWN),
+            *map(grid.duration, times.get((label, who), (None, None))),
             *(_count(int(counts.get(word, 0)), word) for word in (Word.WITHIN, Word.EXPECTED, Word.OUTSIDE)),
         )  # fmt: skip
     return table

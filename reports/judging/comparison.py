@@ -62,6 +62,7 @@ class Entry:
         own: truth of the equations that the engine really integrates; None where they are the case's own.
         hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
         crashed: what it threw, where it did not come back with an outcome.
+        took_s: what all of that took, preparation and the runs that tell the parts of its error too, s.
     """
 
     engine: str
@@ -76,6 +77,7 @@ class Entry:
     own: Truth | None = None
     hidden: Mapping[str, str] = field(default_factory=dict)
     crashed: str = ""
+    took_s: float = 0.0
 
 
 def compare(

@@ -34,8 +34,6 @@ LADDER = (1.0, 10.0)
 """Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
 NUDGE, DIRECTIONS, INSTANTS = 1e-7, 2, 201
 """By how much of the largest velocity a start is put off, in how many directions, and when it is looked at."""
-METHODS = ("Adams", "BDF")
-"""Of CVODE: the second costs less where rows, dampers or servos are stiff."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
 STEPS, GROWTH = 1e4, 10.0
@@ -193,21 +191,22 @@ def _witness(case: Case) -> Trajectory | str:
     try:
         pinocchio = engines.load("pinocchio")
         part, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
-        cost, steps, method = min((*_seconds(pinocchio.prepare(part, "law", rtol=rtol, method=m)), m) for m in METHODS)
+        cost, steps = seconds(pinocchio.prepare(part, "law", rtol=rtol))
         if cost > SHARE * WITNESS_S:
             return f"Pinocchio would share the scene alone, and take about {cost / SHARE:.0f} s"
         most = max(1000, int(WITNESS_S * steps / cost))  # contacts later on may want far more steps than the first part
-        run = pinocchio.prepare(case, "law", rtol=rtol, method=method, max_steps=most).run()
+        run = pinocchio.prepare(case, "law", rtol=rtol, max_steps=most).run()
     except (EngineUnavailable, CaseUnsupported) as error:
         return str(error).removesuffix(".")
     return run if run.outcome.ok else f"Pinocchio ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
 
 
-def _seconds(run: Run) -> tuple[float, int]:
-    """Time that a run takes of one processor, s, and its steps."""
+def seconds(run: Run) -> tuple[float, int]:
+    """Return the time that a run takes of one processor, s, without that of choosing its method, and its steps."""
     began = process_time()
-    steps = run.run().steps
-    return process_time() - began, steps
+    found = run.run()
+    used, tried = (found.counts.get(name, 0) for name in ("rhs", "tried"))
+    return (process_time() - began) * used / max(used + tried, 1) if tried else process_time() - began, found.steps
 
 
 def _rechecked(truth: Truth, case: Case) -> Truth:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from time import process_time
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from crossbody.cases import (
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
-from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
+from crossbody.reports.judging.truth import law_of, seconds, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 
@@ -191,7 +191,9 @@ def run_case(
         tell(label)
         watch.limited(label, limit)
         why = watch.lost(label)
-        entries.append(ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine))
+        began = perf_counter()
+        entry = ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine)
+        entries.append(replace(entry, took_s=perf_counter() - began))
     watch.unlimited()
     _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
@@ -268,9 +270,7 @@ def _dear(case: Case, pick: Pick, asked: Mapping[str, Value]) -> str:
     if not case.general or pick.engine == "reference":
         return ""
     prepared = prepare(replace(case, t_end=FIRST * case.t_end), pick, asked)
-    began = process_time()
-    prepared.run()
-    cost = (process_time() - began) / FIRST
+    cost = seconds(prepared)[0] / FIRST
     if cost <= DEAR_S:
         return ""
     return f"Too dear: it would take about {cost:.0f} s. -e {pick.engine}:{pick.profile} runs it all the same."
