@@ -179,7 +179,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     rows, acting = switched or (Obvious if profile == "default" else Rows)(scene, model, data), Acting(case)
     driver = Forces(scene) if profile == "matched" and scene.activated else None
     prepared = Prepared(
-        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting, driver),
+        model=model, data=data, nc=len(case.contacts), start=_start(case, data, rows, acting, driver),
         modes=rows.modes, lam=rows.lam,
         safe=_guard(followed(case, profile) or case, data, rows),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
@@ -248,10 +248,14 @@ def matched(scene: Scene) -> Any:
     return model
 
 
-def _start(case: Case, model: Any, data: Any, acting: Acting, driver: Forces | None) -> Callable[[], None]:
+def _start(case: Case, data: Any, rows: Rows, acting: Acting, driver: Forces | None) -> Callable[[], None]:
+    model = rows.model
+
     def start() -> None:
         acting.reset()
         mujoco.mj_resetData(model, data)
+        if isinstance(rows, Switched):
+            rows.last = np.zeros(rows.nc)  # not in place: multipliers that are recorded are these arrays
         data.qpos[:], data.qvel[:] = case.q0, case.v0
         if driver is not None:
             driver.begin(case.act0)

@@ -112,20 +112,17 @@ class Points:
 
     def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
         self.model, self.data = model, model.createData()
-        self.loops = [loop for loop in scene.loops if loop.type == "joint" and not loop.second]
+        loops = [loop for loop in scene.loops if loop.type == "joint" and not loop.second]
         self.contacts, self.placed = Contacts(by_shapes(scene)), placed
-        self.whole = len(self.loops) == len(scene.loops)
-
-    @property
-    def count(self) -> int:
-        """Number of rows that are points."""
-        return len(self.loops) + self.contacts.count
+        self.anchors = [self._anchor(model.getJointId(loop.first), loop.polynomial[0]) for loop in loops]
 
     def __call__(self, q: Floats) -> list[Any]:
         """Return the constraints."""
+        found = list(self.anchors)
+        if not self.contacts.count:
+            return found
         pin.forwardKinematics(self.model, self.data, q)
         met = self.contacts.touches(self._pose)
-        found = [self._anchor(self.model.getJointId(loop.first), loop.polynomial[0]) for loop in self.loops]
         for gap, normal, point, *bodies in zip(met.gap, met.normal, met.point, met.first, met.second, strict=True):
             turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
             world = pin.SE3(turn, point - 0.5 * gap * normal)

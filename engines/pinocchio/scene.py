@@ -90,7 +90,7 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
-        rows=pinned, points=Points(scene, model, placed),
+        rows=pinned, points=() if case.general else Points(scene, model, placed),
         observe=_observe(scene, model, placed, forces, gaps, to),
         sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)) if case.general else _sizes(pinned, *start),
         start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
