@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 from random_scenes import random_scene, random_state
+from scenes import compiled, rows_at
 from scipy.spatial.transform import Rotation
-from test_tree import compiled, rows_at
 
 from crossbody.cases.files.case import case_of, quaternions
 from crossbody.cases.rotations import rates

@@ -18,7 +18,7 @@ from crossbody.reference import Options, System, kernels, prepare, simulate
 
 def test_ballistic_is_caught_below_the_surface():
     # Pushed down while it leaves: without the second guard it falls through.
-    from test_machines import gusty
+    from gusty import gusty
 
     run = simulate(gusty(1e8, 2e4), [0.01], [-1.0], 0.5, inputs=([0.0, 0.0101], [[0.0], [-2000.0]]))
     assert run.outcome.ok

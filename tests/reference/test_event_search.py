@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gusty import gusty
 from many_contacts import constant
 from numpy.polynomial.chebyshev import chebvander
 from rippled_walls import rippled
 from scipy.optimize import linprog
 from springs import known, outside, parameters_outside, suite, system_of
-from test_machines import gusty
 
 from crossbody import cases, engines
 from crossbody.cases import Law, Mode

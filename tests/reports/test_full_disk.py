@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import STUCK, helped
 from rig_data import channels, log_of
+from studies import MINE, content, expected, fresh, put
 from swap_kills import refused_before
-from test_output_kills import MINE, content, expected, fresh, put
 
 from crossbody import hw
 from crossbody.cases import OutputError
@@ -23,8 +24,6 @@ from crossbody.reference import code_store
 from crossbody.reference.code_store import CODE, Store
 from crossbody.reports.runs.output import MARKER, folder, recover
 from crossbody.reports.runs.parts import ABOUT, Parts
-
-STUCK = Path(__file__).parent / "stuck_engine.py"
 
 
 @contextmanager
@@ -155,7 +154,15 @@ def test_a_call_that_is_refused_loses_nothing(tmp_path: Path) -> None:
         "import sys; from pathlib import Path; import test_full_disk; test_full_disk.every_refusal(Path(sys.argv[1]))"
     )
     words = [sys.executable, "-c", code, str(tmp_path)]
-    done = subprocess.run(words, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=100, check=False)
+    done = subprocess.run(
+        words,
+        cwd=Path(__file__).parent,
+        env=helped(),
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -1,9 +1,9 @@
 """Plant faults in a copy of the sources, one at a time, and see whether the named run or test fails.
 
-    python tests/plant_faults.py                     all faults of faults.toml, with what has been seen before left out
-    python tests/plant_faults.py --jobs 2 --only lam those whose name has "lam", two at a time
-    python tests/plant_faults.py --quick             those that cost little: the sample that the gate takes
-    python tests/plant_faults.py --faults mine.toml  those of a list of one's own, written as faults.toml is
+    python tests/support/plant_faults.py                     all of faults.toml, less what was seen before
+    python tests/support/plant_faults.py --jobs 2 --only lam those whose name has "lam", two at a time
+    python tests/support/plant_faults.py --quick             those that cost little: the sample that the gate takes
+    python tests/support/plant_faults.py --faults mine.toml  those of a list of one's own, written as faults.toml is
 
 A fault is a change of the text of one file. It is seen by `run` if `crossbody run` with those arguments says that a
 number is outside (exit code 1), and by `test`, which is asked where `run` sees nothing, if pytest fails there. What
@@ -30,8 +30,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
-ROOT = Path(__file__).parent.parent
-FAULTS = Path(__file__).with_name("faults.toml")
+from places import DATA, ROOT
+
+FAULTS = ROOT / "tests" / "faults.toml"
 FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 RUN_SEES, ALL_SEE = 7 / 8, 39 / 40
 LIMIT_S = 1800.0
@@ -117,8 +118,8 @@ class Tree:
         shutil.rmtree(self.root / "out", ignore_errors=True)
         ended = subprocess.run(
             [sys.executable, "-B", *start, *arguments.split()],
-            cwd=self.root, env={**os.environ, "PYTHONPATH": str(self.root)}, capture_output=True, text=True,
-            timeout=LIMIT_S, check=False,
+            cwd=self.root, env={**os.environ, "PYTHONPATH": str(self.root), "CROSSBODY_DATA": str(DATA)},
+            capture_output=True, text=True, timeout=LIMIT_S, check=False,
         )  # fmt: skip
         if ended.returncode not in (0, FAILED):
             said = (ended.stdout + ended.stderr)[-2000:]
@@ -192,8 +193,6 @@ def look(wanted: Sequence[Fault], kept: Kept, jobs: int) -> dict[Fault, dict[str
     """What is seen of each fault, each worker in a tree of its own; those that are kept are not asked again."""
     left = [fault for fault in wanted if kept.key(fault) not in kept.known]
     with tempfile.TemporaryDirectory(prefix="crossbody-faults-") as work:
-        if (data := ROOT.parent / "shared").is_dir():  # where tests look for published robots and logs
-            (Path(work) / "shared").symlink_to(data)
         trees: SimpleQueue[Tree] = SimpleQueue()
         for i in range(min(jobs, len(left))):
             trees.put(Tree(Path(work) / str(i)))

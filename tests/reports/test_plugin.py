@@ -7,10 +7,10 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from places import OWN
 
 pytest_plugins = ["pytester"]
 
-OWN = Path(__file__).with_name("own_case.py")
 REFERENCE = ("--crossbody-engine", "reference:compiled")
 HEAVY = ("numpy", "pandas", "numba", "scipy", "mujoco", "pinocchio", "plotly", "pyarrow", "sksundae", "click", "rich")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from places import OWN
 
 from crossbody import engines
 from crossbody.cases import InvalidValue, installed
@@ -12,7 +13,6 @@ from crossbody.reports import metrics
 from crossbody.reports.cli import cli, main
 from crossbody.reports.sweep import pools
 
-OWN = Path(__file__).with_name("own_case.py")
 ENGINE = '"""The reference by another name."""\nfrom crossbody.engines import load\nENGINE = load("reference")\n'
 METRIC = (
     '"""Where it ends."""\nUNIT, CLAIMED = "m", False\ndef measure(truth, run, case):\n    return float(run.q[-1, 0])\n'

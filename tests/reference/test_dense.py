@@ -13,7 +13,7 @@ import springs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_scenes import random_scene, random_state
-from test_user_controllers import BALL
+from scenes import BALL
 
 from crossbody import cases
 from crossbody.cases import Control, InvalidValue, SceneError

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from random_scenes import random_scene, random_state
+from scenes import compiled, rows_at
 
 from crossbody.cases import CaseUnsupported, Mode, SceneError
 from crossbody.cases.files.case import case_of
@@ -28,13 +29,6 @@ from crossbody.reference.tree.table import tabulate
 SEEDS = range(40)
 ROUNDING = 1e-12
 """Of sums of products over a path of a dozen bodies, over the largest of their terms."""
-
-
-def compiled(scene: Scene) -> Any:
-    spec = build.spec_of(scene)
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    return build.compiled(spec, scene)
 
 
 def ours(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
@@ -115,15 +109,6 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
 def in_space(scene: Scene) -> Scene:
     """The scene with its loops in space alone."""
     return scene.replace(loops=tuple(loop for loop in scene.loops if loop.in_space))
-
-
-def rows_at(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
-    """Return H, h and H' v of the loops of a scene, or of all rows where there are none."""
-    count, table = sum(loop.width for loop in scene.loops) or len(rows_of(scene)[0]), tabulate(scene)
-    H, h, Hdv, w = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count), np.zeros(table.scratch)
-    mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
-    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
-    return H, h, Hdv
 
 
 def drift_of(model: Any, row: Any, q: Any, v: Any) -> Any:

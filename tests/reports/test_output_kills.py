@@ -12,37 +12,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from places import helped
+from studies import FILES, MINE, STUDIES, content, expected, fresh, put
 from swap_kills import everywhere
 
 from crossbody.cases import OutputError
 from crossbody.reports.runs import manifest
 from crossbody.reports.runs.output import MARKER, check, folder, gather, recover
-
-MINE = {"notes.md": "mine", "bench/own.csv": "mine too", "traces/sketch.txt": "and mine"}
-STUDIES = ("old", "new")
-FILES = {
-    "old": ("verdicts.json", "a.json", "traces/0000.parquet", "traces/0001.parquet", "index.html"),
-    "new": ("verdicts.json", "b.json", "traces/0000.parquet", "index.html", "case.html"),
-}
-
-
-def put(place: Path, which: str, study: str = "run") -> None:
-    """Write one of two studies, each with files that the other does not have."""
-    with folder(place, study) as made:
-        for name in FILES[which]:
-            (made / name).parent.mkdir(exist_ok=True)
-            (made / name).write_text(which)
-
-
-def fresh(place: Path) -> Path:
-    """A folder with an old study, one of another command, and files of the user's."""
-    put(place, "old")
-    with folder(place, "bode") as made:
-        (made / "bode.json").write_text("beside")
-    for name, text in MINE.items():
-        (place / name).parent.mkdir(exist_ok=True)
-        (place / name).write_text(text)
-    return place
 
 
 def copied(made: Callable[[Path], Path], root: Path) -> Callable[[Path], Path]:
@@ -51,23 +27,13 @@ def copied(made: Callable[[Path], Path], root: Path) -> Callable[[Path], Path]:
     return lambda place: Path(shutil.copytree(one, place))
 
 
-def content(place: Path) -> dict[str, str]:
-    """Every file but those whose names begin with a dot."""
-    found = (path for path in place.rglob("*") if path.is_file())
-    inside = ((path.relative_to(place), path) for path in found)
-    return {str(name): path.read_text() for name, path in inside if not any(p.startswith(".") for p in name.parts)}
-
-
-def expected(which: str) -> dict[str, str]:
-    return dict.fromkeys(FILES[which], which) | MINE | {"bode.json": "beside"}
-
-
 def in_a_new_process(law: Callable[[Path, int], None], root: Path, stride: int) -> None:
     """Hold a law where nothing but this file was loaded: children of a process with threads may hang."""
     code = f"import test_output_kills as t; from pathlib import Path; t.{law.__name__}(Path({str(root)!r}), {stride})"
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=Path(__file__).parent,
+        env=helped(),
         capture_output=True,
         text=True,
         check=False,
@@ -201,7 +167,7 @@ CHANGES = "rename,renameat,renameat2,unlink,unlinkat,mkdir,mkdirat,rmdir,link,li
 def test_every_change_on_disk_has_a_kill_of_its_own_before_it(tmp_path: Path) -> None:
     command = ["strace", "-f", "-z", "-e", f"trace={CHANGES}", "-o", str(tmp_path / "calls")]
     command += [sys.executable, "-c", TRACED, str(tmp_path / "out")]
-    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=Path(__file__).parent, env=helped(), capture_output=True, text=True, check=False)
     if done.returncode and "ptrace" in done.stderr.lower():
         pytest.skip("strace may not look at a process here")
     assert done.returncode == 0, done.stderr

@@ -10,6 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from places import ROBOTS
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier, Trajectory
@@ -22,7 +23,7 @@ from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, from_run
 from crossbody.reports.runs import jobs
 
-BIPED = Path(__file__).parents[2] / "shared" / "data" / "robots" / "agility_cassie" / "cassie.xml"
+BIPED = ROBOTS / "agility_cassie" / "cassie.xml"
 
 
 def motion(q: Any, t: Any, v: Any) -> Trajectory:

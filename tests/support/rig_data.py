@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DATA
 
 from crossbody import engines, hw
 from crossbody.cases import Case
 
-DATA = Path(os.environ.get("CROSSBODY_DATA", Path(__file__).parent.parent.parent / "shared" / "data"))
 PENDULUM = DATA / "multiarm_pendulum"
 CUBE = DATA / "contactnets_cube" / "tosses.parquet"
 

@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
+from places import ROBOTS
 from published import SAME, STATES, moves_as_in_mujoco
 
 from crossbody import cases, engines
@@ -29,7 +30,6 @@ from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
 from crossbody.reports.runs import jobs
 
-ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",
              "universal_robots_ur5e/ur5e")  # fmt: skip
 ARM = """

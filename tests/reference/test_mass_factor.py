@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_kernel_check import GOOD
+from bead import GOOD
 
 from crossbody.cases import SceneError
 from crossbody.reference import System

@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from joblib.externals.loky import get_reusable_executor
+from places import STUCK
 from rig_data import run_as_log
 
 from crossbody import cases, hw
@@ -37,7 +38,6 @@ def alone() -> None:
     get_reusable_executor(max_workers=1).shutdown(wait=True, kill_workers=True)
 
 
-STUCK = Path(__file__).parent / "stuck_engine.py"
 SECOND = 1.0
 """Within this a command has stopped, s; start-up of the interpreter is no part of it."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import textwrap
@@ -11,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bead import GOOD, _gaps, _rows
 from mechanisms import ball, flyby, oscillator, sliders
+from places import helped
 
 from crossbody import cases
 from crossbody.cases import SceneError
@@ -32,36 +33,6 @@ def test_every_shipped_system_passes(name, variant):
 
 
 # A bead of mass p[0] on a line and a wall that curves: h = p[1] - x + p[2] y^2 + |z|, with three coordinates.
-
-
-@kernels.dynamics
-def _dynamics(t, q, v, u, p, M, f, w):
-    for i in range(3):
-        for j in range(3):
-            M[i, j] = p[0] * (2.0 if i == j else 0.5 * np.cos(q[2]))
-        f[i] = -p[1] * q[i] - 0.1 * v[i]
-
-
-@kernels.gaps
-def _gaps(t, q, v, p, h, hd):
-    h[0] = p[1] - q[0] + p[2] * q[1] * q[1] + np.sin(q[2])
-    hd[0] = -v[0] + 2.0 * p[2] * q[1] * v[1] + np.cos(q[2]) * v[2]
-
-
-@kernels.rows
-def _rows(t, q, v, p, w, idx, na, H, h, Hdv):
-    for j in range(na):
-        H[j, 0], H[j, 1], H[j, 2] = -1.0, 2.0 * p[2] * q[1], np.cos(q[2])
-        h[j] = p[1] - q[0] + p[2] * q[1] * q[1] + np.sin(q[2])
-        Hdv[j] = 2.0 * p[2] * v[1] * v[1] - np.sin(q[2]) * v[2] * v[2]
-
-
-@kernels.energy
-def _energy(q, v, p, e):
-    e[0] = e[1] = 0.5 * v[0] * v[0]
-
-
-GOOD = {"dynamics": _dynamics, "gaps": _gaps, "rows": _rows, "energy": _energy}
 
 
 def _bead(**changes):
@@ -302,7 +273,7 @@ def test_every_shipped_kernel_stays_inside_its_arrays(tmp_path):
     # As Python the kernels need not be compiled, and NumPy looks at every index.
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(SHIPPED)], cwd=Path(__file__).parent,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
+        env=helped(NUMBA_DISABLE_JIT="1"), capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     count, found = done.stdout.splitlines()
@@ -311,7 +282,7 @@ def test_every_shipped_kernel_stays_inside_its_arrays(tmp_path):
 
 
 def test_with_debugging_on_kernels_check_their_indices(tmp_path):
-    environment = {**os.environ, "CROSSBODY_DEBUG": "1"}
+    environment = helped(CROSSBODY_DEBUG="1")
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(DEBUG)], cwd=Path(__file__).parent, env=environment,
         capture_output=True, text=True, check=False,

@@ -89,7 +89,7 @@ def test_implicit_steps_are_of_order_four_and_so_is_their_dense_output():
 def test_what_a_stabiliser_costs_where_nothing_drifts():
     """Its poles bound the step by the errors of the stages, far below the limit of stability; drift it has none.
 
-    Printed with `pytest tests/test_order.py -s`: the figures of the model's page.
+    Printed with `pytest tests/reference/test_order.py -s`: the figures of the model's page.
     """
     taken = {}
     for pole in (0.01, 1.0, 20.0, 100.0):

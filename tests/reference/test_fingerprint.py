@@ -6,7 +6,6 @@ import ast
 import enum
 import inspect
 import math
-import os
 import random
 import subprocess
 import sys
@@ -20,6 +19,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import helped
 
 from crossbody.reference import core, linear, systems
 from crossbody.reference._fingerprint import Unreadable, fingerprint
@@ -93,7 +93,7 @@ def test_every_global_that_a_compiled_function_reaches_is_in_its_key():
     # In a process that compiles nothing, where the functions stand as they were written.
     code = "import test_fingerprint as law; print(*law.mutate_every_global())"
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=Path(__file__).parent, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        [sys.executable, "-c", code], cwd=Path(__file__).parent, env=helped(NUMBA_DISABLE_JIT="1"),
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from places import ROBOTS
 from published import MJCF
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases.rotations import differences
 
-ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 PUSHED = {
     "agility_cassie/cassie": ("left-foot 0 0 60 0 .02", 0.006),
     "franka_emika_panda/panda": ("link5 0 40 0 0 .1", 0.06),

@@ -10,12 +10,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
+from places import ROBOTS
 
 from crossbody import cases, engines
 from crossbody.cases import Case
@@ -24,7 +24,6 @@ from crossbody.cases.rotations import differences
 from crossbody.engines.mujoco.scene import matched
 
 pytestmark = pytest.mark.bench
-ROBOTS = Path(__file__).parents[2] / "shared" / "data" / "robots"
 WANTED = 1e-9
 ROBOT = {
     "franka_emika_panda/panda": (2.0, 12.0), "universal_robots_ur5e/ur5e": (2.0, 15.0), "unitree_go1/go1": (2.0, 12.0),

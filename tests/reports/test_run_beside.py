@@ -11,10 +11,10 @@ import time
 from pathlib import Path
 
 import pytest
+from places import STUCK
 
 from crossbody.reports.runs import watch
 
-STUCK = Path(__file__).parent / "stuck_engine.py"
 BALLS = """from crossbody.cases.library.bouncing_ball import PARAMETERS, build
 
 VARIANTS = {"linear": {"a0": 1e4, "a1": 20.0, "a2": 0.0}, "resting": {"a2": 0.0}, "listing": {}}

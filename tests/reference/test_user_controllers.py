@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from places import ROBOTS
 from random_scenes import random_scene, random_state
+from scenes import BALL
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Control, ControlError, Inputs, InvalidValue, Law, Outcome, SceneError, Trajectory
-from crossbody.cases.scene import Actuator, Body, Joint, Pair, Push, RowLaw, Scene, Shape
+from crossbody.cases.scene import Actuator, Body, Joint, Push, Scene
 from crossbody.reference import ensemble, kernels, linear, simulate
 from crossbody.reference.systems import _none
 from crossbody.reference.tree.system import system
@@ -45,16 +47,6 @@ ARM = Scene(
     actuators=(Actuator(name="m1", joint="shoulder", gear=(2.0,)), Actuator(name="m2", joint="elbow")),
 )  # fmt: skip
 AIM = np.array([0.4, -0.3])
-BALL = Scene(
-    bodies=(Body(name="ball", mass=0.5, inertia=(1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)),),
-    joints=(Joint(name="x", body="ball", type="slide", axis=(1.0, 0.0, 0.0)),),
-    shapes=(
-        Shape(name="ball", body="ball", type="sphere", size=(0.1, 0.0, 0.0)),
-        Shape(name="wall", type="plane", position=(0.3, 0.0, 0.0), orientation=(0.5**0.5, 0.0, -(0.5**0.5), 0.0)),
-    ),
-    pairs=(Pair(name="touch", first="wall", second="ball", law=RowLaw(a0=2e4, a1=40.0)),),
-    actuators=(Actuator(name="push", joint="x"),),
-)  # fmt: skip
 
 
 def pd(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -238,7 +230,7 @@ def test_random_scenes_with_an_impedance_law_move_alike_in_four_engines(seed: in
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["universal_robots_ur5e/ur5e", "unitree_go1/go1", "franka_emika_panda/panda"])
 def test_published_robots_move_alike_under_one_impedance_law(robot: str) -> None:
-    path = Path(__file__).parents[2] / "shared" / "data" / "robots" / f"{robot}.xml"
+    path = ROBOTS / f"{robot}.xml"
     if not path.is_file():
         pytest.skip(f"The robot's file {path} is not here.")
     start = cases.from_file(path, without="friction,contacts")

@@ -66,7 +66,7 @@ def test_rest_costs_under_a_hundred_steps(a0):
 
 
 def test_hands_back_to_the_explicit_method_at_an_event():
-    from test_machines import gusty
+    from gusty import gusty
 
     inputs = ([0.0, 1.0, 1.2], [[0.0], [15.0], [0.0]])
     run = simulate(gusty(1e8, 2e4), [1e-6], [0.0], 4.0, rtol=1e-8, inputs=inputs)

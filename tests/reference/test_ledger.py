@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from gusty import gusty
 from mechanisms import ball, flyby, oscillator, sliders
-from test_machines import gusty
 from wall_pendulum import wall_pendulum
 
 from crossbody import cases, engines
