@@ -65,10 +65,10 @@ class Switched(Rows):
         """Put the law of the rows in contact in force and that of the others out of it."""
         self.armed, self.on = modes, np.array(modes) == CONTACT
         for row, (margin, i) in enumerate(self.part, self.always):
-            if modes[row] in (CONTACT, BALLISTIC):
-                self._widen(row)
-            else:
-                margin[i] = -FAR if self.quiet else self.surface[row] + REACH
+            margin[i] = -FAR if self.quiet else self.surface[row] + REACH
+        for row, mode in enumerate(modes):
+            if mode in (CONTACT, BALLISTIC):
+                self._widen(row)  # behind all others: both bounds of a joint have one margin
 
     def _widen(self, row: int) -> None:
         margin, i = self.part[row - self.always]
