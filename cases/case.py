@@ -56,6 +56,14 @@ class Parameter:
     open_low: bool = False
     choices: tuple[str, ...] = ()
 
+    @property
+    def valid(self) -> str:
+        """Its words or its interval; empty for any text."""
+        if isinstance(self.default, str):
+            return ", ".join(self.choices)
+        opens = "(" if self.open_low or math.isinf(self.low) else "["
+        return f"{opens}{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
+
     def checked(self, where: str, value: Value) -> Value:
         """Return `value` in the type of the default.
 
@@ -64,8 +72,7 @@ class Parameter:
         """
         if isinstance(self.default, str):
             if not isinstance(value, str) or (self.choices and value not in self.choices):
-                valid = ", ".join(self.choices) or f"a text ({self.doc})"
-                raise InvalidValue(f"{where} is {shown(value)}; valid: {valid}.")
+                raise InvalidValue(f"{where} is {shown(value)}; valid: {self.valid or f'a text ({self.doc})'}.")
             return value
         try:
             if not isinstance(value, (int, float, str, np.number, np.bool_)):
@@ -74,11 +81,7 @@ class Parameter:
         except (TypeError, ValueError, OverflowError):
             raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].") from None
         if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
-            bracket = "(" if self.open_low or math.isinf(self.low) else "["
-            close = ")" if math.isinf(self.high) else "]"
-            raise InvalidValue(
-                f"{where} is {number:g}; valid: {bracket}{self.low:g}, {self.high:g}{close} {self.unit}."
-            )
+            raise InvalidValue(f"{where} is {number:g}; valid: {self.valid} {self.unit}.")
         if isinstance(self.default, int) and not isinstance(self.default, bool):
             if number != int(number):
                 raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")

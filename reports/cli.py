@@ -62,13 +62,13 @@ def cli() -> None:
 
 
 @cli.command("list")
-@click.argument("case", required=False)
+@click.argument("name", metavar="[CASE or ENGINE]", required=False)
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
-def list_(case: str | None, plain: bool) -> None:
-    """List cases, engines, metrics, stress suites and models of logs; or parameters and metrics of CASE."""
+def list_(name: str | None, plain: bool) -> None:
+    """List cases, engines, metrics, stress suites and models of logs; or what CASE or ENGINE has."""
     from crossbody.reports import described
 
-    told = described.everything() if case is None else described.case(case)
+    told = described.everything() if name is None else described.one(name)
     click.echo(json.dumps({k.lower(): v for k, v in told.items()}, indent=1) if plain else described.text(told))
 
 

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from crossbody.cases import Parameter
+
 Named = dict[str, dict[str, str]]
 """Heading -> name -> one line."""
+EVERYTHING = "(-inf, inf)"
 
 
 def everything() -> Named:
@@ -31,9 +37,7 @@ def case(name: str) -> Named:
 
     source = loading.module(name)
     found = {variant: cases.load(name, variant) for variant in source.VARIANTS}
-    parameters = {
-        key: f"{each.doc} ({f'{_short(each.default)} {each.unit}'.strip()})" for key, each in source.PARAMETERS.items()
-    }
+    parameters = {key: _parameter(each) for key, each in source.PARAMETERS.items()}
     own = {key: f"{metric.doc} [{metric.unit}]" for one in found.values() for key, metric in one.metrics.items()}
     rows = {row: "" for one in found.values() for row in one.contacts}
     told = {
@@ -43,8 +47,30 @@ def case(name: str) -> Named:
     return {title: named for title, named in told.items() if named}
 
 
-def _short(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def _parameter(one: Parameter) -> str:
+    """Return its sentence, its default with the unit, and what is valid where that is bounded."""
+    default = f"{one.default:g}" if isinstance(one.default, float) else str(one.default)
+    told = [f"{default} {one.unit}".strip(), "" if one.valid == EVERYTHING else one.valid]
+    return f"{one.doc} ({'; '.join(filter(None, told)) or 'empty'})"
+
+
+def engine(name: str) -> Named:
+    """Return profiles of an engine, and versions of its packages.
+
+    Raises:
+        CrossbodyError: if there is no such engine, or it is not installed.
+    """
+    from crossbody import engines
+
+    found = engines.load(name)
+    return {"Profiles": dict(found.profiles), "Versions": dict(found.versions)}
+
+
+def one(name: str) -> Named:
+    """Return what can be asked of the case, file or engine of that name."""
+    from crossbody import engines
+
+    return engine(name) if name in engines.names() else case(name)
 
 
 def text(told: Named) -> str:

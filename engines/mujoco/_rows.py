@@ -184,13 +184,13 @@ class Rows:
         gaps, bodies, n = np.empty((len(q), self.touching.count)), numbers(self.scene), self.model.nbody
         if not self.touching.count:
             return gaps
-        R, p = np.empty((TOGETHER, n, 3, 3)), np.empty((TOGETHER, n, 3))
+        R, p, ways = np.empty((TOGETHER, n, 3, 3)), np.empty((TOGETHER, n, 3)), dict[int, bool]()
         for first in range(0, len(q), TOGETHER):
             part = q[first : first + TOGETHER]
             for k, position in enumerate(part):
                 data.qpos[:] = position
                 mujoco.mj_kinematics(self.model, data)
                 R[k], p[k] = data.xmat.reshape(-1, 3, 3), data.xpos
-            met = self.touching.touches(lambda name: (R[:, bodies[name]], p[:, bodies[name]]))
-            gaps[first : first + TOGETHER] = met.gap[: len(part)]
+            poses = {name: (R[: len(part), i], p[: len(part), i]) for name, i in bodies.items()}
+            gaps[first : first + TOGETHER] = self.touching.recorded(poses.__getitem__, ways)
         return gaps

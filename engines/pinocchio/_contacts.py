@@ -38,13 +38,13 @@ class ContactRows:
         return self.contacts.touches(self._now(q), rows, self.along).gap if self.count else np.zeros(0)
 
     def recorded(self, q: Floats) -> Floats:
-        """Return h (m, n) of recorded positions (m, nq), as the shapes lie there."""
-        bodies, gaps = self.contacts.bodies, [np.zeros((0, self.count))]
+        """Return h (m, n) of recorded positions (m, nq), one after the other."""
+        gaps, ways = [np.zeros((0, self.count))], dict[int, bool]()
         for first in range(0, len(q) if self.count else 0, TOGETHER):
-            found = [[now(body) for body in bodies] for now in map(self._now, q[first : first + TOGETHER])]
-            R, p = (np.array([[pose[k] for pose in one] for one in found]) for k in (0, 1))
-            placed = {body: (R[:, i], p[:, i]) for i, body in enumerate(bodies)}
-            gaps.append(self.contacts.touches(placed.__getitem__).gap)
+            found = [
+                [now(body) for body in self.contacts.bodies] for now in map(self._now, q[first : first + TOGETHER])
+            ]
+            gaps.append(self.contacts.recorded(self._stacked(found), ways))
         return np.concatenate(gaps) if self.count else np.zeros((len(q), 0))
 
     def parted(self, q: Floats) -> tuple[Floats, Floats]:
@@ -75,11 +75,28 @@ class ContactRows:
         along, turn = self.contacts.lying(self._now(q), rows)
         along |= self.along
 
-        def rates(t: float) -> Floats:
-            pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
-            return closing(self.contacts.touches(lambda body: self._pose(body, data), rows, along), self._carried)
+        def rates(times: Floats) -> Floats:
+            placed, twists, origins = [], [], []
+            for t in times:
+                pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
+                placed.append([self._pose(body, data) for body in self.contacts.bodies])
+                twists.append([pin.getVelocity(self.model, data, joint, WORLD).vector for joint in self.carriers])
+                origins.append(self._origins(data))
+            poses, moving, at = self._stacked(placed), np.array(twists), np.array(origins)
+
+            def carried(bodies: Indices, points: Floats) -> Floats:
+                twist = moving[:, bodies]
+                velocity: Floats = twist[..., :3] + cross(twist[..., 3:], points - at[:, bodies])
+                return velocity
+
+            return closing(self.contacts.touches(poses, rows, along), carried)
 
         return drift(rates, v, turn)
+
+    def _stacked(self, placed: Sequence[Sequence[Pose]]) -> Poses:
+        """Return what gives the poses of bodies at several instants at once (m, 3, 3) and (m, 3)."""
+        R, p = (np.array([[pose[k] for pose in one] for one in placed]) for k in (0, 1))
+        return {body: (R[:, i], p[:, i]) for i, body in enumerate(self.contacts.bodies)}.__getitem__
 
     def _now(self, q: Floats) -> Poses:
         """Return what gives the poses of bodies at q."""
@@ -90,13 +107,6 @@ class ContactRows:
         carrier, pose = self.placed[body]
         world = data.oMi[carrier] * pose
         return world.rotation, world.translation
-
-    def _carried(self, bodies: Indices, points: Floats) -> Floats:
-        """Return the velocities (n, 3) of points that bodies carry, where `drift` has moved them."""
-        data = self._moved
-        twists = np.array([pin.getVelocity(self.model, data, joint, WORLD).vector for joint in self.carriers])[bodies]
-        carried: Floats = twists[:, :3] + cross(twists[:, 3:], points - self._origins(data)[bodies])
-        return carried
 
     def _origins(self, data: Any) -> Floats:
         """Return where the joints are that carry the bodies (nb, 3)."""

@@ -33,9 +33,12 @@ from crossbody.reports.judging.verdict import (
 )  # fmt: skip
 from crossbody.reports.measuring.truth import TRUTH, Truth
 
-GROWING = frozenset({"position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path"})
-"""Metrics that compare a motion with the truth's."""
-"""Engine and metric of the row that judges the truth itself."""
+GROWING = frozenset({
+    "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
+    "largest position (importer)", "largest event_times (importer)",
+})  # fmt: skip
+"""Metrics that compare a motion with the truth's, or those of two readers of a file: rounding grows as the motion has
+it."""
 LARGEST = "largest"
 """Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 FLOOR = 0.5

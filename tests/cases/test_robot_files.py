@@ -28,6 +28,7 @@ from crossbody.reference import System, simulate
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
+from crossbody.reports.metrics.position import scale_of
 from crossbody.reports.runs import jobs
 
 PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",
@@ -671,6 +672,24 @@ def test_a_medium_is_left_out_of_every_engine(tmp_path: Path) -> None:
             for path, word in ((thick, "medium"), (thin, ""))
         ]
         assert np.array_equal(runs[0].q, runs[1].q)
+
+
+def test_positions_of_a_robot_are_measured_by_the_largest_of_their_unit(tmp_path: Path) -> None:
+    """A joint that all but rests in the truth divides no error of an engine that moves it."""
+    case = cases.load(write(tmp_path, elbow='armature="1e6"'), "raised")
+    run = engines.load("reference").prepare(case, "compiled").run()
+    scale = scale_of(run, case)
+    assert np.allclose(scale, np.abs(run.q).max())
+    assert np.ptp(run.q, axis=0).min() < 1e-2 * scale[0], "one rests"
+
+
+def test_gravity_that_a_flag_turns_off_is_none_in_every_audit(tmp_path: Path) -> None:
+    path = tmp_path / "floats.xml"
+    path.write_text("""<mujoco><option gravity="0 0 -9.81"><flag gravity="disable"/></option><worldbody><body><joint/>
+        <geom size=".1" pos=".2 0 0"/></body></worldbody></mujoco>""")
+    case = cases.load(str(path))
+    assert [engines.load(name).prepare(case, profile).audit()["gravity"] for name, profile in (
+        ("mujoco", "as_is"), ("mujoco", "matched"), ("pinocchio", "law"))] == [0.0, 0.0, 0.0]  # fmt: skip
 
 
 def test_contacts_with_a_height_field_are_refused_by_its_name(tmp_path: Path) -> None:

@@ -17,10 +17,9 @@ from crossbody.cases.scene import Scene
 from crossbody.reference.tree.table import tabulate
 
 REFUSED = {
-    "dm_control/dog": "activation",
     "dm_control/fish": "medium",
     "dm_control/lqr": "no joint",
-    "dm_control/quadruped": "activation",
+    "dm_control/quadruped": "height field",
     "dm_control/swimmer": "medium",
     "gymnasium/swimmer": "medium",
     "alex_description/alex_psyonic_hands": "'index_q1', which does not exist",

@@ -57,6 +57,40 @@ def standing(apart: float) -> Case:
     return cases.from_scene(scene, q0=[0.101, 0.0], t_end=0.3)
 
 
+@pytest.mark.parametrize("engine", ["reference", "pinocchio"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_ball_within_another_changes_nothing(seed: int, engine: str) -> None:
+    """Its row is that of the other with another gap: no multipliers let both follow their laws."""
+    rng = np.random.default_rng(seed)
+    alone = standing(float(rng.uniform(0.1, 0.4)))
+    assert alone.scene is not None
+    scene = alone.scene.replace(gravity=(0.0, 0.0, -float(rng.uniform(1.0, 30.0))))
+    within, law = scene.shapes[1], scene.pairs[0].law
+    smaller = replace(within, name="within", size=(within.size[0] - 10.0 ** -float(rng.uniform(3.0, 6.0)), 0.0, 0.0))
+    pair = Pair(name="within", first="floor", second="within", law=law)
+    both = scene.replace(shapes=(*scene.shapes, smaller), pairs=(*scene.pairs, pair))
+    runs = [
+        engines.load(engine).prepare(cases.from_scene(one, q0=[0.105, 0.05], t_end=0.3)).run() for one in (scene, both)
+    ]
+    assert all(run.outcome.ok for run in runs)
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() < 1e-8
+
+
+@pytest.mark.parametrize(("engine", "profile"), [("pinocchio", "law"), ("mujoco", "matched")])
+def test_how_shapes_lie_out_of_reach_is_not_looked_at(engine: str, profile: str) -> None:
+    law = RowLaw(a0=1e3, a1=60.0)
+    bodies = [Body(name=name, position=(x, 0.0, 0.0), mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+              for name, x in (("one", 0.0), ("two", 1.0))]  # fmt: skip
+    joints = [Joint(name=body.name, body=body.name, type="hinge", axis=(0.0, 1.0, 0.0)) for body in bodies]
+    bars = [Shape(name=f"bar of {body.name}", body=body.name, type="capsule", size=(0.02, 0.1, 0.0)) for body in bodies]
+    pair = Pair(name="bars", first=bars[0].name, second=bars[1].name, law=law)
+    scene = Scene(bodies=tuple(bodies), joints=tuple(joints), shapes=tuple(bars), pairs=(pair,), gravity=(0.0,) * 3)
+    case = cases.from_scene(scene, q0=[0.0, 0.1], v0=[3.0, -5.0], t_end=1.0)
+    run = engines.load(engine).prepare(case, profile).run()
+    exact = engines.load("reference").prepare(case, "compiled", samples=np.array(run.t)).run()
+    assert np.abs(run.gap - exact.gap).max() < 1e-6
+
+
 @pytest.mark.parametrize(("apart", "unique"), [(1e-12, False), (1e-8, False), (1e-3, True), (0.3, True)])
 def test_a_load_may_be_shared_in_any_way_where_that_exerts_nothing(apart: float, unique: bool) -> None:
     """What moves from one ball to the other is an error of the law where the two balls can be told apart, else none."""

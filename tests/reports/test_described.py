@@ -7,7 +7,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from crossbody import cases
+from crossbody import cases, engines
 from crossbody.cases import loading
 from crossbody.reports import described, metrics
 from crossbody.reports.cli import cli
@@ -25,6 +25,16 @@ def test_a_case_is_listed_with_all_that_it_can_be_asked_for(name: str) -> None:
         assert set(case.contacts) <= set(told.get("rows", ()))
         assert set(case.metrics) <= set(told.get("metrics of its own", ()))
         assert not set(case.metrics) & set(metrics.names())
+
+
+@pytest.mark.parametrize("name", engines.names())
+def test_an_engine_is_listed_with_its_profiles(name: str) -> None:
+    try:
+        told = described.one(name)
+    except cases.EngineUnavailable:
+        pytest.skip(f"{name} is not installed")
+    assert told["Profiles"] == dict(engines.load(name).profiles)
+    assert told["Versions"]
 
 
 def test_an_unknown_case_is_a_sentence() -> None:
