@@ -207,7 +207,8 @@ class LevelMachine:
         G = np.diag(self.rows.delassus(q))
         self._unmoved = set(np.flatnonzero(UNMOVED * G.max(initial=0.0) >= G).tolist())
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
-        parts = (press < -UNMET * (noise / NOISE + np.abs(lam) * G)) & ~np.array(self.rows.fast)  # whose law it may be
+        own = ~np.array(self.rows.fast, dtype=bool)  # whose law it may be
+        parts = (press < -UNMET * (noise / NOISE + np.abs(lam) * G)) & own
         return View(h, hd, lam, allowed, press > noise, parts)
 
     def _wanted(self, view: View, modes: Modes, deep: float) -> list[int]:
