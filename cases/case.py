@@ -253,7 +253,8 @@ class Case:
 
     Attributes:
         name, variant: which case; `title` says it in words.
-        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of one's own with them.
+        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of one's own with them;
+            "scene" where they are those of every scene.
         parameters: every parameter of the case, resolved, SI.
         coordinates: names and units of q.
         contacts: names of the constraint rows.
@@ -272,8 +273,8 @@ class Case:
         limits: how far engines may be from the truth.
         act0 (na,): activations at the start, of those actuators of the scene that have one; 0 if not given.
         rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
-        scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
-            `findings` what is strange in it.
+        scene: bodies, joints and what acts between them, of which engines build their models; the reference takes the
+            kernels of `mechanism` where there are some. `file` is where it was read from, `findings` what is strange.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
             show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
@@ -349,6 +350,11 @@ class Case:
         object.__setattr__(self, "control", control)
         if inputs is not None:
             object.__setattr__(self, "inputs", replace(inputs, times=control.on_ticks(inputs.times)))
+
+    @property
+    def general(self) -> bool:
+        """Whether its equations are those of every scene: a robot's file, or a scene without kernels of its own."""
+        return self.mechanism == "scene"
 
     @property
     def label(self) -> str:

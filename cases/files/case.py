@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Case, Coordinate, Inputs, Law, Limit, Parameter, Value
+from crossbody.cases.case import Case, Coordinate, Inputs, Limit, Parameter, Value
 from crossbody.cases.control import Control
 from crossbody.cases.errors import SceneError, UnknownName
 from crossbody.cases.files.assemble import assembled
@@ -21,7 +21,7 @@ from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
-from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_rows import law_of, rows_of
 
 REFERENCE_POSE, UNNAMED = "reference", "scene"
 OF_THE_FILE = -1.0
@@ -169,23 +169,19 @@ def case_of(
     if rank >= 0 and not scene.loops:
         raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
-    names, laws, unilateral = rows_of(scene)
+    names, laws, _ = rows_of(scene)
     fast = [name for name, one in zip(names, laws, strict=True) if one.b0 or one.b1]
     if fast:
         raise SceneError(
             f"Row {fast[0]!r} has constants of COLLISION, which no row of a scene follows: b0, b1 must be 0."
         )
-    law = Law(
-        a0=np.array([one.a0 for one in laws]), a1=np.array([one.a1 for one in laws]),
-        a2=np.array([one.a2 for one in laws]), unilateral=np.array(unilateral, dtype=bool),
-    )  # fmt: skip
     return Case(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
-        contacts=tuple(names), q0=start,
+        contacts=tuple(rows_of(scene)[0]), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else cast(Floats, v0),  # arrays are checked there
-        act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law,
+        act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law_of(scene),
         inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
         limits=AS_IT_STANDS if file else (),
@@ -286,28 +282,3 @@ AS_IT_STANDS = (
     ),
 )  # fmt: skip
 """Of what an engine makes of a file by itself: its reader is judged, what it computes is told."""
-
-
-COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-"""Of a loop in space: its points, then its axes."""
-
-
-def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
-    """Return names, laws and whether they can open, of the rows in the order of all engines."""
-    names, laws, unilateral = [], [], []
-    for loop in scene.loops:
-        for k in range(loop.width):
-            names.append(loop.name if loop.width == 1 else f"{loop.name} {COMPONENTS[k]}")
-            laws.append(loop.law)
-            unilateral.append(False)
-    for part in scene.bounded:
-        for side, bound in zip(("low", "high"), part.range, strict=True):
-            if np.isfinite(bound):
-                names.append(f"{part.name} {side}")
-                laws.append(part.law)
-                unilateral.append(True)
-    for contact in contacts(scene):
-        names += contact.rows
-        laws += [contact.pair.law] * contact.places
-        unilateral += [True] * contact.places
-    return names, laws, unilateral

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
+from crossbody.cases.scene_contacts import by_shapes
 from crossbody.engines._contacts import TOGETHER, Contacts, Indices, Poses, closing, drift
 from crossbody.engines.nearest import Pose, cross
 
@@ -110,3 +111,50 @@ class ContactRows:
     def _origins(self, data: Any) -> Floats:
         """Return where the joints are that carry the bodies (nb, 3)."""
         return np.array([data.oMi[joint].translation for joint in self.carriers]).reshape(-1, 3)
+
+
+class Points:
+    """Rows as Pinocchio's constraints of three components, the normal last, at positions q.
+
+    A contact is a point without friction between its shapes. A coordinate that is held is an anchor where it has its
+    value, whose other components the joint keeps anyway.
+    """
+
+    def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
+        self.model, self.data = model, model.createData()
+        loops = [loop for loop in scene.loops if loop.type == "joint" and not loop.second]
+        self.contacts, self.placed = Contacts(by_shapes(scene)), placed
+        self.anchors = [self._anchor(model.getJointId(loop.first), loop.polynomial[0]) for loop in loops]
+
+    def __call__(self, q: Floats) -> list[Any]:
+        """Return the constraints."""
+        found = list(self.anchors)
+        if not self.contacts.count:
+            return found
+        pin.forwardKinematics(self.model, self.data, q)
+        met = self.contacts.touches(self._pose)
+        for gap, normal, point, *bodies in zip(met.gap, met.normal, met.point, met.first, met.second, strict=True):
+            turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
+            world = pin.SE3(turn, point - 0.5 * gap * normal)
+            joints = [self.placed[self.contacts.bodies[body]][0] for body in bodies]
+            ends = [part for i in joints for part in (i, self.data.oMi[i].inverse() * world)]
+            contact = pin.PointContactConstraintModel(self.model, *ends)
+            contact.setFriction(0.0)
+            found.append(pin.ConstraintModel(contact))
+        return found
+
+    def _anchor(self, joint: int, value: float) -> Any:
+        """Return the point of a slide that is held, with the third axis along it."""
+        kind = self.model.joints[joint]
+        moved = kind.createData()
+        kind.calc(moved, np.array([value]))
+        turn = pin.SE3(
+            pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(moved.S)[:3]).matrix(), np.zeros(3)
+        )
+        world = self.model.jointPlacements[joint] * moved.M * turn
+        return pin.ConstraintModel(pin.PointAnchorConstraintModel(self.model, 0, world, joint, turn))
+
+    def _pose(self, body: str) -> Pose:
+        carrier, pose = self.placed[body]
+        world = self.data.oMi[carrier] * pose
+        return world.rotation, world.translation

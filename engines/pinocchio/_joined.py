@@ -16,9 +16,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
+from crossbody.engines.nearest import cross as crossed
 from crossbody.engines.pinocchio._rows import ROUNDING, Solve, pose
 
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
@@ -136,30 +139,6 @@ def _velocity_of(model: Any, data: Any, end: int) -> Floats:
 class Spans:
     """Distances of two points: lengths, and their derivatives along Pinocchio's velocities.
 
-    Args:
-        model, placed: as of `Joined`.
-        tendons: those between points.
-    """
-
-    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
-        self.model = model.copy()
-        self.ends = [ends_of(self.model, placed, tendon) for tendon in tendons]
-        self.data = self.model.createData()
-
-    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return l (nt,) and dl/dv (nt, nv)."""
-        pin.computeJointJacobians(self.model, self.data, q)
-        pin.updateFramePlacements(self.model, self.data)
-        lengths, rows = np.zeros(len(self.ends)), np.zeros((len(self.ends), self.model.nv))
-        for i, (one, two) in enumerate(self.ends):
-            lengths[i], n = apart(self.data, one, two)
-            rows[i] = n @ (_velocity_of(self.model, self.data, two) - _velocity_of(self.model, self.data, one))[:3]
-        return lengths, rows
-
-
-class Strings:
-    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
-
     With W = v2 - v1 of the points and n from the first to the second, W_t what of W is not along n:
 
         d' = n.W,    d'' at v' = 0 = n.(a2 - a1) + |W_t|^2 / d
@@ -170,53 +149,100 @@ class Strings:
     """
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
+        self.model, self.data = model, model.createData()
+        points = [tuple(zip(tendon.bodies, tendon.positions, strict=True)) for tendon in tendons]
+        known = list(dict.fromkeys(point for pair in points for point in pair))
+        ends = [(placed[body][0], placed[body][1] * pose(place, UPRIGHT)) for body, place in known]
+        which = [[known.index(point) for point in pair] for pair in points]
+        self.one, self.two = np.array(which, dtype=int).reshape(-1, 2).T
+        self.joints, self.arms = [joint for joint, _ in ends], np.array([at.translation for _, at in ends])
+        self.moving = np.zeros((len(ends), model.nv))  # 1 where a coordinate moves an end
+        for row, carrier in zip(self.moving, self.joints, strict=True):
+            for joint in list(model.supports[carrier])[1:]:
+                row[model.joints[joint].idx_v :][: model.joints[joint].nv] = 1.0
+
+    def _apart(self) -> tuple[Floats, Floats, Floats]:
+        """Return the points of the ends (ne, 3), distances (nt,), and directions from first to second (nt, 3)."""
+        poses = [self.data.oMi[joint] for joint in self.joints]
+        turned = np.array([pose.rotation for pose in poses]) @ self.arms[:, :, None]
+        origins, arms = np.array([pose.translation for pose in poses]), turned[:, :, 0]
+        points = origins + arms
+        # What moves alike stays as far apart to the last bit: bodies that hang side by side touch, or do not.
+        way = (origins[self.two] - origins[self.one]) + (arms[self.two] - arms[self.one])
+        d = np.sqrt(np.einsum("ij,ij->i", way, way))
+        return points, d, way / d[:, None]
+
+    def lengths(self, q: Floats) -> Floats:
+        """Return l (nt,)."""
+        pin.forwardKinematics(self.model, self.data, q)
+        return self._apart()[1]
+
+    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return l (nt,) and dl/dv (nt, nv): an end's n.v is n.(linear) + (x cross n).(angular), as of the origin."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        points, d, n = self._apart()
+        J = self.data.J.reshape(6, -1)  # of one column it is a vector
+
+        def along(ends: Any) -> Floats:
+            found: Floats = self.moving[ends] * (n @ J[:3] + crossed(points[ends], n) @ J[3:])
+            return found
+
+        return d, along(self.two) - along(self.one)
+
+    def bend(self, q: Floats, v: Floats) -> Floats:
+        """Return d'' at v' = 0 (nt,)."""
+        pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
+        points, d, n = self._apart()
+        carried = self.moving * v
+        twist, change = (carried @ part.reshape(6, -1).T for part in (self.data.J, self.data.dJ))
+        rate = twist[:, :3] + crossed(twist[:, 3:], points)
+        own = change[:, :3] + crossed(change[:, 3:], points) + crossed(twist[:, 3:], rate)
+        W, a = (part[self.two] - part[self.one] for part in (rate, own))
+        across = W - np.einsum("ij,ij->i", n, W)[:, None] * n
+        total: Floats = np.einsum("ij,ij->i", n, a) + np.einsum("ij,ij->i", across, across) / d
+        return total
+
+
+class Strings:
+    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
+
+    Args:
+        model, placed, tendons: as of `Spans`.
+    """
+
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
         self.spans = Spans(model, placed, tendons)
-        self.model, self.data, self.none = self.spans.model, self.spans.data, np.zeros(model.nv)
         rows = [
             (i, sign, bound + sign * tendon.margin)
             for i, tendon in enumerate(tendons)
             for sign, bound in zip((1.0, -1.0), tendon.range, strict=True)
             if np.isfinite(bound)
         ]
-        of, self.signs, self.bounds = np.array(rows).reshape(-1, 3).T
+        of, self.sign, self.bound = np.array(rows).reshape(-1, 3).T
         self.of = of.astype(int)
+
+    @property
+    def chained(self) -> bool:
+        """Whether the ends move apart from each other, or as one, and one bound each makes no ring of them."""
+        kinds, group = np.unique(self.spans.moving, axis=0, return_inverse=True)
+        one, two = (group[ends][self.of] for ends in (self.spans.one, self.spans.two))
+        joined = connected_components(coo_array((np.ones(len(one)), (one, two)), (len(kinds),) * 2), directed=False)[0]
+        return bool((np.count_nonzero(kinds, axis=0) <= 1).all()) and len(one) == len(kinds) - joined
 
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""
-        return self.gradients(q)[0]
+        found: Floats = self.sign * (self.spans.lengths(q)[self.of] - self.bound)
+        return found
 
     def gradients(self, q: Floats) -> tuple[Floats, Floats]:
         """Return h (rows,) and H (rows, nv)."""
         lengths, rows = self.spans(q)
-        return self.signs * (lengths[self.of] - self.bounds), self.signs[:, None] * rows[self.of]
+        return self.sign * (lengths[self.of] - self.bound), self.sign[:, None] * rows[self.of]
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (rows,)."""
-        model, data = self.model, self.data
-        moving(model, data, q, v, self.none)
-        found = []
-        for one, two in self.spans.ends:
-            v1, v2 = (pin.getFrameVelocity(model, data, end, AXES).linear for end in (one, two))
-            a1, a2 = (pin.getFrameClassicalAcceleration(model, data, end, AXES).linear for end in (one, two))
-            d, n = apart(data, one, two)
-            across = (v2 - v1) - n @ (v2 - v1) * n
-            found.append(n @ (a2 - a1) + across @ across / d)
-        bent: Floats = self.signs * np.array(found)[self.of]
-        return bent
-
-
-def apart(data: Any, one: int, two: int) -> tuple[float, Floats]:
-    """Return the distance of two ends, and the direction from the first to the second."""
-    way = data.oMf[two].translation - data.oMf[one].translation
-    d = float(np.linalg.norm(way))
-    return d, way / d
-
-
-def ends_of(model: Any, placed: dict[str, tuple[int, Any]], tendon: Tendon) -> tuple[int, int]:
-    """Return the ends of a tendon between points."""
-    ends = zip(tendon.bodies, tendon.positions, strict=True)
-    one, two = (_end(model, placed[body], place, UPRIGHT) for body, place in ends)
-    return one, two
+        found: Floats = self.sign * self.spans.bend(q, v)[self.of]
+        return found
 
 
 def _end(model: Any, placed: tuple[int, Any], position: Any, orientation: Any) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,9 +64,15 @@ ALGEBRA = {"forwardDynamics": by_forward_dynamics, "kkt": by_dense_kkt}
 
 def mass_matrix(model: Any, data: Any, q: Floats) -> Floats:
     """M(q) (nv, nv); crba fills the upper triangle alone."""
-    upper = np.triu(pin.crba(model, data, q))
-    full: Floats = upper + np.triu(upper, 1).T
+    full: Floats = np.array(pin.crba(model, data, q))
+    below = _below(len(full))
+    full[below] = full.T[below]
     return full
+
+
+@cache
+def _below(n: int) -> Any:
+    return np.tril_indices(n, -1)
 
 
 def pose(position: Any, orientation: Any) -> Any:

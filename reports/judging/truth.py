@@ -112,7 +112,7 @@ def tightened(case: Case) -> tuple[Case, Trajectory]:
 
     Stiff rows on small masses reach theirs before.
     """
-    if case.scene is None:
+    if not case.general:
         return case, _tight(case)
     from crossbody.engines import load
 
@@ -156,7 +156,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     tier = Tier.D if other == "compiled" else Tier.C
     who, loose, why = other, SECOND * case.tight, ""
     shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
-    second = _witness(case) if case.scene is not None and tier is Tier.C else None
+    second = _witness(case) if case.general and tier is Tier.C else None
     if isinstance(second, Trajectory):
         who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "the scene alone"
     else:
@@ -165,7 +165,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     truth = _held_against(
         Truth(
             tier=tier, source="", trajectory=dense, at=at, agreement={}, tight=case.tight,
-            grows=_growing(case, dense, at), joined=case.scene is not None,
+            grows=_growing(case, dense, at), joined=case.general,
         ),
         second,
         case,
@@ -224,7 +224,7 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
 def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) -> float:
     """By how much more than in free flight errors of a scene's start grow: its velocities are put off, on its rows."""
     fastest = float(np.max(np.abs(truth.v), initial=0.0))
-    if case.scene is None or not truth.outcome.ok or not 0.0 < fastest < math.inf:
+    if not case.general or not truth.outcome.ok or not 0.0 < fastest < math.inf:
         return 1.0
     from crossbody.engines import load
     from crossbody.engines.equations import system_of

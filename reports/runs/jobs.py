@@ -127,7 +127,7 @@ def _profiles(name: str, profile: str | None) -> Iterator[Pick]:
 
 def of_case(pick: Pick, case: Case) -> Pick:
     """Return a pick, or for one of all profiles the one that stands for it where the case is a scene."""
-    if not pick.every or pick.skipped or case.scene is None:
+    if not pick.every or pick.skipped or not case.general:
         return pick
     return replace(pick, profile=engines.load(pick.engine).of_scenes.get(pick.profile, pick.profile))
 
@@ -267,7 +267,7 @@ def _ran(
 
 def _dear(case: Case, pick: Pick, asked: Mapping[str, Value]) -> str:
     """Return what a run of a scene would cost where that is too much, by its first part; else nothing."""
-    if case.scene is None or pick.engine == "reference":
+    if not case.general or pick.engine == "reference":
         return ""
     prepared = prepare(replace(case, t_end=FIRST * case.t_end), pick, asked)
     cost = seconds(prepared)[0] / FIRST
@@ -328,7 +328,7 @@ def _study(
     setting = next(iter(size))
     for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
         cost = _cost(setting, sizes, size[setting], took)
-        if case.scene is not None and cost > STUDIES_S:
+        if case.general and cost > STUDIES_S:
             return Study(why=f"Runs with other {setting} that tell it would take about {cost:.0f} s.", **told)
         known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
         runs = [known.get(one) or run(**of_scene, **{setting: one}, **samples) for one in sizes]

@@ -118,7 +118,7 @@ def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
         "coordinates": [{"name": c.name, "unit": c.unit} for c in case.coordinates],
         "contacts": list(case.contacts), "parameters": dict(case.parameters), "units": dict(case.units),
     }  # fmt: skip
-    return found if case.scene is None else found | {"scene": plain(_drawn(case.scene))}
+    return found if case.scene is None or not case.general else found | {"scene": plain(_drawn(case.scene))}
 
 
 def _drawn(scene: Scene) -> Scene:

@@ -69,7 +69,7 @@ def test_where_there_is_no_witness_the_truth_says_why(arm: Case, monkeypatch: py
     assert "they share the equations of the mechanism alone (Pinocchio would share the scene alone, and take" in said
 
     monkeypatch.setattr(judging, "WITNESS_S", 40.0)
-    monkeypatch.setattr(judging, "_seconds", lambda _: (1.0, 10))
+    monkeypatch.setattr(judging, "seconds", lambda _: (1.0, 10))
     long = replace(arm, t_end=500.0)  # its first part seemed cheap: a thousand steps are all that it is given
     assert str(judging._witness(long)).startswith("Pinocchio ends step_limit at t = ")
 
