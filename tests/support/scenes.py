@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases.files.case import rows_of
+from crossbody.cases.scene_rows import rows_of
 from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.engines.mujoco import _build as build
 from crossbody.reference.tree import mechanism
