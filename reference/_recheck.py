@@ -262,4 +262,5 @@ class _Recheck:
             e.activate(run.mode[row].tolist())
         else:  # rows that share a load share their noise
             noise, of_speed = float(exact.max()), float((off - exact).max())
-        return UNDECIDED * self.rtol / (8.0 * ULP) * noise + of_speed * COARSE * ULP * np.abs(run.q).max() / step
+        rounding: Floats = of_speed * COARSE * ULP * np.abs(run.q).max() / step
+        return UNDECIDED * self.rtol / (8.0 * ULP) * noise + rounding
