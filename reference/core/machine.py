@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import (
     GENERAL,
     accelerate,
@@ -53,13 +53,13 @@ TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is c
 LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 
 
-@inlined
+@compiled
 def slow(s: Any) -> float:
     """The rate below which a gap is taken to stand still."""
     return float(SLOW * s.speed)
 
 
-@inlined
+@compiled
 def known(s: Any, w: Work) -> float:
     """To what a gap is known, as far as the tolerance of the positions tells."""
     largest = 0.0
@@ -68,13 +68,13 @@ def known(s: Any, w: Work) -> float:
     return float(largest)
 
 
-@inlined
+@compiled
 def active_mode(s: Any, m: Model, i: int) -> int:
     """COLLISION where the row has fast constants and follows them in real time, else CONTACT."""
     return COLLISION if m.beta[i, 0] > 0.0 and not s.frozen else CONTACT
 
 
-@inlined
+@compiled
 def released_mode(mode: int, h: float) -> int:
     """Where a row goes whose multiplier vanished."""
     if h > 0.0:
@@ -82,7 +82,7 @@ def released_mode(mode: int, h: float) -> int:
     return COLLISION_SEPARATION if mode == COLLISION else BALLISTIC
 
 
-@inlined
+@compiled
 def _from_state(s: Any, w: Work, i: int) -> float:
     """What rounding of the state makes of row i's law."""
     position, speed = 0.0, 0.0
@@ -93,7 +93,7 @@ def _from_state(s: Any, w: Work, i: int) -> float:
     return float(8.0 * ULP * (w.law[i, 0] * position + w.law[i, 1] * speed))
 
 
-@inlined
+@compiled
 def touching(s: Any, w: Work) -> float:
     """How large a gap rounding alone can make of a touch."""
     largest = 1.0
@@ -102,7 +102,7 @@ def touching(s: Any, w: Work) -> float:
     return float(TOUCHING * largest)
 
 
-@inlined
+@compiled
 def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
     """What the law of a row that came to rest makes of a gap that counts as closed and a rate that counts as none.
 
@@ -113,7 +113,7 @@ def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
     return float(w.law[i, 0] * s.touch + w.law[i, 1] * slow(s))
 
 
-@inlined
+@compiled
 def noise(s: Any, m: Model, w: Work) -> None:
     """What rounding of the state and of the sums, and what collisions left, can make of each multiplier.
 
@@ -141,7 +141,7 @@ def noise(s: Any, m: Model, w: Work) -> None:
         _spread_left_over(s, w)
 
 
-@inlined
+@compiled
 def _spread_left_over(s: Any, w: Work) -> None:
     """Add to every row's noise the most that G^-1 r can be in it, whatever the signs: r in w.r; Cauchy and Schwarz."""
     solve_schur(w.G, s.na, w.reach, w.r, w.Hdv)
@@ -152,7 +152,7 @@ def _spread_left_over(s: Any, w: Work) -> None:
         w.noise[w.idx[j]] += np.sqrt(size2 * inverse_diagonal(w.G, s.na, w.reach, j, w.scale))
 
 
-@inlined
+@compiled
 def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Everything a machine asks for at the present instant: gaps, rates, multipliers, their noise."""
     nq = s.nq
@@ -199,7 +199,7 @@ def multiplier_if_active(
     return float(lam)
 
 
-@inlined
+@compiled
 def _off_law(m: Model, w: Work, j: int, i: int, on: float, v: Any, vd: Any) -> tuple[float, float]:
     """H'' and on (1 or 0) times a1 h' + a0 h + a2 h^3 of row i, evaluated in place j, and the size of the terms."""
     push, size, rate = w.Hdv[j], abs(w.Hdv[j]), 0.0
@@ -212,7 +212,7 @@ def _off_law(m: Model, w: Work, j: int, i: int, on: float, v: Any, vd: Any) -> t
     return push + on * (a1 * rate + spring), size + on * (a1 * abs(rate) + abs(spring))
 
 
-@inlined
+@compiled
 def _alone(K: Any, m: Model, w: Work, j: int, i: int, t: float, q: Any, v: Any) -> None:
     """Evaluate row i in place j, behind the active ones."""
     w.idx[j] = i
@@ -220,7 +220,7 @@ def _alone(K: Any, m: Model, w: Work, j: int, i: int, t: float, q: Any, v: Any) 
     K.rows(t, q, v, m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
 
 
-@inlined
+@compiled
 def _stirred(s: Any, m: Model, w: Work, j: int) -> float:
     """What rounding of the active rows' multipliers makes of the law of the row in place j, behind them."""
     if s.na == 0:
@@ -238,7 +238,7 @@ def _stirred(s: Any, m: Model, w: Work, j: int) -> float:
     return float(ROUNDING * pushed(m, w, j) + np.sqrt(G) * s.unsure)
 
 
-@inlined
+@compiled
 def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float, t: float, q: Any, v: Any) -> float:
     """What row i lacks beside the active rows: its multiplier, or if it depends on them by how much it is off its law.
 
@@ -278,7 +278,7 @@ def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: in
     return float(size)
 
 
-@inlined
+@compiled
 def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool:
     """Whether lam of row i would be positive: the rest of its law is negative with the others as they are.
 
@@ -292,7 +292,7 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
     return bool(-off > rounding + _left_over(s, m, w, i))
 
 
-@inlined
+@compiled
 def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest: bool) -> bool:
     """Whether row i would push if it were active now; the acceleration of the present modes stands in k[0]."""
     if at_rest or (not s.has_solve and active_mode(s, m, i) == CONTACT):
@@ -301,7 +301,7 @@ def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest
     return bool(lam > w.noise[i])
 
 
-@inlined
+@compiled
 def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether row i, below the surface, depends on the active rows and follows its law with them."""
     if not w.shares[i] or s.na == 0:
@@ -310,7 +310,7 @@ def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     return bool(w.tied[i] and lam > 0.0)
 
 
-@inlined
+@compiled
 def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the level machine puts row i at this instant."""
     h, rate = w.gap[i], w.rate[i]
@@ -335,7 +335,7 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     return FREE
 
 
-@inlined
+@compiled
 def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the complementarity problem's next pivot puts row i; below the surface it is CONTACT or BALLISTIC."""
     if mode[i] == FREE and not (w.gap[i] <= s.touch and (w.rate[i] <= slow(s) or w.gap[i] < -DEEP)):
@@ -347,7 +347,7 @@ def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> 
     return CONTACT if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
 
 
-@inlined
+@compiled
 def next_mode(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the machine in force puts row i at this instant."""
     if s.fsm == LEVEL:
