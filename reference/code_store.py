@@ -19,6 +19,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from threading import Timer
 
 from crossbody.cases.regular import open_regular
 
@@ -32,6 +33,7 @@ CODE, LOCK = ".code", ".lock"
 OURS = re.compile(r"[\w.<>-]*-[0-9a-f]{32}\.(code|lock)|\.[\w.<>-]*\.part")
 UNUSED_DAYS, LARGEST = 90.0, 2 << 30  # what is kept, in days since it was last read and in bytes
 TELL_S, WAIT_S, LOOK_S = 2.0, 300.0, 0.05  # when a wait is told, when it ends, and how often it is looked, s
+SLOW_S = 6.0  # when a compilation is told: that of a kernel takes less
 _DAY = 86400.0
 
 
@@ -53,6 +55,7 @@ def base() -> Path | None:
         return None
 
 
+COMPILING = "compiling for this processor, once; the integrator takes about a minute."
 ADVICE = "CROSSBODY_CACHE names another folder."
 
 
@@ -167,9 +170,14 @@ class Store:
         """Let one process compile while others wait for its code, until it is there or `WAIT_S` have passed."""
         with ExitStack() as held:
             lock = self._lock(name, held) if fcntl is not None else None
+            slow = Timer(SLOW_S, tell, [COMPILING])
+            slow.daemon = True  # a process that ends meanwhile does not wait for it
+            if not os.path.exists(self.folder / (name + CODE)):
+                slow.start()
             try:
                 yield
             finally:
+                slow.cancel()
                 if lock is not None:
                     with suppress(OSError):
                         lock.unlink()  # who waits for it looks for the code next

@@ -28,7 +28,9 @@ PROGRAM = """
     import os
     import sys
     import numpy as np
-    from crossbody.reference import kernels
+    from crossbody.reference import code_store, kernels
+
+    code_store.SLOW_S = 600.0  # nothing is told for a machine that is busy elsewhere
 
     def make(value):
         @kernels.energy
@@ -39,7 +41,6 @@ PROGRAM = """
     z, e = np.zeros(1), np.zeros(2)
     if "DROP" in os.environ:  # to another user, once the interpreter has imported what compiling needs
         make(-1.0)
-        from crossbody.reference import code_store
         code_store._opened.cache_clear()
         for name in os.environ["FORGET"].split():
             os.environ.pop(name, None)
@@ -158,6 +159,15 @@ def test_damaged_files_are_dropped_told_and_compiled_again(folder, capsys):
         assert _value(_kernel(5.0)) == 5.0
         assert f"{path} was damaged; it is compiled again." in capsys.readouterr().err
         assert path.read_bytes() != bytes(data)
+
+
+def test_a_compilation_that_takes_long_is_told_once(monkeypatch, capsys):
+    monkeypatch.setattr(code_store, "SLOW_S", 0.0)
+    assert _value(_kernel(5.0)) == 5.0
+    assert capsys.readouterr().err == f"crossbody: {code_store.COMPILING}\n"
+    code_store.tell.cache_clear()
+    assert _value(_kernel(5.0)) == 5.0
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("seed", range(3))
