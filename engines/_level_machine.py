@@ -52,6 +52,7 @@ class View:
     noise: Floats
     presses: NDArray[np.bool_]
     parts: NDArray[np.bool_]
+    lags: NDArray[np.bool_]
 
 
 def least_push(G: Floats, demand: Floats) -> Floats:
@@ -121,7 +122,8 @@ class LevelMachine:
         """See `crossbody.engines._machines.Machine`."""
         h, hd = (x.copy() for x in self.rows.gaps(q, v))
         self.slow = max(self.slow, SLOW * float(np.abs(hd[list(self.own)]).max(initial=0.0)))
-        modes, passed = self._fire(h, modes, fired | self._touching_too(q, h, hd, modes, fired))
+        fired |= self._touching_too(q, h, hd, modes, fired) | self._catching_too(q, v, h, hd, modes, fired)
+        modes, passed = self._fire(h, modes, fired)
         h[[i for i, which in fired if which == GAP]] = 0.0
         modes, more, cycle = self._iterate(q, v, h, hd, modes)
         self._closed = {i for i in self.own if h[i] <= 0.0}
@@ -153,22 +155,38 @@ class LevelMachine:
         closing = (np.abs(h) <= self._known(q)) & (hd < -self.slow)
         return frozenset((i, GAP) for i in self.own if modes[i] == FREE and closing[i])
 
+    def _catching_too(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes, fired: Fired) -> Fired:
+        """The rows below the surface that would press as one is caught, and whose rates are zero as well.
+
+        Of rows that one motion moves alike the one that was located first need not be the one that bears: the law of
+        another may ask for more.
+        """
+        below = [i for i in self.own if modes[i] != FREE and modes[i] not in ACTIVE]
+        if not any(i in below and which == PUSH for i, which in fired):
+            return frozenset()
+        still = [i for i in below if h[i] <= 0.0 and hd[i] <= self.slow]
+        press, noise = self.rows.pressure(q, v, self.rows.accelerate(q, v, modes)[0], still)
+        return frozenset((i, PUSH) for i, one, rounding in zip(still, press, noise, strict=True) if one > rounding)
+
     def _iterate(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> tuple[Modes, list[Passed], bool]:
         """All rows together; one at a time once a set of modes has repeated; a cycle if that repeats too.
 
         Then the set of the least motion, if it is consistent: many rows of one body, of which few can follow their law.
+        It is taken too where rows that contradict each other push, and one of them lags behind its law.
         """
         seen, passed, one_by_one = {modes}, list[Passed](), False
         deep = max(DEEP, self._known(q))
         while True:
-            wanted = self._wanted(self._look(q, v, h, hd, modes), modes, deep)
+            view = self._look(q, v, h, hd, modes)
+            wanted = self._wanted(view, modes, deep)
             moved = [i for i in self.own if wanted[i] != modes[i]][: 1 if one_by_one else None]
-            if not moved:
+            lags = not moved and bool(view.lags[list(self.own)].any())
+            if not moved and not lags:
                 return modes, passed, False
             passed += [(i, modes[i], wanted[i], 0.0) for i in moved]
             modes = shared(self.rows, [wanted[i] if i in moved else mode for i, mode in enumerate(modes)])
-            if modes in seen:
-                if one_by_one:
+            if lags or modes in seen:
+                if lags or one_by_one:
                     found = self._least(q, v, h, hd, modes)
                     moved = [i for i in self.own if found[i] != modes[i]]
                     passed += [(i, modes[i], found[i], 0.0) for i in moved]
@@ -210,8 +228,9 @@ class LevelMachine:
         self._unmoved = set(np.flatnonzero(UNMOVED * G.max(initial=0.0) >= G).tolist())
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
         two = np.array(self.rows.fast, dtype=bool)  # sets of constants: what its law asks depends on the mode
-        parts = ~two & (press < -UNMET * (noise / NOISE + np.abs(lam) * G))
-        return View(h, hd, lam, allowed, press > noise, parts)
+        unmet = UNMET * (noise / NOISE + np.abs(lam) * G)
+        on = np.isin(modes, ACTIVE)
+        return View(h, hd, lam, allowed, press > noise, ~two & (press < -unmet), on & ~two & (press > unmet))
 
     def _wanted(self, view: View, modes: Modes, deep: float) -> list[int]:
         """Where every row belongs by the guards that hold now."""

@@ -67,11 +67,18 @@ def _why(model: Any, pair: tuple[int, ...]) -> str:
     one, two = ("hull" if kind == "mesh" else kind for kind in types)
     if not {(one, two), (two, one)} & PLACES.keys():
         return f"no gap of a {one} and a {two} is known"
-    friction = "they have friction (without=friction leaves it out of every engine)"
-    if "hull" not in (one, two):
-        return friction
-    most = PLACES["plane", "hull"]
-    return f"{friction}, or the hull has more than {most} corners (a mesh of a file has at most its maxhullvert)"
+    reasons = ["they have friction (without=friction leaves it out of every engine)"] * _rubs(model, pair)
+    if "hull" in (one, two):
+        most = PLACES["plane", "hull"]
+        reasons.append(f"the hull has more than {most} corners (a mesh of a file has at most its maxhullvert)")
+    return ", or ".join(reasons) or "no joint moves one against the other"
+
+
+def _rubs(model: Any, pair: tuple[int, ...]) -> bool:
+    """Return whether a contact of two shapes has friction: by the one of higher priority, else by either."""
+    geoms = np.array(pair)
+    priority = model.geom_priority[geoms]
+    return bool(model.geom_condim[geoms[priority == priority.max()]].max() > 1)
 
 
 def _named(model: Any, geom: int) -> str:

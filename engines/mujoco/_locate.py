@@ -13,6 +13,8 @@ from crossbody.engines.mujoco._scene import Scene
 
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
+TOGETHER = 1e-12
+"""Part of a step within which rows cross together: which of them is located first is rounding."""
 TRIALS = 300
 """Most that one row takes; bisection alone takes 50."""
 Sign = tuple[int, int, float]
@@ -58,9 +60,11 @@ class Locator:
     def land(self, modes: Modes) -> int:
         """Redo the step so that it ends just behind its first event; returns the trials that it took.
 
-        A change of constants alone (COLLISION to CONTACT) crosses nothing: it is taken at the end of the step.
+        It ends behind all rows that cross together there: of those that one motion moves alike any may be the one that
+        bears. A change of constants alone (COLLISION to CONTACT) crosses nothing: it is taken at the end of the step.
         """
-        if not self._crossed(modes):
+        crossed = self._crossed(modes)
+        if not crossed:
             return 0
         full, trials = self.model.opt.timestep, 0
 
@@ -71,16 +75,17 @@ class Locator:
             return self.margins()[row][which]
 
         roots = []
-        for row, which, sign in self._crossed(modes):
+        for row, which, sign in crossed:
             start = value(0.0, row, which)
             bracketed = sign * start > 0.0
             try:
                 roots.append(brentq(value, 0.0, full, (row, which), 1e-15 * full, maxiter=TRIALS) if bracketed else 0.0)
             except ValueError:  # a trial starts from an evaluation of its own, and may just miss what the step passed
                 roots.append(full)
+        together = {one for one, root in zip(crossed, roots, strict=True) if root <= min(roots) + TOGETHER * full}
         tau, nudge = min(roots), 1e-16 * full
         self._redo(tau)
-        while not self._crossed(modes) and tau < full:
+        while not together.issubset(self._crossed(modes)) and tau < full:
             tau, nudge = min(tau + nudge, full), 2.0 * nudge
             self._redo(tau)
             trials += 1

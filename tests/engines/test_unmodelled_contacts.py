@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, Outcome
+from crossbody.cases.files.contacts import _why
 from crossbody.reports.runs import jobs
 
 GATE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody>
@@ -51,3 +54,27 @@ def test_nothing_is_judged_behind_it(tmp_path: Path) -> None:
 def test_a_motion_that_passes_beside_it_runs(tmp_path: Path) -> None:
     case = cases.load(gate(tmp_path, speed=5.0, wall=-3.0))
     assert engines.load("reference").prepare(case, "compiled").run().outcome is Outcome.FINISHED
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_friction_is_a_reason_where_the_contact_has_it(seed: int) -> None:
+    """By MuJoCo's own contacts, whatever the shapes' priorities."""
+    rng = np.random.default_rng(seed)
+    dims, priorities = rng.choice([1, 1, 3], 2), rng.integers(0, 2, 2)
+    balls = "".join(
+        f'<body pos="{0.15 * k} 0 0"><freejoint/><geom size="0.1" condim="{dim}" priority="{first}"/></body>'
+        for k, (dim, first) in enumerate(zip(dims, priorities, strict=True))
+    )
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert ("friction" in _why(model, (0, 1))) == (int(data.contact.dim[0]) > 1)
+
+
+def test_a_hull_without_friction_has_too_many_corners() -> None:
+    points = " ".join(f"{x:.6f}" for x in Rotation.random(300, rng=0).apply([0.0, 0.0, 1.0]).ravel())
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset><mesh name="ball" vertex="{points}"/></asset><worldbody><geom type="plane" size="1 1 1" '
+        'condim="1"/><body><freejoint/><geom type="mesh" mesh="ball" condim="1"/></body></worldbody></mujoco>'
+    )
+    assert _why(model, (0, 1)).startswith("the hull has more than 256 corners")
