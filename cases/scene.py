@@ -420,6 +420,7 @@ class Scene:
         joints: those of one body stand together, in the order of the bodies.
         shapes, pairs, loops, tendons, actuators, pushes: what else there is.
         gravity: m/s^2.
+        friction: whether pairs with friction have rows; a motion in which they meet is else not the scene's.
     """
 
     bodies: tuple[Body, ...] = ()
@@ -431,6 +432,7 @@ class Scene:
     actuators: tuple[Actuator, ...] = ()
     pushes: tuple[Push, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
+    friction: bool = True
 
     def __post_init__(self) -> None:
         """Check that names are unique, that every name which is spoken of is there, and the order of the parts."""

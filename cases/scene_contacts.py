@@ -19,6 +19,13 @@ PLACES = {
 """Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull, lowest and
 highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end
 if they lie along each other. Of a hull it is the most: each has as many as corners."""
+WAYS = ("t1", "t2")
+"""Directions across the normal: over a plane its x and y, else those of `crossbody.reference.pairs.slip`."""
+ROUND = (
+    ("plane", "sphere"), ("plane", "capsule"), ("plane", "box"), ("plane", "ellipsoid"), ("plane", "hull"),
+    ("sphere", "sphere"),
+)  # fmt: skip
+"""Pairs that may have friction."""
 LEVELLED = 1e-14
 """Sine of the angle between an axis and a plane below which it lies in it: rounding."""
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6
@@ -33,7 +40,7 @@ class Contact:
     Attributes:
         pair: whose.
         first, second: its shapes, in the order in which the rows are written: the normal leads from first to second.
-        places: number of its rows.
+        places: number of its normal rows.
     """
 
     pair: Pair
@@ -47,9 +54,24 @@ class Contact:
         return parallel(self.first, self.second)
 
     @property
-    def rows(self) -> tuple[str, ...]:
-        """Names of its rows."""
+    def friction(self) -> float:
+        """Coefficient of its Coulomb friction; 0 without."""
+        return self.pair.friction[0] if self.pair.dimension > 1 else 0.0
+
+    @property
+    def normals(self) -> tuple[str, ...]:
+        """Names of its normal rows."""
         return (self.pair.name,) if self.places == 1 else tuple(f"{self.pair.name} {k}" for k in range(self.places))
+
+    @property
+    def tangents(self) -> tuple[str, ...]:
+        """Names of its tangential rows, two for every normal one; they stand behind the normal rows of all contacts."""
+        return tuple(f"{name} {way}" for name in self.normals for way in WAYS) if self.friction > 0.0 else ()
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of all its rows."""
+        return (*self.normals, *self.tangents)
 
 
 def parallel(first: Shape, second: Shape) -> float:
@@ -67,8 +89,17 @@ def parallel(first: Shape, second: Shape) -> float:
 
 
 def contacts(scene: Scene) -> tuple[Contact, ...]:
-    """Return the pairs that have rows: without friction, of shapes whose gap is known in closed form, and that move."""
+    """Return the pairs that have rows: of shapes whose gap is known in closed form, and that move.
+
+    Those with friction have if the scene asks for it and it is of the kind that is known.
+    """
     return tuple(found for found in _all(scene) if isinstance(found, Contact))
+
+
+def frictional(scene: Scene) -> str | None:
+    """Return why an engine that has no rows with friction cannot run a scene; None if it can."""
+    first = next((one for one in contacts(scene) if one.friction > 0.0), None)
+    return None if first is None else f"Pair {first.pair.name!r} has friction, which the reference alone follows."
 
 
 def inert(scene: Scene) -> tuple[Pair, ...]:
@@ -131,7 +162,15 @@ def _all(scene: Scene) -> Iterator[Contact | Pair]:
         if (one.type, two.type) not in PLACES:
             one, two = two, one
         places = _places(one, two)
-        yield Contact(pair=pair, first=one, second=two, places=places) if places and pair.dimension == 1 else pair
+        known = places > 0 and (pair.dimension == 1 or _slides(scene, pair, one, two))
+        yield Contact(pair=pair, first=one, second=two, places=places) if known else pair
+
+
+def _slides(scene: Scene, pair: Pair, one: Shape, two: Shape) -> bool:
+    """Whether a pair has the friction that the machine knows: sliding alone, the same in all directions."""
+    if not scene.friction or pair.dimension != 3 or (one.type, two.type) not in ROUND:
+        return False
+    return pair.friction[0] == pair.friction[1]
 
 
 def _places(one: Shape, two: Shape) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,6 +33,9 @@ PARAMETERS = {
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
+    "friction": Parameter(
+        default=False, doc="contacts that slide have rows: the reference alone runs it", low=0, high=1
+    ),
     "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
     "rank": Parameter(default=-1, doc="rows of the loops that hold; -1: those that surely do", low=-1, high=1e6),
     "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
@@ -73,7 +77,8 @@ class FileCase:
             q0, v0 = assembled(model, q0, v0)
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         act0 = np.zeros(self.model.na) if index < 0 else self.model.key_act[index]
-        scene = overruled(scene_of(self.path, model), float(p["a0"]), float(p["a1"]))
+        scene = scene_of(self.path, model).replace(friction=bool(p["friction"]))
+        scene = overruled(scene, float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
@@ -298,8 +303,18 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
                 names.append(f"{part.name} {side}")
                 laws.append(part.law)
                 unilateral.append(True)
-    for contact in contacts(scene):
-        names += contact.rows
+    met = contacts(scene)
+    for contact in met:
+        names += contact.normals
         laws += [contact.pair.law] * contact.places
         unilateral += [True] * contact.places
+    for contact in met:
+        names += contact.tangents
+        laws += [_held_back(contact.pair.law)] * len(contact.tangents)
+        unilateral += [True] * len(contact.tangents)
     return names, laws, unilateral
+
+
+def _held_back(law: RowLaw) -> RowLaw:
+    """Return the law of a contact's tangential rows: a slip velocity decays as fast as a gap does."""
+    return RowLaw(a0=0.0, a1=law.a1 or math.sqrt(law.a0))

@@ -53,7 +53,8 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
             both = " and ".join(_named(model, geom) for geom in pair)
             return (
                 f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for them, because they "
-                "have friction (without=friction leaves it out of every engine), because no gap is known for such "
+                "have friction (without=friction leaves it out of every engine, friction=1 has it where shapes slide "
+                "alone and meet planes, or spheres each other), because no gap is known for such "
                 f"shapes, or because a hull has more than {PLACES['plane', 'hull']} corners (a mesh of a file has at "
                 "most its maxhullvert). "
                 f"{_advice(model, pair)}without=contacts leaves all contacts out, and a shorter t_end ends before."

@@ -17,6 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines._acting import Acting
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
@@ -51,6 +52,8 @@ def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
     if profile == "default":
         return "What MuJoCo makes of a robot file by itself is the profile as_is; default is one of the shipped cases."
+    if case.scene is not None and (found := frictional(case.scene)):
+        return found
     if profile != "as_is":
         return "MuJoCo's rows have no cubic term: a2 must be 0." if case.law.a2.any() else None
     if not case.file:

@@ -14,7 +14,9 @@ import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
-from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
+from crossbody.reference.core.friction import enter, factor
+from crossbody.reference.core.friction import solve as solve_rows
+from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, SLIP, STICK, Model, Work
 from crossbody.reference.core.shares import solve_dependent
 from crossbody.reference.kinds import Array, Bytes, Floats
 
@@ -24,8 +26,8 @@ OWN, GENERAL, SMOOTH = np.arange(3)
 
 @inlined
 def is_active(mode: int) -> bool:
-    """CONTACT, COLLISION and BILATERAL rows carry a multiplier."""
-    return bool(mode in (CONTACT, COLLISION, BILATERAL))
+    """Rows that are in contact, however, or always on carry a multiplier."""
+    return bool(mode in (CONTACT, COLLISION, BILATERAL, STICK, SLIP))
 
 
 @inlined
@@ -47,6 +49,8 @@ def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     s.have_laws = 1
     for i in range(s.nc):
         w.law[i, 0], w.law[i, 1], w.law[i, 2] = law_of(m, mode, i)
+    if s.frictional:
+        enter(s, m, w, mode)
 
 
 @inlined
@@ -165,6 +169,8 @@ def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array
     for j in range(na):
         _rate_and_drive(s, m, w, on, j, v)
         _schur_row(s, m, w, j)
+    if s.frictional:
+        return factor(s, m, w)
     s.dependent = factor_schur(w.G, na, w.reach, w.idx, w.shares)
     return int(s.dependent < 0)
 
@@ -227,7 +233,9 @@ def accelerate(
         return 0
     if assemble(rows, s, m, w, on, t, q, v) != 0:
         return 1
-    if s.dependent == 0:
+    if s.frictional:
+        solve_rows(s, m, w, w.r, w.la)
+    elif s.dependent == 0:
         solve_schur(w.G, na, w.reach, w.r, w.la)
     elif not solve_dependent(s, w, q, v):
         return 1

@@ -15,11 +15,14 @@ from crossbody.reference.core import (
     events,
     exact,
     folds,
+    friction,
+    guards,
     journal,
     peaks,
     record,
     settle,
     stepping,
+    sticking,
 )
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
@@ -37,6 +40,7 @@ from crossbody.reference.core.layout import (
     MORE,
     NODES,
     NOT_FINITE,
+    PAINLEVE,
     ROWS_FULL,
     SHORT,
     Buffers,
@@ -164,6 +168,8 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
     moved, touched = False, False
+    if s.frictional and _slip_or_jam(K, s, m, w, b):
+        return PAINLEVE
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
@@ -173,7 +179,7 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
                 moved = True
     for i in range(s.nc if touched else 0):
         if events.touches_too(s, m, w, b.mode, i):
-            journal.move(s, b, i, active_mode(s, m, i))
+            journal.move(s, b, i, active_mode(s, m, w, i))
     if moved and journal.remember(s, b):
         if s.one_by_one:
             return MODE_CYCLE
@@ -187,6 +193,21 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if code == 0:
         record.here(K, s, m, w, b.mode, b.out, b.modes, s.audited)
     return int(code)
+
+
+@inlined
+def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked."""
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta and w.kind[i] == guards.JAM:
+            marks = b.history[len(b.history) - 1]
+            marks[:] = 0
+            marks[i] = 1
+            return True
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta and w.kind[i] == guards.CONE:
+            sticking.begin_slip(K, s, m, w, i)
+    return False
 
 
 @compiled
@@ -224,6 +245,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)
+    if s.frictional:
+        friction.renew(s, m, w, b.mode, w.rates[0])
     if s.audited:
         code = audit.account(K, s, m, w)
         if code != 0:

@@ -25,6 +25,7 @@ from crossbody.reference.core.dop853 import (
     watch_guards,
     watch_multipliers,
 )
+from crossbody.reference.core.friction import solve as solve_rows
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -93,7 +94,10 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
     i = w.idx[j]
     w.r[: s.na] = 0.0
     w.r[j] = 1.0
-    solve_schur(w.G, s.na, w.reach, w.r, w.la)
+    if s.frictional:
+        solve_rows(s, m, w, w.r, w.la)
+    else:
+        solve_schur(w.G, s.na, w.reach, w.r, w.la)
     spring = w.law[i, 0] + 3.0 * w.law[i, 2] * w.ha[j] ** 2
     w.d[:] = 0.0
     push_rows(m, w, s.na, w.la, 1.0, w.d)

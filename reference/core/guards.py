@@ -10,13 +10,15 @@ from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
+from crossbody.reference.core.friction import margin, slip_along, stiffness, stopped_slip, without_pull
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, slow
 from crossbody.reference.kinds import Array, Bytes
 
 # Guards: each fires where all of its functions are below zero.
-NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH = np.arange(9)
-FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1])
+NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH, CONE, STOP, JAM = np.arange(12)
+FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1, 1, 1, 1])
+ON_BOUND = 1e-9  # part of the bound of a contact's friction, below which one that sticks has only begun to
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 
 
@@ -57,7 +59,7 @@ def rise(s: Any) -> float:
 
 
 @inlined
-def arm(s: Any, w: Work, kind: int, i: int) -> None:
+def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
     """Where the functions of a guard count as zero: at zero if they start clearly off it, else beyond what is noise.
 
     A rate, or a multiplier, that starts as zero but for rounding would fire on it. One that was clear of it is located
@@ -70,6 +72,27 @@ def arm(s: Any, w: Work, kind: int, i: int) -> None:
         w.bands[1] = slow(s)
     elif kind == CATCH and abs(w.rates[0, i]) <= slow(s):
         w.bands[0] = slow(s)
+    elif kind == STOP:
+        w.bands[0] = stopped_slip(s)  # a slip that grazes zero goes on
+    elif kind == CONE and w.cones[0, i] <= ON_BOUND * m.friction[i] * abs(w.lams[0, i]):
+        w.bands[0] = ON_BOUND * m.friction[i] * abs(w.lams[0, i])
+
+
+@inlined
+def _sticking(K: Any, s: Any, m: Model, w: Work, i: int, t: float, y: Array) -> None:
+    """Leave mu lam_n - |lam_t| of contact i in w.parts, without what pulls it back."""
+    w.parts[0] = np.nan
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], GENERAL) == 0:
+        without_pull(s, m, w)
+        w.parts[0] = margin(m, w, i, w.la)
+
+
+@inlined
+def _jammed(K: Any, s: Any, m: Model, w: Work, i: int, t: float, y: Array) -> None:
+    """Leave in w.parts what a multiplier of contact i does to its own gap while it slides."""
+    w.parts[0] = np.nan
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], GENERAL) == 0:
+        w.parts[0] = stiffness(s, m, w, w.listed[i])
 
 
 @compiled
@@ -90,6 +113,13 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     elif kind == PRESS:
         lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
         w.parts[0] = w.noise[i] - lam if lam > -np.inf else REDUNDANT
+    elif kind == CONE:
+        _sticking(K, s, m, w, i, t, w.ys)
+    elif kind == JAM:
+        _jammed(K, s, m, w, i, t, w.ys)
+    elif kind == STOP:
+        K.gaps(t, q, v, m.p, w.gap, w.rate)
+        w.parts[0] = slip_along(m, w, i, w.rate)
     else:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         h, rate = w.gap[i], w.rate[i]
@@ -139,7 +169,7 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     Returns:
         The first function's derivative over the rate of the gap; 0 if it is none of the gap.
     """
-    arm(s, w, kind, i)
+    arm(s, m, w, kind, i)
     w.tiny[:] = 0.0
     scale = 0.0
     if kind in (TOUCH, TOUCH_INSIDE, LEAVE):
@@ -159,6 +189,10 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
             row[node] = w.lams[node, i] + w.bands[0]
         elif kind == SWITCH:
             row[node] = w.guards[node, i]
+        elif kind == STOP:
+            row[node] = slip_along(m, w, i, w.rates[node]) + w.bands[0]
+        elif kind in (CONE, JAM):
+            row[node] = w.cones[node, i] + w.bands[0]
         else:
             functions(K, s, m, w, mode, kind, i, at_node(node))
             for j in range(FUNCTIONS[kind]):

@@ -20,6 +20,7 @@ from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, clear, is_active, scatter
 from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
+from crossbody.reference.core.friction import has_friction, slip_velocity, stopped_slip
 from crossbody.reference.core.layout import (
     BALLISTIC,
     COLLISION,
@@ -31,6 +32,8 @@ from crossbody.reference.core.layout import (
     ILL_POSED,
     LEVEL,
     NOT_FINITE,
+    SLIP,
+    STICK,
     Model,
     Work,
 )
@@ -60,8 +63,13 @@ def known(s: Any, w: Work) -> float:
 
 
 @inlined
-def active_mode(s: Any, m: Model, i: int) -> int:
-    """COLLISION where the row has fast constants and follows them in real time, else CONTACT."""
+def active_mode(s: Any, m: Model, w: Work, i: int) -> int:
+    """COLLISION where the row has fast constants and follows them in real time, else CONTACT.
+
+    With friction SLIP or STICK by the rates in w.rate; whether the latter holds is decided with all others that stand.
+    """
+    if s.frictional and has_friction(m, i):
+        return SLIP if slip_velocity(m, i, w.rate) > stopped_slip(s) else STICK
     return COLLISION if m.beta[i, 0] > 0.0 and not s.frozen else CONTACT
 
 
@@ -115,7 +123,7 @@ def noise(s: Any, m: Model, w: Work) -> None:
         G = 0.0
         for c in range(m.span[i, 0], m.span[i, 1]):
             G += w.H[j, c] * w.X[j, c]
-        w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i) + opened) / G
+        w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i) + opened) / G if G > 0.0 else 0.0
         w.r[j] = _left_over(s, m, w, i)
         largest = max(largest, w.r[j])
     if largest > 0.0:
@@ -161,7 +169,7 @@ def multiplier_if_active(
 ) -> float:
     """Lam of row i if it were active now, from the same equations that the row would use; noise[i] beside it."""
     before = mode[i]
-    mode[i] = active_mode(s, m, i)
+    mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, mode)
     lam, dependent = -np.inf, -1
     w.tied[i] = 0
@@ -227,14 +235,17 @@ def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: in
     """Square of what row i's joining or leaving the active rows changes v' by, in the norm of M: lam^2 / (G^-1)_ii."""
     before = mode[i]
     if not is_active(before):
-        mode[i] = active_mode(s, m, i)
+        mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, mode)
     size = 0.0
     found = accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) == 0
     if found and s.dependent == 0:  # a row that depends on the others changes nothing
         for j in range(s.na):
             if w.idx[j] == i:
-                size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
+                if s.frictional:
+                    size = w.la[j] ** 2 * w.gram[j, j]
+                else:
+                    size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
     mode[i] = before
     activate(s, m, w, mode)
     return float(size)
@@ -256,7 +267,7 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
 @inlined
 def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest: bool) -> bool:
     """Whether row i would push if it were active now; the acceleration of the present modes stands in k[0]."""
-    if at_rest or (not s.has_solve and active_mode(s, m, i) == CONTACT):
+    if at_rest or (not s.has_solve and active_mode(s, m, w, i) != COLLISION):
         return _own_press(K, s, m, w, i, at_rest)
     lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.nq], w.y[s.nq :])
     return bool(lam > w.noise[i])
@@ -285,14 +296,14 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     if mode[i] != FREE:
         closing = rate < -slow(s)
         if closing and (_would_press(K, s, m, w, mode, i, False) or _is_held(K, s, m, w, mode, i)):
-            return active_mode(s, m, i)
+            return active_mode(s, m, w, i)
         return int(mode[i])
     if rate < -slow(s):
-        return active_mode(s, m, i)
+        return active_mode(s, m, w, i)
     if h < -max(DEEP, known(s, w)):
-        return active_mode(s, m, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
+        return active_mode(s, m, w, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
     if rate <= slow(s) and _would_press(K, s, m, w, mode, i, collides):
-        return active_mode(s, m, i)
+        return active_mode(s, m, w, i)
     return FREE
 
 

@@ -25,6 +25,7 @@ from crossbody.reference.core.layout import (
     Work,
 )
 from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise, touching
+from crossbody.reference.core.sticking import decide
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
@@ -134,6 +135,10 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     events, joined = s.events, False
     while True:
         code = evaluate(K, s, m, w, b.mode)
+        if s.frictional and code == 0:
+            code = decide(K, s, m, w, b)
+            if code == 0:
+                code = evaluate(K, s, m, w, b.mode)
         if s.sharing and (code == ILL_POSED or s.idle > 0 or (s.na > 1 and doubtful(s, w))):
             code = share(K, s, m, w, b)
             if code == MOVED:
@@ -173,7 +178,7 @@ def begin(s: Any, m: Model, w: Work) -> None:
     level one, collisions that take no time, and systems with an algebra of their own.
     """
     w.idle_rows[:], w.spent[:], w.let_go[:] = 0, 0, -np.inf
-    may = s.fsm == LEVEL and not s.frozen and not s.has_solve
+    may = s.fsm == LEVEL and not s.frozen and not s.has_solve and not s.frictional
     for i in range(s.nc):
         w.order[i] = i
         s.switching |= m.unilateral[i]
