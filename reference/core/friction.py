@@ -83,7 +83,7 @@ def renew(s: Any, m: Model, w: Work, mode: Bytes, rate: Array) -> None:
     for i in range(s.nc):
         if has_friction(m, i) and mode[i] == SLIP:
             size = slip_velocity(m, i, rate)
-            if size > small_slip(s):
+            if size > small_slip(s) and slip_along(m, w, i, rate) > 0.0:  # behind zero a stop is about to be found
                 for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
                     w.way[t] = (rate[t] - m.drift[t]) / size
     if s.na > 0 and s.dependent_rows > 0:

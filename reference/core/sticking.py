@@ -48,6 +48,7 @@ SWEEPS = 60
 CLEAR = 1e-6  # part of its bound by which a force must stay below it to count as that of a contact that sticks
 TURNS = 100  # of directions of slip towards those of acceleration
 TURNED = 1e-13
+AROUND, HALVINGS = 24, 50  # directions that are looked at where that leads nowhere, and halvings between two
 MOST_SETS = 256
 FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
 DIFFERENT = 1e-6  # part of the largest acceleration by which motions differ
@@ -201,6 +202,37 @@ def _seen(s: Any, m: Model, w: Work) -> bool:
 
 
 @inlined
+def _face(s: Any, m: Model, w: Work, i: int, angle: float) -> tuple[float, float]:
+    """Let contact i begin to slide at an angle; its acceleration along that and across it."""
+    first = _first(m, w, i)
+    w.way[w.idx[first]], w.way[w.idx[first + 1]] = np.cos(angle), np.sin(angle)
+    w.along[first], w.along[first + 1] = np.cos(angle), np.sin(angle)
+    _evaluate(s, m, w)
+    x, y = w.excess[first], w.excess[first + 1]
+    return x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+
+
+@compiled
+def _look_around(s: Any, m: Model, w: Work, i: int) -> None:
+    """Search all directions for one in which contact i, once it slides, is accelerated."""
+    low = 0.0
+    ahead, aside = _face(s, m, w, i, 0.0)
+    for k in range(1, AROUND + 1):
+        high = 2.0 * np.pi * k / AROUND
+        next_ahead, next_aside = _face(s, m, w, i, high)
+        if min(ahead, next_ahead) > 0.0 and (aside > 0.0) != (next_aside > 0.0):
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                _, across = _face(s, m, w, i, middle)
+                if (across > 0.0) == (aside > 0.0):
+                    low = middle
+                else:
+                    high = middle
+            return
+        low, ahead, aside = high, next_ahead, next_aside
+
+
+@inlined
 def _judge(s: Any, m: Model, w: Work) -> int:
     """Evaluate the set, with directions that agree with what they lead to; the contact that violates it most, or -1."""
     _evaluate(s, m, w)
@@ -208,7 +240,11 @@ def _judge(s: Any, m: Model, w: Work) -> int:
         if _turn(s, m, w) <= TURNED:
             break
         _evaluate(s, m, w)
-    return _worst(s, m, w)
+    worst = _worst(s, m, w)
+    if worst >= 0 and w.state[worst] == SLIP and w.wants[worst] == STICK and m.tangents[worst] > 1:
+        _look_around(s, m, w, worst)
+        worst = _worst(s, m, w)
+    return worst
 
 
 @compiled
