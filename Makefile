@@ -26,17 +26,17 @@ bench: $(READY)
 
 peers: $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[peers]'
-	$(BIN)/pytest tests/test_peers.py tests/test_drake_scenes.py tests/test_bench.py tests/test_engine_contract.py -m "not bench"
+	$(BIN)/pytest tests/engines/test_peers.py tests/engines/test_drake_scenes.py tests/reports/test_bench.py tests/engines/test_engine_contract.py -m "not bench"
 
 JOBS ?= 1
 faults: $(READY)
-	$(BIN)/python tests/plant_faults.py --jobs $(JOBS)
+	$(BIN)/python tests/support/plant_faults.py --jobs $(JOBS)
 
 strict: $(READY)
 	$(BIN)/crossbody run --strict --out build/strict
 
 bands: $(READY)
-	$(BIN)/python -m crossbody.reports.judging.stored
+	$(BIN)/python -m crossbody.reports.commands.bands
 
 check: $(READY)
 	$(BIN)/ruff check .

@@ -20,6 +20,7 @@ from crossbody.cases.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from crossbody.cases.control import Control
+    from crossbody.cases.metric import CaseMetric
     from crossbody.cases.scene import Scene
 
 Value = float | int | str | bool
@@ -55,6 +56,14 @@ class Parameter:
     open_low: bool = False
     choices: tuple[str, ...] = ()
 
+    @property
+    def valid(self) -> str:
+        """Its words or its interval; empty for any text."""
+        if isinstance(self.default, str):
+            return ", ".join(self.choices)
+        opens = "(" if self.open_low or math.isinf(self.low) else "["
+        return f"{opens}{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
+
     def checked(self, where: str, value: Value) -> Value:
         """Return `value` in the type of the default.
 
@@ -63,7 +72,7 @@ class Parameter:
         """
         if isinstance(self.default, str):
             if not isinstance(value, str) or (self.choices and value not in self.choices):
-                raise InvalidValue(f"{where} is {shown(value)}; valid: {', '.join(self.choices)}.")
+                raise InvalidValue(f"{where} is {shown(value)}; valid: {self.valid or f'a text ({self.doc})'}.")
             return value
         try:
             if not isinstance(value, (int, float, str, np.number, np.bool_)):
@@ -72,11 +81,7 @@ class Parameter:
         except (TypeError, ValueError, OverflowError):
             raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].") from None
         if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
-            bracket = "(" if self.open_low or math.isinf(self.low) else "["
-            close = ")" if math.isinf(self.high) else "]"
-            raise InvalidValue(
-                f"{where} is {number:g}; valid: {bracket}{self.low:g}, {self.high:g}{close} {self.unit}."
-            )
+            raise InvalidValue(f"{where} is {number:g}; valid: {self.valid} {self.unit}.")
         if isinstance(self.default, int) and not isinstance(self.default, bool):
             if number != int(number):
                 raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")
@@ -186,8 +191,8 @@ class Limit:
     """How large one metric may be for one engine and profile, and why.
 
     Attributes:
-        metric: name of a metric in reports/metrics; "*" for a known property that shows in any of them, with no value
-            of its own.
+        metric: name of a metric of every case (reports/metrics) or of this one; "*" for a known property that shows in
+            any of them, with no value of its own.
         value: the largest absolute value that is still within, in the metric's unit.
         engine, profile: which runs it judges; "*" is any.
         why: the reason for the number.
@@ -248,7 +253,8 @@ class Case:
 
     Attributes:
         name, variant: which case; `title` says it in words.
-        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of one's own with them.
+        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of one's own with them;
+            "scene" where they are those of every scene.
         parameters: every parameter of the case, resolved, SI.
         coordinates: names and units of q.
         contacts: names of the constraint rows.
@@ -263,11 +269,12 @@ class Case:
         inputs: what acts from outside; None for nothing.
         control: a callable of the user's own that gives a scene's controls at its ticks, beside the inputs.
         claims: numbers that must come out.
+        metrics: numbers that runs of this case show beside those that every case has, by name.
         limits: how far engines may be from the truth.
         act0 (na,): activations at the start, of those actuators of the scene that have one; 0 if not given.
         rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
-        scene: bodies, joints and what acts between them, where the mechanism is one; `file` is where it was read from,
-            `findings` what is strange in it.
+        scene: bodies, joints and what acts between them, of which engines build their models; the reference takes the
+            kernels of `mechanism` where there are some. `file` is where it was read from, `findings` what is strange.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
             show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
@@ -293,6 +300,7 @@ class Case:
     inputs: Inputs | None = None
     control: Control | None = None
     claims: tuple[Claim, ...] = ()
+    metrics: Mapping[str, CaseMetric] = field(default_factory=lambda: MappingProxyType({}))
     limits: tuple[Limit, ...] = ()
     discrete: tuple[str, ...] = ()
     tight: float = 1e-13
@@ -326,6 +334,7 @@ class Case:
         self._put_control()
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+        object.__setattr__(self, "metrics", MappingProxyType(dict(self.metrics)))
 
     def _put_control(self) -> None:
         """Tell a controller its inputs, and bring its ticks to the horizon and to the instants of the other inputs."""
@@ -341,6 +350,11 @@ class Case:
         object.__setattr__(self, "control", control)
         if inputs is not None:
             object.__setattr__(self, "inputs", replace(inputs, times=control.on_ticks(inputs.times)))
+
+    @property
+    def general(self) -> bool:
+        """Whether its equations are those of every scene: a robot's file, or a scene without kernels of its own."""
+        return self.mechanism == "scene"
 
     @property
     def label(self) -> str:

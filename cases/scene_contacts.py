@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
+from typing import Any
 
 import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
-from crossbody.cases.scene import Joint, Pair, Scene, Shape
+from crossbody.cases.scene import UNBOUNDED, Joint, Pair, Scene, Shape, Tendon, Vector
 
 PLACES = {
     ("plane", "sphere"): 1, ("plane", "capsule"): 2, ("plane", "cylinder"): 4, ("plane", "box"): 8,
@@ -20,12 +24,16 @@ PLACES = {
 highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end
 if they lie along each other. Of a hull it is the most: each has as many as corners."""
 WAYS = ("t1", "t2")
-"""Directions across the normal: over a plane its x and y, else those of `crossbody.reference.pairs.slip`."""
+"""Directions across the normal: over a plane its x and y, else those of `crossbody.reference.tree.pair_slip`."""
 ROUND = (
     ("plane", "sphere"), ("plane", "capsule"), ("plane", "box"), ("plane", "ellipsoid"), ("plane", "hull"),
     ("sphere", "sphere"),
 )  # fmt: skip
 """Pairs that may have friction."""
+Pose = tuple[Floats, Floats]
+"""Rotation (3, 3) and origin (3,), m."""
+SAME_GAP = 1e-9
+"""m, to which a bound's gap is that of two shapes: the places of bodies are rounded."""
 LEVELLED = 1e-14
 """Sine of the angle between an axis and a plane below which it lies in it: rounding."""
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6
@@ -115,9 +123,8 @@ class _Axes:
     """Axes of a scene's joints in the world, at its reference pose."""
 
     def __init__(self, scene: Scene) -> None:
-        self.turned, self.parents = {"": np.eye(3)}, {body.name: body.parent for body in scene.bodies}
-        for body in scene.bodies:
-            self.turned[body.name] = self.turned[body.parent] @ matrices(np.asarray(body.orientation))
+        self.turned = {name: turned for name, (turned, _) in _reference_poses(scene).items()}
+        self.parents = {body.name: body.parent for body in scene.bodies}
         self.joints: dict[str, list[Joint]] = {}
         for joint in scene.joints:
             self.joints.setdefault(joint.body, []).append(joint)
@@ -146,6 +153,82 @@ class _Axes:
         if joint.type == "slide":
             return bool(abs(axis @ normal) <= LEVELLED)
         return joint.type == "hinge" and bool(np.linalg.norm(axis - (axis @ normal) * normal) <= LEVELLED)
+
+
+def by_shapes(scene: Scene) -> Scene:
+    """Return the scene with pairs of shapes in the place of lower bounds that are the distance of two shapes.
+
+    An engine with contacts of its own lets shapes touch. A bound is one of these if its gap is that of a sphere and a
+    sphere or plane, on the bodies between which it is, at the reference pose. Unless all bounds are, it is the scene as
+    it stands: rows keep their order.
+    """
+    poses, pairs = _reference_poses(scene), list[Pair]()
+    joints, tendons = (
+        tuple(_by_shapes(scene, part, poses, pairs) for part in parts) for parts in (scene.joints, scene.tendons)
+    )
+    if any(np.isfinite(part.range).any() for part in (*joints, *tendons)):
+        return scene
+    return scene.replace(joints=joints, tendons=tendons, pairs=(*pairs, *scene.pairs))
+
+
+def _by_shapes(scene: Scene, part: Any, poses: Mapping[str, Pose], pairs: list[Pair]) -> Any:
+    """Return a joint or tendon, and add its pair; as it is where no two shapes are that far apart."""
+    low, high = part.range
+    if not (math.isfinite(low) and math.isinf(high)):
+        return part
+    gap = _at_reference(scene, part, poses) - low - part.margin
+    first, second = ([shape for shape in scene.shapes if shape.body == body] for body in _ends(scene, part))
+    for one, two in product(first, second):
+        apart = _apart(one, two, poses)
+        if apart is not None and abs(apart - gap) <= SAME_GAP:
+            pairs.append(Pair(name=part.name, first=one.name, second=two.name, law=part.law))
+            return dataclasses.replace(part, range=UNBOUNDED)
+    return part
+
+
+def _ends(scene: Scene, part: Joint | Tendon) -> tuple[str, str]:
+    """Return the bodies between which a joint, a sum of two joints or a distance of points is; nobody's else."""
+    bodies = {body.name: body for body in scene.bodies}
+    if isinstance(part, Joint):
+        return (bodies[part.body].parent, part.body)
+    own = {joint.name: joint.body for joint in scene.joints}
+    found = part.bodies or tuple(own[name] for name in part.joints)
+    return (found[0], found[1]) if len(found) == 2 else ("\n", "\n")
+
+
+def _at_reference(scene: Scene, part: Joint | Tendon, poses: Mapping[str, Pose]) -> float:
+    """Return the coordinate of a joint, or the length of a tendon, at the reference pose."""
+    if isinstance(part, Joint):
+        return part.reference
+    if not part.bodies:
+        return scene.rest_length(part)
+    one, two = (_placed(poses[body], point) for body, point in zip(part.bodies, part.positions, strict=True))
+    return float(np.linalg.norm(two - one))
+
+
+def _apart(one: Shape, two: Shape, poses: Mapping[str, Pose]) -> float | None:
+    """Return the gap of two spheres, or of a plane and a sphere, at the reference pose; None of others."""
+    at, by = (_placed(poses[shape.body], shape.position) for shape in (one, two))
+    if (one.type, two.type) == ("sphere", "sphere"):
+        return float(np.linalg.norm(by - at)) - one.size[0] - two.size[0]
+    if (one.type, two.type) == ("plane", "sphere"):
+        normal = poses[one.body][0] @ matrices(np.array(one.orientation))[:, 2]
+        return float(normal @ (by - at)) - two.size[0]
+    return _apart(two, one, poses) if (one.type, two.type) == ("sphere", "plane") else None
+
+
+def _placed(pose: Pose, point: Vector) -> Floats:
+    at: Floats = pose[1] + pose[0] @ np.array(point)
+    return at
+
+
+def _reference_poses(scene: Scene) -> dict[str, Pose]:
+    """Return rotation and origin of every body at the reference pose."""
+    found: dict[str, Pose] = {"": (np.eye(3), np.zeros(3))}
+    for body in scene.bodies:
+        turned, at = found[body.parent]
+        found[body.name] = turned @ matrices(np.array(body.orientation)), _placed((turned, at), body.position)
+    return found
 
 
 def watched(scene: Scene) -> tuple[Pair, ...]:

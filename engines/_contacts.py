@@ -24,6 +24,8 @@ TURN = 1e-3
 """Angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it."""
 SHARP = 30.0
 """Times the tilt of a cap, or the squared sine at which capsules cross: part of TURN that H is differenced over."""
+TOGETHER = 64
+"""Recorded states whose gaps are computed at once: some hundred pairs are as many arrays as memory's cache holds."""
 Poses = Callable[[str], Pose]
 """Body -> its pose, or its poses at some instants (..., 3, 3) and (..., 3)."""
 Indices = NDArray[np.intp]
@@ -100,14 +102,15 @@ class Contacts:
         return len(self.rows)
 
     def touches(
-        self, poses: Poses, rows: Sequence[int] | None = None, along: Mapping[int, bool] | None = None
+        self, poses: Poses, rows: Sequence[int] | None = None, along: Mapping[int, Any] | None = None
     ) -> Touches:
         """Return those of some rows, or of all.
 
         Args:
             poses: of the bodies.
             rows: which; all if not given.
-            along: of contacts in `turning`, whether the shapes lie along each other; as they do, if not given.
+            along: of contacts in `turning`, whether the shapes lie along each other, at all instants or at each (...);
+                as they do, if not given.
         """
         groups, (R, p) = self._groups_of(rows), self._placed(poses)
         lead, count = p.shape[:-2], self.count if rows is None else len(rows)
@@ -144,6 +147,29 @@ class Contacts:
                 sharp = np.where(beside, crossing(at, by) ** 2, 1.0)
             least = min(least, float(sharp[~along].min(initial=1.0)))
         return found, TURN * min(1.0, SHARP * least)
+
+    def recorded(self, poses: Poses, before: dict[int, bool]) -> Floats:
+        """Return the gaps (m, n) of all rows at instants of a motion, one after the other.
+
+        How shapes lie to each other that are out of reach is not looked at: they lie as they did.
+
+        Args:
+            poses: of the bodies at all of them.
+            before: how the shapes of the contacts in `turning` lay last, which is brought up to date.
+        """
+        along: dict[int, NDArray[np.bool_]] = {}
+        R, p = self._placed(poses)
+        for k in self.turning:
+            pair = self.all[k]
+            at, by = (
+                (R[..., j, :, :], p[..., j, :]) for j in (self.number[pair.first.name], self.number[pair.second.name])
+            )
+            kinds, sizes = (pair.first.type, pair.second.type), _sizes(pair)
+            found = lying(kinds, sizes, at, by, np.array(pair.parallel))
+            last = np.maximum.accumulate(np.where(_within_reach(pair, at, by), np.arange(len(found)), -1))
+            along[k] = np.where(last < 0, before.get(k, found[0]), found[last])
+            before[k] = bool(along[k][-1])
+        return self.touches(poses, None, along).gap
 
     def parted(self, poses: Poses) -> tuple[Floats, Floats]:
         """Return by how much the shapes of the pairs in `turning` do not lie along each other, and to which side (n,).
@@ -209,11 +235,11 @@ class Contacts:
         most = np.arange(max(map(len, found)))
         return np.array([one[np.minimum(most, len(one) - 1)] for one in found])
 
-    def _lying(self, group: _Group, at: Pose, by: Pose, along: Mapping[int, bool]) -> NDArray[np.bool_]:
+    def _lying(self, group: _Group, at: Pose, by: Pose, along: Mapping[int, Any]) -> NDArray[np.bool_]:
         if not group.sine.any():
             return np.zeros(len(group.sine), dtype=bool)
         if all(k in along for k in group.which):
-            return np.array([along[k] for k in group.which], dtype=bool)
+            return np.stack([np.asarray(along[k]) for k in group.which], axis=-1)
         found = lying(group.kinds, group.sizes, at, by, group.sine)
         for j, k in enumerate(group.which):
             if k in along:
@@ -223,6 +249,15 @@ class Contacts:
 
 def _sizes(contact: Contact) -> tuple[Floats, Floats]:
     return contact.first.extents, contact.second.extents
+
+
+def _within_reach(contact: Contact, at: Pose, by: Pose) -> NDArray[np.bool_]:
+    """Whether shapes are so near that how they lie matters: about their own size from where they touch."""
+    one, two = _sizes(contact)
+    way, reach = by[1] - at[1], 2.0 * (two[0] + contact.pair.margin) + two[1]
+    if contact.first.type == "plane":
+        return np.asarray(np.einsum("...i,...i->...", way, at[0][..., 2]) <= reach)
+    return np.asarray(np.linalg.norm(way, axis=-1) <= reach + 2.0 * one[0] + one[1])
 
 
 def _along(contact: Contact, at: Pose, by: Pose) -> bool:
@@ -243,27 +278,27 @@ def end_of(contact: Contact, at: Pose, by: Pose, point: Floats) -> int:
     return int(_along(contact, at, by) and at[0][:, 2] @ (point - at[1]) > 0.5 * (low + high))
 
 
-def drift(rates: Callable[[float], Floats], v: Floats, turn: float = TURN) -> Floats:
+def drift(rates: Callable[[Floats], Floats], v: Floats, turn: float = TURN) -> Floats:
     """Return H' v by a central difference of fourth order along the motion.
 
     Args:
-        rates: time from now along the motion with constant v -> H v there.
+        rates: times from now along the motion with constant v (m,) -> H v there (m, n).
         v: velocities (nv,).
         turn: angle or length over which they are.
     """
     step = turn / max(float(np.abs(v).max()), 1e-12)
-    before, left, right, ahead = (rates(k * step) for k in (-2, -1, 1, 2))
+    before, left, right, ahead = rates(step * np.array([-2.0, -1.0, 1.0, 2.0]))
     total: Floats = (before - 8.0 * left + 8.0 * right - ahead) / (12.0 * step)
     return total
 
 
 def closing(met: Touches, velocity: Callable[[Indices, Floats], Any]) -> Floats:
-    """Return the rate of every gap (n,), m/s.
+    """Return the rate of every gap (..., n), m/s.
 
     Args:
         met: where shapes may meet.
-        velocity: numbers of bodies, and points in the world (n, 3) -> how fast the bodies carry them (n, 3).
+        velocity: numbers of bodies, and points in the world (..., n, 3) -> how fast the bodies carry them.
     """
     apart = velocity(met.second, met.point) - velocity(met.first, met.point)
-    total: Floats = np.einsum("ni,ni->n", met.normal, apart)
+    total: Floats = np.einsum("...ni,...ni->...n", met.normal, apart)
     return total

@@ -31,8 +31,13 @@ COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 GAP, PUSH, SPENT = 0, 1, 2
 """The functions watched of a row: touch or leave; turn, release or catch; hand-over."""
 SLOW, DEEP, EPS = 1e-9, 1e-9, 0.01
+NOISE = 1e-13
+"""Part of the terms of a row's acceleration that `Rows.pressure` says is their rounding."""
 PUSHES, ULP = 1e-9, float(np.finfo(float).eps)
 """Part of the largest multiplier below which one is rounding."""
+UNMET = 1e-6
+"""Of what makes up a row's acceleration: by so much more than its law asks does it part where it depends on others that
+contradict it, as of a sphere within another: no multipliers let both follow their laws, and it would have to pull."""
 UNMOVED = 1e-24
 """Of the largest diagonal entry of H M^-1 H^T: the rate of a row which no motion moves is rounding, and has no dips."""
 
@@ -46,6 +51,7 @@ class View:
     lam: Floats
     noise: Floats
     presses: NDArray[np.bool_]
+    parts: NDArray[np.bool_]
 
 
 def least_push(G: Floats, demand: Floats) -> Floats:
@@ -93,8 +99,8 @@ class LevelMachine:
         for i in self._closed.intersection(free.tolist()):
             out[WATCHED * i + GAP] = max(h[i], hd[i] + self.slow)
         out[WATCHED * np.array([*self._unmoved], dtype=int) + PUSH] = 1.0
-        below = any(modes[i] not in ACTIVE for i in others)
-        pressure = rows.pressure(q, v, vd)[0] if vd is not None and below else h
+        below = [i for i in others if modes[i] not in ACTIVE]
+        pressure = dict(zip(below, rows.pressure(q, v, vd, below)[0], strict=True)) if vd is not None and below else {}
         for i in others:
             mode, at = modes[i], WATCHED * i
             if mode in ACTIVE and lam is not None:
@@ -192,19 +198,25 @@ class LevelMachine:
         return shared(self.rows, found)
 
     def _look(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> View:
+        """Only of what is held or may come to be does it count how it presses."""
         vd, lam = self.rows.accelerate(q, v, modes)
-        press, noise = self.rows.pressure(q, v, vd)
+        asked = [i for i in self.own if modes[i] in ACTIVE or h[i] <= 0.0]
+        press, noise = np.zeros(len(h)), np.zeros(len(h))
+        if asked:
+            press[asked], noise[asked] = self.rows.pressure(q, v, vd, asked)
         G = np.diag(self.rows.delassus(q))
         self._unmoved = set(np.flatnonzero(UNMOVED * G.max(initial=0.0) >= G).tolist())
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
-        return View(h, hd, lam, allowed, press > noise)
+        two = np.array(self.rows.fast, dtype=bool)  # sets of constants: what its law asks depends on the mode
+        parts = ~two & (press < -UNMET * (noise / NOISE + np.abs(lam) * G))
+        return View(h, hd, lam, allowed, press > noise, parts)
 
     def _wanted(self, view: View, modes: Modes, deep: float) -> list[int]:
         """Where every row belongs by the guards that hold now."""
         after = list(modes)
         for i in self.own:
             if modes[i] in ACTIVE:
-                pulls = view.lam[i] < -view.noise[i]
+                pulls = view.lam[i] < -view.noise[i] or view.parts[i]
                 after[i] = self._released(modes[i], float(view.h[i])) if pulls else modes[i]
             else:
                 after[i] = self._inactive(view, modes[i], i, deep)

@@ -1,24 +1,25 @@
-"""Bodies on a line as engines need them: a ball above a floor, or the sliders of a cradle (spec 2.1, 2.2).
+"""Bodies that slide along one line, as engines need them that know forces between coordinates, or shapes and impacts.
 
-h_0 = q_0 above a floor; h_i = gap + q_(i+1) - q_i between neighbours. Every row alone follows the case's law,
+    h = H q + h0,    every row alone: lam = m (w - a1 h' - a0 h - a2 h^3),    1/m = diag(H M^-1 H^T),
 
-    lam = m (w - a1 h' - a0 h - a2 h^3),    1/m = H M^-1 H^T,    w = -H M^-1 f: what presses without the row, m/s^2.
+w = -H M^-1 f: what presses without the row, m/s^2. A row is a coordinate or a difference of two.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode
 from crossbody.cases.arrays import Bytes, Floats
-from crossbody.engines import _ball_scale
-from crossbody.engines._cradle import in_real_time, one_set, sliders
-from crossbody.engines._log import Observe
+from crossbody.cases.rotations import matrices
+from crossbody.cases.scene import Joint, Loop, Scene, Shape, Tendon
+from crossbody.cases.scene_contacts import by_shapes
+from crossbody.engines._real_time import in_real_time, one_set
 
-MECHANISMS = ("ball", "sliders")
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 
 
@@ -27,47 +28,61 @@ class Line:
     """A scene on a line.
 
     Attributes:
-        masses (n,): kg.
+        axis (3,): the line, in the world.
+        places (n, 3): where the bodies are at q = 0, m.
+        bodies: names. masses (n,): kg.
         gravity: towards smaller q, m/s^2.
-        floor: whether there is one below body 0; else neighbours collide with each other.
-        radius, gap: of every body, and between neighbours at q = 0, m.
+        shapes: what may touch: spheres of the bodies, and planes of the world.
+        H (nc, n), h0 (nc,): of the rows.
         q0, v0 (n,): start.
         a0, a1, a2 (nc,): constants of each row: the fast ones where it has two sets.
         unilateral (nc,): rows that can open.
-        sizes: how far things move and how fast, m and m/s.
-        observe: gaps and energies of many states.
+        fastest: about the speed that the scene can have, m/s.
     """
 
+    axis: Floats
+    places: Floats
+    bodies: tuple[str, ...]
     masses: Floats
     gravity: float
-    floor: bool
-    radius: float
-    gap: float
+    shapes: tuple[Shape, ...]
+    H: Floats
+    h0: Floats
     q0: Floats
     v0: Floats
     a0: Floats
     a1: Floats
     a2: Floats
     unilateral: NDArray[np.bool_]
-    sizes: tuple[float, float]
-    observe: Observe
+    fastest: float
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """(left, right) of every row; the floor is -1."""
-        return ((-1, 0),) if self.floor else tuple((i, i + 1) for i in range(len(self.masses) - 1))
+        """(left, right) of every row, h = q_right - q_left + h0; what stands still is -1."""
+        return tuple((_first(row == -1.0), _first(row == 1.0)) for row in self.H)
 
     @property
+    def alone(self) -> bool:
+        """Whether no two rows have a body in common: then the law of each is that of all."""
+        return bool((np.count_nonzero(self.H, axis=0) <= 1).all())
+
+    @cached_property
     def reduced(self) -> Floats:
         """M of every row (nc,), kg."""
-        inverse = 1.0 / self.masses
-        found: Floats = inverse if self.floor else inverse[:-1] + inverse[1:]
-        return 1.0 / found
+        found: Floats = 1.0 / (self.H**2 @ (1.0 / self.masses))
+        return found
 
-    @property
-    def presses(self) -> float:
-        """W of every row, m/s^2."""
-        return self.gravity if self.floor else 0.0
+    @cached_property
+    def presses(self) -> Floats:
+        """W of every row (nc,), m/s^2."""
+        found: Floats = self.gravity * self.H.sum(axis=1)
+        return found
+
+    @cached_property
+    def _balance(self) -> Floats:
+        """What gives lam (nc,) of the generalised forces that the rows exert (n,)."""
+        found: Floats = np.asarray(np.linalg.pinv(self.H.T), dtype=np.float64)
+        return found
 
     def spring(self, q: Floats, v: Floats) -> Floats:
         """Lam of every row as if it were alone and active (..., nc), N."""
@@ -77,25 +92,23 @@ class Line:
 
     def gaps(self, q: Floats) -> Floats:
         """Gaps (..., nc), m."""
-        return q if self.floor else self.gap + np.diff(q, axis=-1)
+        found: Floats = q @ self.H.T + self.h0
+        return found
 
     def rates(self, v: Floats) -> Floats:
         """H v (..., nc), m/s."""
-        return v if self.floor else np.diff(v, axis=-1)
+        found: Floats = v @ self.H.T
+        return found
 
     def acceleration(self, q: Floats, v: Floats) -> Floats:
         """V' under `memoryless` (n,), m/s^2."""
-        push: Floats = np.zeros(len(self.masses))
-        for (left, right), lam in zip(self.pairs, self.memoryless(q, v), strict=True):
-            push[right] += lam
-            if left >= 0:
-                push[left] -= lam
-        return push / self.masses - self.gravity
+        found: Floats = self.memoryless(q, v) @ self.H / self.masses - self.gravity
+        return found
 
     def transmitted(self, change: Floats) -> Floats:
         """What each row passes on (..., nc), from change (..., n) of velocity (or of it a second) beside gravity's."""
-        p: Floats = self.masses * change
-        return p if self.floor else -np.cumsum(p, axis=-1)[..., :-1]
+        found: Floats = (self.masses * change) @ self._balance.T
+        return found
 
     def memoryless(self, q: Floats, v: Floats, h: Floats | None = None) -> Floats:
         """max(0, lam) of every row whose gap h, of q if not given, is closed, lam where it cannot open (..., nc), N."""
@@ -110,38 +123,95 @@ class Line:
         found: Bytes = np.where(self.unilateral, np.where(h > 0.0, FREE, below), int(Mode.BILATERAL)).astype(np.int8)
         return found
 
+    def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Gaps (m, nc), m, and energies (m, 2), J, of m states."""
+        return self.gaps(q), np.column_stack((0.5 * v**2 @ self.masses, self.gravity * q @ self.masses))
+
+
+def _first(there: NDArray[np.bool_]) -> int:
+    return int(np.argmax(there)) if there.any() else -1
+
+
+def why_no_line(case: Case) -> str | None:
+    """Return why a case is not of bodies on one line, in words that go on from "It"; None if it is."""
+    scene = case.scene
+    if scene is None:
+        return f"has no scene as data, but the mechanism {case.mechanism!r}."
+    if scene.actuators or scene.pushes or scene.pairs or any(loop.in_space for loop in scene.loops):
+        return "has loops in space, actuators, pushes or pairs of shapes."
+    if [joint.body for joint in scene.joints] != [body.name for body in scene.bodies]:
+        return "has bodies with no joint, or with several."
+    bodies = zip(scene.bodies, scene.joints, strict=True)
+    axes = [matrices(np.array(body.orientation)) @ joint.axis for body, joint in bodies]
+    slides = all(joint.type == "slide" for joint in scene.joints) and not any(body.parent for body in scene.bodies)
+    if not (slides and scene.joints and np.ptp(axes, axis=0).max() == 0.0):
+        return "has bodies that do not slide along one line."
+    if np.linalg.norm(np.cross(axes[0], scene.gravity)) > 0.0:
+        return "has gravity across its line."
+    own = _rows(scene) is not None
+    return None if own else "has springs, dampers, or rows that are not a coordinate or a difference of two."
+
 
 def line(case: Case) -> Line:
-    """Read a case of the mechanism "ball" or "sliders"."""
-    return _ball(case) if case.mechanism == "ball" else _sliders(case)
+    """Read a case of bodies on a line."""
+    assert case.scene is not None
+    scene, law = case.scene, one_set(case.law)
+    rows = _rows(scene)
+    assert rows is not None
+    H, h0 = rows
+    axis = matrices(np.array(scene.bodies[0].orientation)) @ scene.joints[0].axis
+    gravity = -float(axis @ scene.gravity)
+    reference = np.array([joint.reference for joint in scene.joints])
+    met = {name for pair in by_shapes(scene).pairs for name in (pair.first, pair.second)}
+    stored = float(np.max(np.sqrt(law.a0) * np.abs(H @ case.q0 + h0), initial=0.0))
+    return Line(
+        axis=axis, places=np.array([body.position for body in scene.bodies]) - np.outer(reference, axis),
+        bodies=tuple(body.name for body in scene.bodies), masses=np.array([body.mass for body in scene.bodies]),
+        gravity=gravity,
+        shapes=tuple(shape for shape in scene.shapes if shape.name in met), H=H, h0=h0, q0=case.q0, v0=case.v0,
+        a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
+        fastest=float(np.max(np.abs(case.v0))) + abs(gravity) * case.t_end + stored or 1.0,
+    )  # fmt: skip
+
+
+def _rows(scene: Scene) -> tuple[Floats, Floats] | None:
+    """Return H (nc, n) and h0 (nc,); None where a row or a force is none of a line's."""
+    unit = dict(zip((joint.name for joint in scene.joints), np.eye(len(scene.joints)), strict=True))
+    found = [*(_loop(loop, scene, unit) for loop in scene.loops), *(_bound(part, unit) for part in scene.bounded)]
+    if any(one is None for one in found) or any(map(scene.acts_along, scene.tendons)):
+        return None
+    rows = [row for part in found if part for row in part]
+    H = np.array([row for row, _ in rows]).reshape(-1, len(unit))
+    return (H, np.array([offset for _, offset in rows])) if ((H == 0) | (np.abs(H) == 1)).all() else None
+
+
+Row = tuple[Floats, float]
+
+
+def _bound(part: Joint | Tendon, unit: dict[str, Floats]) -> list[Row] | None:
+    if isinstance(part, Joint):
+        plain = not (any(part.stiffness) or any(part.damping) or part.armature or part.margin)
+        row = unit[part.name]
+    else:
+        plain = not part.bodies and part.margin == 0.0 and len(part.joints) <= 2 and abs(sum(part.coefficients)) < 2.0
+        row = sum((c * unit[name] for name, c in zip(part.joints, part.coefficients, strict=True)), np.zeros(len(unit)))
+    bounds = zip((1.0, -1.0), part.range, strict=True)
+    return [(sign * row, -sign * bound) for sign, bound in bounds if np.isfinite(bound)] if plain else None
+
+
+def _loop(loop: Loop, scene: Scene, unit: dict[str, Floats]) -> list[Row] | None:
+    """Return a coordinate that is held, from its value."""
+    if loop.type != "joint" or loop.second or any(loop.polynomial[1:]):
+        return None
+    reference = next(joint.reference for joint in scene.joints if joint.name == loop.first)
+    return [(unit[loop.first], -reference - loop.polynomial[0])]
 
 
 def followed(case: Case) -> Case | None:
     """The same rows without ballistic memory; None where several rows are not those of the law (`spring`)."""
-    alone = len(case.contacts) == 1 and bool(case.law.unilateral[0])
-    return in_real_time(case, "memoryless") if alone else None
+    return in_real_time(case, "memoryless") if line(case).alone and case.law.unilateral.all() else None
 
 
 def law_name(case: Case) -> str:
-    """What `Line.memoryless` is: the machine of that name for one row, a chain of springs for several."""
-    return "memoryless" if len(case.contacts) == 1 else "springs"
-
-
-def _ball(case: Case) -> Line:
-    mass, gravity, law = case.number("mass"), case.number("gravity"), case.law
-
-    def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        return q, np.column_stack((0.5 * mass * v[:, 0] ** 2, mass * gravity * q[:, 0]))
-
-    return Line(
-        masses=np.array([mass]), gravity=gravity, floor=True, radius=0.05, gap=0.0, q0=case.q0, v0=case.v0, a0=law.a0,
-        a1=law.a1, a2=law.a2, unilateral=law.unilateral, sizes=_ball_scale.sizes(case), observe=observe,
-    )  # fmt: skip
-
-
-def _sliders(case: Case) -> Line:
-    chain, law = sliders(case), one_set(case.law)
-    return Line(
-        masses=chain.masses, gravity=0.0, floor=False, radius=chain.radius, gap=chain.gap, q0=case.q0, v0=case.v0,
-        a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral, sizes=chain.sizes(law), observe=chain.observe,
-    )  # fmt: skip
+    """What `Line.memoryless` is: the machine of that name for rows of their own, else a chain of springs."""
+    return "memoryless" if line(case).alone else "springs"

@@ -48,8 +48,8 @@ class Rows(Protocol):
         """Acceleration (nv,) and multipliers (nc,), 0 where not active."""
         ...
 
-    def pressure(self, q: Floats, v: Floats, vd: Floats) -> tuple[Floats, Floats]:
-        """-(h'' + law) of every row (nc,) at acceleration vd, and what rounding may make of it (nc,), m/s^2.
+    def pressure(self, q: Floats, v: Floats, vd: Floats, rows: Sequence[int] | slice = ...) -> tuple[Floats, Floats]:
+        """-(h'' + law) of rows (n,), or of all, at acceleration vd, and what rounding may make of it (n,), m/s^2.
 
         A row that is not active would push if it were, exactly where this is positive.
         """

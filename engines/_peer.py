@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from crossbody.cases import Case, Event, Mode, Outcome, Trajectory
 from crossbody.cases.arrays import Bytes, Floats
-from crossbody.engines._line import FREE, MECHANISMS, Line
+from crossbody.engines._line import FREE, Line, why_no_line
 from crossbody.engines.contract import Run
 
 ROUNDING = 1e-9
@@ -58,10 +58,9 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
 
 
 def why_not(engine: str, case: Case) -> str | None:
-    """The sentence for a mechanism that is not on a line."""
-    if case.mechanism in MECHANISMS:
-        return None
-    return f"{engine} has no model of the mechanism {case.mechanism!r}; it has: {', '.join(MECHANISMS)}."
+    """The sentence for a case that is not of bodies on a line."""
+    reason = why_no_line(case)
+    return None if reason is None else f"{engine} is given bodies on one line alone, and {case.label} {reason}"
 
 
 def sampled(
@@ -154,8 +153,7 @@ def events(t: Floats, mode: Bytes) -> tuple[Event, ...]:
 
 
 def ended(line: Line, q: Floats, v: Floats) -> Outcome:
-    """Whether a state is finite and within a million times the sizes of the scene."""
+    """Whether a state is finite and within a thousand times the speed of the scene."""
     if not (np.isfinite(q).all() and np.isfinite(v).all()):
         return Outcome.NOT_FINITE
-    fast = math.hypot(line.sizes[1], float(np.max(np.abs(line.v0), initial=0.0)))
-    return Outcome.DIVERGED if np.max(np.abs(v)) > 1e3 * fast else Outcome.FINISHED
+    return Outcome.DIVERGED if np.max(np.abs(v)) > 1e3 * line.fastest else Outcome.FINISHED

@@ -93,7 +93,7 @@ class Steps:
         scene, dt = self.line, np.diff(t)[:, None]
         with np.errstate(all="ignore"):
             p = scene.transmitted(np.diff(v, axis=0) + scene.gravity * dt)
-            size = scene.masses.max() * (np.abs(v[1:]).max(axis=1, keepdims=True) + scene.gravity * dt)
+            size = scene.masses.max() * (np.abs(v[1:]).max(axis=1, keepdims=True) + abs(scene.gravity) * dt)
             return np.vstack([np.zeros((1, p.shape[1])), np.where(p > ROUNDING * size, p / dt, 0.0)])
 
 

@@ -100,6 +100,8 @@ class Forces:
         act (nu,): activations then, of the actuators that have one.
         T (nt, nv): dl/dx of the tendons, 0 of those between points.
         A (nu, nv): dl/dx of the actuators on joints, gear included.
+        straight: whether all joints are slides and hinges: then x is q.
+        none: whether nothing but pushes ever acts.
         spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics; None without them.
     """
 
@@ -140,6 +142,10 @@ class Forces:
             for name in ("stiffness", "damping")
         )
         self.slack = np.array([one.rest for one in scene.tendons]).reshape(-1, 2).T
+        self.along = any(scene.acts_along(tendon) for tendon in scene.tendons)
+        self.straight = len(single) == len(scene.joints)
+        own = any(any(joint.stiffness) or any(joint.damping) for joint in scene.joints)
+        self.none = not (own or self.along or scene.actuators)
         self.spanning = [i for i, tendon in enumerate(scene.tendons) if tendon.bodies]
         self._lay_out_actuators()
         self._lay_out_bounds()
@@ -178,7 +184,9 @@ class Forces:
         )
 
     def x(self, q: Floats) -> Floats:
-        """Return x (..., nv) of positions (..., nq)."""
+        """Return x (..., nv) of positions (..., nq); it may only be read."""
+        if self.straight:
+            return q
         x: Floats = np.zeros((*np.shape(q)[:-1], self.nv))
         x[..., self.single[1]] = q[..., self.single[0]]
         return x
@@ -247,12 +255,12 @@ class Forces:
             moved, turn = self.moved(joint), self.turned(joint, q)
             angle = float(np.linalg.norm(turn)) or 1.0
             total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
-        stretch = self.stretch(q, v)
-        if self.scene.tendons:
-            lengths, rates, rows = stretch
-            spring = polynomial(self.tendon_stiffness, self.outside(lengths))
-            total -= (spring + drag(self.tendon_damping, rates)) @ rows
-        return total + self.actuated(x, v, stretch) if self.scene.actuators else total
+        if not self.along:
+            return total + self.actuated(x, v) if self.scene.actuators else total
+        lengths, rates, rows = self.stretch(q, v)
+        spring = polynomial(self.tendon_stiffness, self.outside(lengths))
+        total -= (spring + drag(self.tendon_damping, rates)) @ rows
+        return total + self.actuated(x, v, (lengths, rates, rows)) if self.scene.actuators else total
 
     def stretch(self, q: Floats, v: Floats) -> Stretch:
         """Return lengths of all tendons, their rates and derivatives."""
@@ -261,20 +269,20 @@ class Forces:
             lengths[self.spanning], rates[self.spanning], rows[self.spanning] = self.spans(q, v)
         return lengths, rates, rows
 
-    def strokes(self, x: Floats, v: Floats, stretch: Stretch) -> Stretch:
+    def strokes(self, x: Floats, v: Floats, stretch: Stretch | None) -> Stretch:
         """Return lengths of all actuators, their rates and their derivatives (nu, nv), gear included."""
         A, lengths = self.A.copy(), self.A @ x
-        if len(self.pulling):
+        if stretch is not None and len(self.pulling):
             gear, tendon = self.gear[self.pulling], self.pulled
             A[self.pulling], lengths[self.pulling] = gear[:, None] * stretch[2][tendon], gear * stretch[0][tendon]
         return lengths, A @ v, A
 
     def bounds(self, q: Floats, lengths: Floats) -> Floats:
-        """Return the gaps of all bounds at a state, in the order of their rows; lengths (nt,) are of the tendons."""
-        found = np.concatenate([self.x(q)[self.firsts], lengths])
+        """Return the gaps (..., n) of all bounds, in the order of their rows; lengths (..., nt) are of the tendons."""
+        found = np.concatenate([self.x(q)[..., self.firsts], lengths], axis=-1)
         for i, at in self.balls:
-            found[i] = np.linalg.norm(angle_of(q[at:][:4]))
-        gaps: Floats = self.bound_sign * found[self.bound_of] + self.bound_at
+            found[..., i] = np.linalg.norm(angle_of(q[..., at : at + 4]), axis=-1)
+        gaps: Floats = self.bound_sign * found[..., self.bound_of] + self.bound_at
         return gaps
 
     def outside(self, lengths: Floats) -> Floats:
@@ -282,7 +290,7 @@ class Forces:
         out: Floats = lengths - clamped(lengths, self.slack)
         return out
 
-    def actuated(self, x: Floats, v: Floats, stretch: Stretch) -> Floats:
+    def actuated(self, x: Floats, v: Floats, stretch: Stretch | None = None) -> Floats:
         """Return what the actuators do (nv,), each within its bounds and their sum within the joint's; less damping."""
         lengths, rates, A = self.strokes(x, v, stretch)
         terms = np.array([np.ones(len(rates)), lengths, rates])
@@ -299,7 +307,7 @@ class Forces:
                 total += stored(joint.stiffness, x[:, self.place[joint.name]] - joint.rest[0])
             elif any(joint.stiffness):
                 total += stored(joint.stiffness, np.linalg.norm(self.turned(joint, q), axis=-1))
-        if self.scene.tendons:
+        if self.tendon_stiffness.any():
             lengths = np.array([self.stretch(one, np.zeros(self.scene.nv))[0] for one in q]).T
             for tendon, length in zip(self.scene.tendons, lengths, strict=True):
                 total += stored(tendon.stiffness, length - clamped(length, tendon.rest))
@@ -312,6 +320,10 @@ class Rows:
     Args:
         scene: whose; loops in space an engine's own kinematics must give.
         forces: of the scene.
+
+    Attributes:
+        straight (nc, nv), offset (nc,): gaps are straight x + offset, but of those rows that bend.
+        bends: whether there are such: loops by polynomials from the square on, and angles of ball joints.
     """
 
     def __init__(self, scene: Scene, forces: Forces) -> None:
@@ -321,42 +333,52 @@ class Rows:
         self.scene, self.forces = scene, forces
         self.ends = [(self._end(loop.type, loop.first), self._end(loop.type, loop.second)) for loop in scene.loops]
         self.curves = [derivatives(loop.polynomial) for loop in scene.loops]
+        self.curved = [i for i, loop in enumerate(scene.loops) if any(loop.polynomial[2:])]
         self._straighten()
+        self.bends = bool(self.curved or self.balls)
 
     def _straighten(self) -> None:
-        """Take the bounds, less those between points: gaps are straight x + offset, of a ball joint its angle's."""
-        forces, turning = self.forces, dict(self.forces.balls)
+        """Lay out the rows, less bounds of distances of points; 0 of what bends, of a ball joint its angle's offset."""
+        forces, turning, count = self.forces, dict(self.forces.balls), len(self.ends)
         spanning = np.array(forces.spanning, dtype=int) + len(self.scene.joints)
         taken = ~np.isin(forces.bound_of, spanning)
         along = np.concatenate([np.eye(forces.nv)[forces.firsts], forces.T])
         along[list(turning)] = 0.0
         of, sign = forces.bound_of[taken], forces.bound_sign[taken]
-        self.straight, self.offset = sign[:, None] * along[of], forces.bound_at[taken]
-        self.balls = [(row, self.scene.joints[i], float(sign[row])) for row, i in enumerate(of) if i in turning]
+        none = np.zeros(forces.nv)
+        loops = [(0.0, none, 0.0) if i in self.curved else self._loop(i, none) for i in range(count)]
+        self.straight = np.concatenate([np.array([row for _, row, _ in loops]).reshape(-1, forces.nv),
+                                        sign[:, None] * along[of]])  # fmt: skip
+        self.offset = np.concatenate([[h for h, _, _ in loops], forces.bound_at[taken]])
+        self.balls = [(count + row, self.scene.joints[i], float(sign[row])) for row, i in enumerate(of) if i in turning]
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""
         x = self.forces.x(q)
-        bounded = self.straight @ x + self.offset
+        h: Floats = self.straight @ x + self.offset
+        for i in self.curved:
+            h[i] = self._loop(i, x)[0]
         for row, joint, sign in self.balls:
-            bounded[row] += sign * self._angle(joint, q, np.zeros(self.forces.nv))[0]
-        return np.concatenate([[self._loop(i, x)[0] for i in range(len(self.ends))], bounded])
+            h[row] += sign * self._angle(joint, q, np.zeros(self.forces.nv))[0]
+        return h
 
     def jacobian(self, q: Floats) -> Floats:
         """Return H (nc, nv)."""
-        x, bounded = self.forces.x(q), self.straight.copy()
+        x, H = self.forces.x(q), self.straight.copy()
+        for i in self.curved:
+            H[i] = self._loop(i, x)[1]
         for row, joint, sign in self.balls:
-            bounded[row] = sign * self._angle(joint, q, np.zeros(len(x)))[1]
-        loops = np.array([self._loop(i, x)[1] for i in range(len(self.ends))]).reshape(-1, len(x))
-        return np.concatenate([loops, bounded])
+            H[row] = sign * self._angle(joint, q, np.zeros(len(x)))[1]
+        return H
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (nc,)."""
-        x, bounded = self.forces.x(q), np.zeros(len(self.offset))
+        x, found = self.forces.x(q), np.zeros(len(self.offset))
+        for i in self.curved:
+            found[i] = -self._loop(i, x)[2] * float(self.ends[i][1][0] @ v) ** 2
         for row, joint, sign in self.balls:
-            bounded[row] = sign * self._angle(joint, q, v)[2]
-        loops = [-self._loop(i, x)[2] * float(second @ v) ** 2 for i, (_, (second, _)) in enumerate(self.ends)]
-        return np.concatenate([loops, bounded])
+            found[row] = sign * self._angle(joint, q, v)[2]
+        return found
 
     def _angle(self, joint: Joint, q: Floats, v: Floats) -> tuple[float, Floats, float]:
         """Return the angle of a ball joint, its derivative along v (nv,), and its second along a steady v."""

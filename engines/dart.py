@@ -9,49 +9,52 @@ import dartpy
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import matrices
+from crossbody.cases.scene import Shape
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, line
 from crossbody.engines._peer import HIDDEN, PeerRun, why_not
 from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
 from crossbody.engines.contract import Engine
 
-THICK = 1.0  # m, of the floor
+THICK, WIDE = 1.0, 2.0  # m, of the box that stands for a plane
 
 
 class World:
-    """A `Stepper`: spheres on prismatic joints, along z above a floor, along x beside each other."""
+    """A `Stepper`: bodies on prismatic joints along the line, with their shapes, beside those of the world."""
 
     def __init__(self, scene: Line, e: float) -> None:
         self.scene, self.dt = scene, 0.0
         self.world = dartpy.simulation.World()
-        self.world.setGravity([0.0, 0.0, -scene.gravity])
-        self.bodies = [self._ball(i, e) for i in range(len(scene.masses))]
-        if scene.floor:
-            self._floor()
+        self.world.setGravity(-scene.gravity * scene.axis)
+        self.bodies = [self._body(i, e) for i in range(len(scene.masses))]
+        self._add(dartpy.dynamics.Skeleton("world"), "", e)
 
-    def _ball(self, i: int, e: float) -> Any:
+    def _body(self, i: int, e: float) -> Any:
         scene = self.scene
-        skeleton = dartpy.dynamics.Skeleton(f"ball {i}")
+        skeleton = dartpy.dynamics.Skeleton(scene.bodies[i])
         joint, body = skeleton.createPrismaticJointAndBodyNodePair()
-        joint.setAxis([0.0, 0.0, 1.0] if scene.floor else [1.0, 0.0, 0.0])
-        along = i * (2.0 * scene.radius + scene.gap)
-        place = dartpy.math.Isometry3()
-        place.set_translation([0.0, 0.0, scene.radius] if scene.floor else [along, 0.0, 0.0])
-        joint.setTransformFromParentBodyNode(place)
-        mass = float(scene.masses[i])
-        body.setInertia(dartpy.dynamics.Inertia(mass, [0.0, 0.0, 0.0], 0.4 * mass * scene.radius**2 * np.eye(3)))
-        _surface(body.createShapeNode(dartpy.dynamics.SphereShape(scene.radius)), e if scene.floor else e**0.5)
+        joint.setAxis(scene.axis)
+        joint.setTransformFromParentBodyNode(_placed(scene.places[i]))
+        body.setInertia(
+            dartpy.dynamics.Inertia(float(scene.masses[i]), np.zeros(3), float(scene.masses[i]) * np.eye(3))
+        )
+        return self._add(skeleton, scene.bodies[i], e)
+
+    def _add(self, skeleton: Any, name: str, e: float) -> Any:
+        """Add the shapes of a body, without friction: a pair's restitution is the product of both."""
+        for shape in (shape for shape in self.scene.shapes if shape.body == name):
+            place, solid = _solid(shape)
+            body = skeleton.getBodyNode(0) if name else skeleton.createWeldJointAndBodyNodePair()[1]
+            node = body.createShapeNode(solid)
+            node.setRelativeTransform(_placed(*place))
+            node.createCollisionAspect()
+            surface = node.createDynamicsAspect()
+            surface.setRestitutionCoeff(e**0.5)
+            surface.setFrictionCoeff(0.0)
         self.world.addSkeleton(skeleton)
         return skeleton
-
-    def _floor(self) -> None:
-        skeleton = dartpy.dynamics.Skeleton("floor")
-        joint, body = skeleton.createWeldJointAndBodyNodePair()
-        place = dartpy.math.Isometry3()
-        place.set_translation([0.0, 0.0, -0.5 * THICK])
-        joint.setTransformFromParentBodyNode(place)
-        _surface(body.createShapeNode(dartpy.dynamics.BoxShape([2.0, 2.0, THICK])), 1.0)
-        self.world.addSkeleton(skeleton)
 
     def start(self) -> None:
         """See `Stepper`."""
@@ -70,12 +73,20 @@ class World:
         return [b.getPosition(0) for b in self.bodies], [b.getVelocity(0) for b in self.bodies]
 
 
-def _surface(shape: Any, e: float) -> None:
-    """A restitution (that of a pair is the product of both) and no friction."""
-    shape.createCollisionAspect()
-    surface = shape.createDynamicsAspect()
-    surface.setRestitutionCoeff(e)
-    surface.setFrictionCoeff(0.0)
+def _placed(position: Any, turned: Any = None) -> Any:
+    found = dartpy.math.Isometry3()
+    found.set_translation(position)
+    if turned is not None:
+        found.set_rotation(turned)
+    return found
+
+
+def _solid(shape: Shape) -> tuple[tuple[Floats, Floats], Any]:
+    """Return place and solid of a shape; of a plane a box below it."""
+    turned, at = matrices(np.array(shape.orientation)), np.array(shape.position)
+    if shape.type == "sphere":
+        return (at, turned), dartpy.dynamics.SphereShape(shape.size[0])
+    return (at - 0.5 * THICK * turned[:, 2], turned), dartpy.dynamics.BoxShape([WIDE, WIDE, THICK])
 
 
 class Dart(Engine):
@@ -90,7 +101,7 @@ class Dart(Engine):
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
-        """Mechanisms that are not on a line, and rows that are always on."""
+        """Cases that are not of bodies on a line, and rows that are always on."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         return why_not("DART", case) or no_rigid_contact(case)

@@ -43,7 +43,7 @@ def known(case: Case) -> bool:
 
 
 def system_of(case: Case, traced: bool | None = None) -> System:
-    """The mechanism with the law of its rows.
+    """The mechanism with the law of its rows: kernels of its own, where there are some, or those of every scene.
 
     Args:
         case: whose.
@@ -52,11 +52,11 @@ def system_of(case: Case, traced: bool | None = None) -> System:
     Raises:
         CaseUnsupported: if the reference has no equations of it.
     """
-    if case.scene is not None:
-        from crossbody.reference.tree.system import system
-
-        return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank, traced)
     build = builder(case.mechanism)
-    if build is None:
+    if build is not None:
+        return build(case.parameters, case.law)
+    if case.scene is None:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")
-    return build(case.parameters, case.law)
+    from crossbody.reference.tree.system import system
+
+    return system(case.scene, case.law, case.q0, case.control, case.act0, case.rank, traced)

@@ -53,7 +53,7 @@ class Model:
 
 def _law(scene: Line, row: int) -> Law:
     """Force of a connector: its lam with the sign of Exudyn, which pulls the right body towards the left one."""
-    m, w = float(scene.reduced[row]), scene.presses
+    m, w = float(scene.reduced[row]), float(scene.presses[row])
     a0, a1, a2 = (float(a[row]) for a in (scene.a0, scene.a1, scene.a2))
     opens, zero = bool(scene.unilateral[row]), exu.symbolic.Real(0.0)
 
@@ -67,7 +67,7 @@ def _law(scene: Line, row: int) -> Law:
 
 def _connector(mbs: Any, scene: Line, row: int, markers: list[Any], symbolic: bool) -> Any:
     """The row with its law still to come, or a spring and damper that act below the surface alone."""
-    offset = 0.0 if scene.floor else -scene.gap
+    offset = -float(scene.h0[row])
     if symbolic or not scene.unilateral[row]:
         m = 0.0 if symbolic else float(scene.reduced[row])
         return items.CoordinateSpringDamper(
@@ -194,10 +194,12 @@ def _audit(case: Case, scene: Line, model: Model) -> Mapping[str, Any]:
     }  # fmt: skip
 
     def lam(q: Floats, v: Floats) -> Floats:
-        h, hd = (float(x[0]) for x in (scene.gaps(q), v))
-        return np.array([-float(model.laws[0].Evaluate(model.mbs, 0.0, 0, h, hd, 0.0, 0.0, 0.0))])
+        rows = zip(model.laws, scene.H @ q, scene.rates(v), -scene.h0, strict=True)
+        return np.array(
+            [-float(law.Evaluate(model.mbs, 0.0, 0, *map(float, (x, hd, 0.0, 0.0, at)))) for law, x, hd, at in rows]
+        )
 
-    return found | ({"lam": lam} if scene.floor and model.laws else {})
+    return found | ({"lam": lam} if scene.alone and model.laws else {})
 
 
 class Exudyn(Engine):
@@ -214,7 +216,7 @@ class Exudyn(Engine):
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
-        """Mechanisms that are not on a line."""
+        """Cases that are not of bodies on a line."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         return why_not("Exudyn", case)

@@ -17,6 +17,8 @@ Pose = tuple[Floats, Floats]
 """Rotations (..., 3, 3) and positions (..., 3) in the world."""
 Places = tuple[Floats, Floats, Floats]
 """Gaps (..., places), m; unit normals from the first shape to the second, and points of the second (..., places, 3)."""
+Pair = tuple[Floats, Floats]
+"""Points of the first of two shapes, and those of the second (..., 3)."""
 Truths = NDArray[np.bool_]
 SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in range(8)])
 """Of the corners of a box, in the order of their rows."""
@@ -178,10 +180,11 @@ def _capsules(sizes: tuple[Floats, Floats], at: Pose, by: Pose, along: Truths) -
     """
     radius, width = sizes[0][..., 0], sizes[1][..., 0]
     segments, none = (at, sizes[0][..., 1], by, sizes[1][..., 1]), ~np.asarray(along)
-    tried = [_nearest(*segments)] * 2
+    feet = _feet(*segments)
+    tried = [_nearest(*segments, feet)] * 2
     if not none.all():
         chosen = none[..., None]
-        sides = [_end(*segments, sign) for sign in (-1.0, 1.0)]
+        sides = [_end(*segments, sign, feet) for sign in (-1.0, 1.0)]
         tried = [(np.where(chosen, a, c), np.where(chosen, b, d)) for (a, b), (c, d) in zip(tried, sides, strict=True)]
     starts, ends = (np.stack([pair[side] for pair in tried], axis=-2) for side in (0, 1))
     apart = ends - starts
@@ -199,17 +202,22 @@ def _axes(one: Pose, two: Pose) -> tuple[Floats, Floats, Floats]:
     return one[0][..., 2], two[0][..., 2], two[1] - one[1]
 
 
-def _end(one: Pose, half: Floats, two: Pose, other: Floats, sign: float) -> tuple[Floats, Floats]:
+def _feet(one: Pose, half: Floats, two: Pose, other: Floats) -> Pair:
+    """Return the ends of segments and what is nearest to each on the other (..., 4, 3): of the first, of the second."""
+    return _joined(_foot(one, half, two, other), _foot(two, other, one, half)[::-1])
+
+
+def _end(one: Pose, half: Floats, two: Pose, other: Floats, sign: float, feet: Pair) -> Pair:
     """Return nearest points (..., 3) where segments side by side end: the nearer of an end and its foot."""
     A, B, _ = _axes(one, two)
-    toward = np.copysign(other, sign * _dot(A, B))
-    return _closest([_foot(one, sign * half, two, other), _foot(two, toward, one, half)[::-1]])
+    same = sign * _dot(A, B) >= 0.0
+    of_second = [np.where(same[..., None], part[..., 3, :], part[..., 2, :])[..., None, :] for part in feet]
+    which = 0 if sign < 0.0 else 1
+    return _closest(_joined([part[..., which : which + 1, :] for part in feet], of_second))
 
 
-def _nearest(one: Pose, half: Floats, two: Pose, other: Floats) -> tuple[Floats, Floats]:
+def _nearest(one: Pose, half: Floats, two: Pose, other: Floats, feet: Pair) -> Pair:
     """Return the nearest points (..., 3) of segments: the best of the four ends and the common perpendicular."""
-    tried = [_foot(one, sign * half, two, other) for sign in (-1.0, 1.0)]
-    tried += [_foot(two, sign * other, one, half)[::-1] for sign in (-1.0, 1.0)]
     A, B, way = _axes(one, two)
     across = cross(A, B)
     square = _dot(across, across)
@@ -217,23 +225,29 @@ def _nearest(one: Pose, half: Floats, two: Pose, other: Floats) -> tuple[Floats,
         s, t = (_dot(cross(way, axis), across) / square for axis in (B, A))
     inside = (square > 0.0) & (np.abs(s) <= half) & (np.abs(t) <= other)
     s, t = np.where(inside, s, half), np.where(inside, t, other)
-    return _closest([*tried, (one[1] + s[..., None] * A, two[1] + t[..., None] * B)])
+    between = (one[1] + s[..., None] * A)[..., None, :], (two[1] + t[..., None] * B)[..., None, :]
+    return _closest(_joined(feet, between))
 
 
-def _foot(one: Pose, along: Floats, two: Pose, half: Floats) -> tuple[Floats, Floats]:
-    """Return points (..., 3) of segments, and what is nearest to them on others."""
-    E, B = one[1] + np.asarray(along)[..., None] * one[0][..., 2], two[0][..., 2]
-    return E, two[1] + np.clip(_dot(B, E - two[1]), -half, half)[..., None] * B
+def _foot(one: Pose, half: Floats, two: Pose, other: Floats) -> Pair:
+    """Return both ends (..., 2, 3) of segments, and what is nearest to them on others."""
+    along = np.stack([-half, half], axis=-1)[..., None]
+    E, B = one[1][..., None, :] + along * one[0][..., None, :, 2], two[0][..., None, :, 2]
+    middle, reach = two[1][..., None, :], np.asarray(other)[..., None]
+    return E, middle + np.clip(_dot(B, E - middle), -reach, reach)[..., None] * B
 
 
-def _closest(tried: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
-    """Return of pairs of points (..., 3) for each place the first pair that is nearest."""
-    starts, ends = tried[0]
-    best = _dot(ends - starts, ends - starts)
-    for a, b in tried[1:]:
-        apart = _dot(b - a, b - a)
-        nearer = (apart < best)[..., None]
-        starts, ends, best = np.where(nearer, a, starts), np.where(nearer, b, ends), np.minimum(apart, best)
+def _joined(one: Sequence[Floats], two: Sequence[Floats]) -> Pair:
+    """Return the pairs of points (..., k + m, 3) of two sets (..., k, 3) and (..., m, 3)."""
+    starts, ends = (np.concatenate(parts, axis=-2) for parts in zip(one, two, strict=True))
+    return starts, ends
+
+
+def _closest(tried: Pair) -> Pair:
+    """Return of pairs of points (..., k, 3) for each place the first pair that is nearest (..., 3)."""
+    apart = tried[1] - tried[0]
+    best = np.argmin(_dot(apart, apart), axis=-1)[..., None, None]
+    starts, ends = (np.take_along_axis(part, best, axis=-2)[..., 0, :] for part in tried)
     return starts, ends
 
 
@@ -244,8 +258,10 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Return vector products (..., 3); NumPy's own costs more than all else here for few vectors."""
-    (x, y, z), (u, v, w) = (np.moveaxis(part, -1, 0) for part in (a, b))
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+    x, y, z, u, v, w = (part[..., i] for part in (a, b) for i in range(3))
+    found: Floats = np.empty((*np.broadcast_shapes(x.shape, u.shape), 3))
+    found[..., 0], found[..., 1], found[..., 2] = y * w - z * v, z * u - x * w, x * v - y * u
+    return found
 
 
 def _inside(rotation: Floats, world: Floats) -> Floats:

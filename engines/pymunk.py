@@ -6,9 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pymunk
 
 from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases.rotations import matrices
+from crossbody.cases.scene import Shape
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, line
 from crossbody.engines._peer import HIDDEN, PeerRun, why_not
@@ -17,53 +20,57 @@ from crossbody.engines.contract import Engine
 
 ITERATIONS = 200
 """Of the sequential impulses: enough for five balls in a row to 1e-10 of their momentum."""
-WIDE = 1e3  # m, half the length of the floor
+WIDE = 1e3  # m, half the length of a plane
+PLANE = [0, 2]  # of the world's axes
 USUAL = 1.0 / 60.0  # s, the step of pymunk's own examples
 
 
 class World:
-    """A `Stepper`: circles that do not turn, along y above a floor, along x beside each other."""
+    """A `Stepper`: bodies that do not turn in the plane x, z, with their shapes, beside those of the world."""
 
     def __init__(self, scene: Line, e: float, matched: bool) -> None:
-        self.scene, self.axis, self.e, self.matched = scene, "y" if scene.floor else "x", e, matched
+        self.scene, self.e, self.matched = scene, e, matched
+        self.axis, self.places = pymunk.Vec2d(*scene.axis[PLANE]), [pymunk.Vec2d(*x) for x in scene.places[:, PLANE]]
         self.start()
 
     def start(self) -> None:
         """See `Stepper`: a new space, for Chipmunk remembers contacts, the last step and what it pushes apart."""
         scene = self.scene
         space = self.space = pymunk.Space()
-        space.gravity = (0.0, -scene.gravity)
+        space.gravity = -scene.gravity * self.axis
         if self.matched:
             space.collision_slop, space.iterations = 0.0, ITERATIONS
-        self.bodies = [self._ball(i, self.e if scene.floor else self.e**0.5) for i in range(len(scene.masses))]
-        if scene.floor:
-            _surface(floor := pymunk.Segment(space.static_body, (-WIDE, 0.0), (WIDE, 0.0), 0.0), 1.0)
-            space.add(floor)
-
-    def _ball(self, i: int, e: float) -> Any:
-        scene = self.scene
-        body = pymunk.Body(float(scene.masses[i]), math.inf)
-        _surface(circle := pymunk.Circle(body, scene.radius), e)
-        place, v = self._place(i) + float(scene.q0[i]), float(scene.v0[i])
-        body.position = (0.0, place) if scene.floor else (place, 0.0)
-        body.velocity = (0.0, v) if scene.floor else (v, 0.0)
-        self.space.add(body, circle)
-        return body
-
-    def _place(self, i: int) -> float:
-        return self.scene.radius if self.scene.floor else i * (2.0 * self.scene.radius + self.scene.gap)
+        self.bodies = [pymunk.Body(mass, math.inf) for mass in scene.masses.tolist()]
+        start = zip(self.bodies, self.places, scene.q0.tolist(), scene.v0.tolist(), strict=True)
+        for body, place, q, v in start:
+            body.position, body.velocity = place + q * self.axis, v * self.axis
+        space.add(*self.bodies)
+        named = {"": space.static_body, **dict(zip(scene.bodies, self.bodies, strict=True))}
+        for shape in scene.shapes:
+            space.add(_solid(shape, named[shape.body], self.e))
 
     def step(self, dt: float) -> tuple[list[float], list[float]]:
         """See `Stepper`."""
         self.space.step(dt)
-        axis = self.axis
-        places = [getattr(body.position, axis) - self._place(i) for i, body in enumerate(self.bodies)]
-        return places, [getattr(body.velocity, axis) for body in self.bodies]
+        along = [self.axis.dot(body.position - place) for body, place in zip(self.bodies, self.places, strict=True)]
+        return along, [self.axis.dot(body.velocity) for body in self.bodies]
 
 
-def _surface(shape: Any, e: float) -> None:
-    """A restitution (that of a pair is the product of both) and no friction."""
-    shape.elasticity, shape.friction = e, 0.0
+def _across(scene: Line) -> str | None:
+    """Return the sentence for a line that is not in its plane."""
+    return "pymunk's plane is x, z, and the bodies slide along y too." if scene.axis[1] else None
+
+
+def _solid(shape: Shape, body: Any, e: float) -> Any:
+    """Return a circle, or a plane's wide line, without friction: a pair's restitution is the product of both."""
+    at, turned = pymunk.Vec2d(*np.array(shape.position)[PLANE]), matrices(np.array(shape.orientation))
+    along = WIDE * pymunk.Vec2d(*turned[PLANE, 2]).perpendicular()
+    solid = (
+        pymunk.Circle(body, shape.size[0], at) if shape.type == "sphere"
+        else pymunk.Segment(body, at - along, at + along, 0.0)
+    )  # fmt: skip
+    solid.elasticity, solid.friction = e**0.5, 0.0
+    return solid
 
 
 class Pymunk(Engine):
@@ -79,10 +86,10 @@ class Pymunk(Engine):
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
-        """Mechanisms that are not on a line, and rows that are always on."""
+        """Cases that are not of bodies on a line in the plane x, z, and rows that are always on."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
-        return why_not("pymunk", case) or no_rigid_contact(case)
+        return why_not("pymunk", case) or no_rigid_contact(case) or _across(line(case))
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **given: Any) -> PeerRun:
         """Build the space.
@@ -103,7 +110,7 @@ class Pymunk(Engine):
         used = _settings.chosen(self.name, profile, settings(case, scene, step), given)
         world = World(scene, float(used["restitution"]), profile == "matched")
         masses = [float(body.mass) for body in world.bodies]
-        return stepped((self.name, profile), case, used, world, masses, -float(world.space.gravity.y))
+        return stepped((self.name, profile), case, used, world, masses, -float(world.axis.dot(world.space.gravity)))
 
 
 ENGINE = Pymunk()

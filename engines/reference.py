@@ -57,12 +57,13 @@ class ReferenceRun(Run):
     def motion(self) -> Trajectory:
         """Integrate from the start, whatever shapes meet that have no rows."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
-        return trajectory if self.case.scene is None else determined(self.case.scene, trajectory)
+        scene = self.case.scene if self.case.general else None
+        return trajectory if scene is None else determined(scene, trajectory)
 
     def audit(self) -> Mapping[str, Any]:
         """The physics as the kernels return it."""
         own = audit(self.system, self.case.q0, self.case.v0)
-        if self.case.scene is not None:
+        if self.case.general and self.case.scene is not None:
             return own | listed(self.case.scene)
         told = getattr(module(self.case.mechanism), "listed", None)
         return own | (told(self.system.p) if told else {})
@@ -162,7 +163,7 @@ def _known(case: Case, solver: str) -> dict[str, Parameter]:
     if solver == "compiled":
         known["shortcuts"] = Parameter(default=True, doc="closed-form arcs where the scene is affine", low=0, high=1)
         known["implicit"] = Parameter(default=True, doc="the implicit method where the law is stiff", low=0, high=1)
-    if solver == "compiled" and case.scene is not None:
+    if solver == "compiled" and case.general:
         known["traced"] = Parameter(default=KEPT, doc="code compiled for this model alone", choices=tuple(TRACED))
     if solver == "ida":
         known["index"] = Parameter(default=1, doc="1, or 3 for bilateral rows", low=1, high=3)

@@ -111,7 +111,9 @@ def watched(system: System, run: Trajectory) -> Trajectory:
     left_out: Index = np.asarray(system.redundant)
     if not len(left_out) or not len(run.t):
         return replace(run, message=_told(system, run)) if system.findings else run
-    rates = np.array([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)])
+    p, h, rates = np.array(system.p), np.zeros(system.nc), np.zeros((len(run.t), system.nc))
+    for q, v, rate in zip(np.array(run.q), np.array(run.v), rates, strict=True):
+        system.gaps(0.0, q, v, p, h, rate)
     for values, what in ((run.gap, "h"), (rates, "h'")):
         most = np.abs(values[:, system.held]).max(initial=0.0)
         off = np.abs(values[:, left_out])

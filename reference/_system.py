@@ -30,8 +30,9 @@ class System:
     """The equations of one mechanism, ready for `simulate`.
 
     A system that is deleted takes its kernels with it, but LLVM gives no memory back that holds machine code: 1.5 to
-    3 MB stay of each system with kernels of its own (`pytest tests/test_kernels_released.py -m bench -s`). Where many
-    are made, give one set of kernels other parameters.
+    3 MB stay of each system with kernels of its own
+    (`pytest tests/reference/test_kernels_released.py -m bench -s`). Where many are made, give one set of kernels other
+    parameters.
 
     Attributes:
         n: number of velocities, and of positions unless nq says otherwise.

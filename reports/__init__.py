@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from crossbody.reports.judging.comparison import Entry, compare
-    from crossbody.reports.judging.truth import Truth, truth_of
+    from crossbody.reports.judging.truth import truth_of
+    from crossbody.reports.measuring.truth import Truth
 
 _LAZY = {
     "compare": "judging.comparison",

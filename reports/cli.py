@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 import click
 
 from crossbody.cases import CrossbodyError, installed
-from crossbody.reports.replay.cli import identify, memory_option, replay
+from crossbody.reports.commands.replay_options import identify, memory_option, replay
 from crossbody.reports.runs.watch import stopping
 from crossbody.reports.voice import as_json, quiet, speaks
 
@@ -62,30 +62,14 @@ def cli() -> None:
 
 
 @cli.command("list")
+@click.argument("name", metavar="[CASE or ENGINE]", required=False)
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
-def list_(plain: bool) -> None:
-    """List cases, engines, metrics, stress suites and models that logs are replayed on."""
-    from crossbody import cases, engines
-    from crossbody.hw import models
-    from crossbody.reports import metrics, suites
+def list_(name: str | None, plain: bool) -> None:
+    """List cases, engines, metrics, stress suites and models of logs; or what CASE or ENGINE has."""
+    from crossbody.reports import described
 
-    sources = {
-        "Cases": cases,
-        "Engines": engines,
-        "Metrics": metrics,
-        "Stress suites": suites,
-        "Models of logs": models,
-    }
-    listed = tuple(sources.items())
-    if plain:
-        kinds = {title.lower(): {name: source.summary(name) for name in source.names()} for title, source in listed}
-        click.echo(json.dumps(kinds, indent=1))
-        return
-    for title, source in listed:
-        click.echo(f"{title}:")
-        width = max(map(len, source.names()), default=0)
-        for name in source.names():
-            click.echo(f"  {name:<{width}}  {source.summary(name)}")
+    told = described.everything() if name is None else described.one(name)
+    click.echo(json.dumps({k.lower(): v for k, v in told.items()}, indent=1) if plain else described.text(told))
 
 
 def _parameters(command: _Work) -> _Work:
@@ -172,6 +156,14 @@ _LIMIT = click.option(
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
 @click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(0, 1024),
+    default=1,
+    show_default=True,
+    metavar="J",
+    help="Cases at once, in processes; 0: one a processor. Run times are then those beside each other.",
+)
 @_LIMIT
 @_AGAINST
 @_WITH
@@ -179,12 +171,26 @@ _LIMIT = click.option(
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
     rtol: float | None, settings: tuple[str, ...], strict: bool, limit: float, against: Path | None,
-    others: tuple[Path, ...],
+    others: tuple[Path, ...], jobs: int,
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
-    from crossbody.reports.commands import run as work
+    from crossbody.reports.commands.run import run as work
 
-    return work(names, wanted, variant, pairs, out, rtol, settings, _command(), against, others, limit, strict)
+    return work(
+        names,
+        wanted,
+        variant,
+        pairs,
+        out,
+        rtol,
+        settings,
+        _command(),
+        against,
+        others,
+        limit,
+        strict,
+        jobs or os.cpu_count() or 1,
+    )
 
 
 @cli.command()
@@ -205,7 +211,7 @@ def bench(
 
     With --against the exit code is 1 if accuracy or a ratio of run times was lost.
     """
-    from crossbody.reports.bench import command as work
+    from crossbody.reports.commands import bench as work
 
     if what is not None:
         return work.alone(what, (names, wanted, variant, pairs, full, minutes, against), repeats, out, _command())
@@ -229,7 +235,7 @@ def bench(
 @speaks
 def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: Path) -> int:
     """Map energy created and pattern of Newton's cradle over the gap between its balls."""
-    from crossbody.reports.commands import gap_map as work
+    from crossbody.reports.commands.maps import gap_map as work
 
     return work(counts, wanted, points, out, _command())
 
@@ -240,7 +246,7 @@ def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: P
 @speaks
 def stability(wanted: tuple[str, ...], out: Path) -> int:
     """Map from which scenes the closed-loop ball maze still comes to its centre."""
-    from crossbody.reports.commands import stability_map as work
+    from crossbody.reports.commands.maps import stability_map as work
 
     return work(wanted, out, _command())
 
@@ -268,8 +274,8 @@ def stress(
     A SUITE may be a case of your own or a robot's file: other laws of its rows, pushes on its bodies, other numbers.
     A sweep that was interrupted goes on where it stood when the same command is given again.
     """
-    from crossbody.reports.sweep.command import Ask
-    from crossbody.reports.sweep.command import stress as work
+    from crossbody.reports.commands.stress import Ask
+    from crossbody.reports.commands.stress import stress as work
     from crossbody.reports.sweep.pools import Tls
 
     tls = Tls(ca=tls_ca, cert=tls_cert, key=tls_key)
@@ -287,7 +293,7 @@ def stress(
 @speaks
 def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
     """Frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
-    from crossbody.reports.analysis.bode_command import bode as work
+    from crossbody.reports.commands.bode import bode as work
 
     return work(name, pairs, out, _command())
 
@@ -307,7 +313,7 @@ def analyse(
     mapped: bool, out: Path | None,
 ) -> int:  # fmt: skip
     """Equilibria of a case, their linear models, poles, ranks, responses and maps."""
-    from crossbody.reports.analysis.command import analyse as work
+    from crossbody.reports.commands.analyse import analyse as work
 
     return work(
         name, variant, pairs, at, bode=bode, locus=locus, mapped=mapped, out=out, command=_command()
@@ -367,7 +373,7 @@ def cache(context: click.Context) -> None:
 @speaks
 def cache_show() -> int:
     """Show where compiled code is kept and how much it is."""
-    from crossbody.reports.cache_command import show
+    from crossbody.reports.commands.cache import show
 
     return show()
 
@@ -376,7 +382,7 @@ def cache_show() -> int:
 @speaks
 def cache_clear() -> int:
     """Remove all compiled code; the next run compiles again."""
-    from crossbody.reports.cache_command import clear
+    from crossbody.reports.commands.cache import clear
 
     return clear()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Case, Coordinate, Inputs, Law, Limit, Parameter, Value
+from crossbody.cases.case import Case, Coordinate, Inputs, Limit, Parameter, Value
 from crossbody.cases.control import Control
 from crossbody.cases.errors import SceneError, UnknownName
 from crossbody.cases.files.assemble import assembled
@@ -22,14 +21,16 @@ from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
-from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_rows import law_of, rows_of
 
 REFERENCE_POSE, UNNAMED = "reference", "scene"
 OF_THE_FILE = -1.0
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
-    "without": Parameter(default="", doc="left out of every engine: friction, contacts, loop:NAME, ..."),
+    "without": Parameter(
+        default="", doc="left out of every engine: friction, contacts, medium, loop:NAME, ..., a comma between them"
+    ),
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
@@ -172,23 +173,19 @@ def case_of(
     if rank >= 0 and not scene.loops:
         raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
-    names, laws, unilateral = rows_of(scene)
+    names, laws, _ = rows_of(scene)
     fast = [name for name, one in zip(names, laws, strict=True) if one.b0 or one.b1]
     if fast:
         raise SceneError(
             f"Row {fast[0]!r} has constants of COLLISION, which no row of a scene follows: b0, b1 must be 0."
         )
-    law = Law(
-        a0=np.array([one.a0 for one in laws]), a1=np.array([one.a1 for one in laws]),
-        a2=np.array([one.a2 for one in laws]), unilateral=np.array(unilateral, dtype=bool),
-    )  # fmt: skip
     return Case(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
-        contacts=tuple(names), q0=start,
+        contacts=tuple(rows_of(scene)[0]), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else cast(Floats, v0),  # arrays are checked there
-        act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law,
+        act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law_of(scene),
         inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
         limits=AS_IT_STANDS if file else (),
@@ -203,11 +200,17 @@ def check_runnable(scene: Scene) -> None:
     """
     for part in scene.bounded:
         if part.friction_loss:
-            raise SceneError(f"{type(part).__name__} {part.name!r} has dry friction, which cannot be run.")
+            raise SceneError(
+                f"{type(part).__name__} {part.name!r} has dry friction (frictionloss), which cannot be run; "
+                "without=friction leaves all friction out of every engine."
+            )
     spans = {tendon.name for tendon in scene.tendons if tendon.bodies}
     for loop in scene.loops:
         for name in {loop.first, loop.second} & spans if loop.type == "tendon" else ():
-            raise SceneError(f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple it.")
+            raise SceneError(
+                f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple it; without=loop:"
+                f"{loop.name} leaves that out of every engine."
+            )
 
 
 ENTRIES = {
@@ -283,38 +286,3 @@ AS_IT_STANDS = (
     ),
 )  # fmt: skip
 """Of what an engine makes of a file by itself: its reader is judged, what it computes is told."""
-
-
-COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-"""Of a loop in space: its points, then its axes."""
-
-
-def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
-    """Return names, laws and whether they can open, of the rows in the order of all engines."""
-    names, laws, unilateral = [], [], []
-    for loop in scene.loops:
-        for k in range(loop.width):
-            names.append(loop.name if loop.width == 1 else f"{loop.name} {COMPONENTS[k]}")
-            laws.append(loop.law)
-            unilateral.append(False)
-    for part in scene.bounded:
-        for side, bound in zip(("low", "high"), part.range, strict=True):
-            if np.isfinite(bound):
-                names.append(f"{part.name} {side}")
-                laws.append(part.law)
-                unilateral.append(True)
-    met = contacts(scene)
-    for contact in met:
-        names += contact.normals
-        laws += [contact.pair.law] * contact.places
-        unilateral += [True] * contact.places
-    for contact in met:
-        names += contact.tangents
-        laws += [_held_back(contact.pair.law)] * len(contact.tangents)
-        unilateral += [True] * len(contact.tangents)
-    return names, laws, unilateral
-
-
-def _held_back(law: RowLaw) -> RowLaw:
-    """Return the law of a contact's tangential rows: a slip velocity decays as fast as a gap does."""
-    return RowLaw(a0=0.0, a1=law.a1 or math.sqrt(law.a0))

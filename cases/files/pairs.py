@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from crossbody.cases.errors import SceneError
 from crossbody.cases.scene import Pair, RowLaw
 
 SMALLEST = 1e-15
@@ -25,9 +26,30 @@ def pairs_of(model: Any, name: Callable[[int], str], law: Callable[[Any, Any, An
         name: shape's number -> its name.
         law: model, solref, solimp -> the law of a row.
     """
+    _check_fields(model, name)
     given = [_explicit(model, i, name, law) for i in range(model.npair)]
     listed = {frozenset(pair) for pair in _listed(model)}
     return (*given, *(_mixed(model, a, b, name, law) for a, b in _met(model) if frozenset((a, b)) not in listed))
+
+
+def _check_fields(model: Any, name: Callable[[int], str]) -> None:
+    import mujoco
+
+    unknown = {
+        int(kind): word
+        for word, kind in (
+            ("height field", mujoco.mjtGeom.mjGEOM_HFIELD),
+            ("signed-distance function", mujoco.mjtGeom.mjGEOM_SDF),
+        )
+    }
+    for pair in allowed(model):
+        for one, other in (pair, pair[::-1]):
+            if (word := unknown.get(int(model.geom_type[one]))) is not None:
+                raise SceneError(
+                    f"Shape {name(one)!r} is a {word}, whose contacts are not done, and {name(other)!r} may touch it; "
+                    "valid: contype and conaffinity 0 for one of them, or without=contacts, which leaves all contacts "
+                    "out of every engine."
+                )
 
 
 def allowed(model: Any) -> Iterator[tuple[int, int]]:

@@ -126,17 +126,29 @@ def _check_flags(option: Any) -> None:
     allowed = {f"mjDSBL_{name}" for name in (*HARMLESS, *HARMLESS_TOO)}
     for flag in mujoco.mjtDisableBit.__members__.values():
         if flag.name.startswith("mjDSBL") and option.disableflags & int(flag) and flag.name not in allowed:
-            raise SceneError(f"The model sets the flag {flag.name}, which is not understood.")
+            raise SceneError(f"The model sets the flag {flag.name}, which is not understood; valid: without it.")
     if option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
-        raise SceneError("The model overrides contact constants for all pairs (flag override): not understood.")
+        raise SceneError(
+            "The model overrides contact constants for all pairs (flag override), which is not understood; valid: "
+            "without it, with solref, solimp and margin at the shapes."
+        )
     if option.disableactuator:
-        raise SceneError("The model disables groups of actuators: not understood.")
+        raise SceneError(
+            "The model disables groups of actuators (actuatorgroupdisable), which is not understood; valid: none "
+            "disabled, with without=actuator:NAME for those that are to do nothing in any engine."
+        )
 
 
 def _check_options(option: Any) -> None:
     _check_flags(option)
     for name in ("density", "viscosity"):
         if getattr(option, name) != 0.0:
-            raise SceneError(f"The model moves in a medium (option {name} {getattr(option, name):g}): not done.")
+            raise SceneError(
+                f"The model moves in a medium (option {name} {getattr(option, name):g}), whose forces are not done; "
+                f"valid: {name} 0, or without=medium, which leaves it out of every engine."
+            )
     if np.any(option.wind):
-        raise SceneError("The model has wind: not done.")
+        raise SceneError(
+            "The model has wind, whose forces are not done; valid: no wind, or without=medium, which leaves it out of "
+            "every engine."
+        )

@@ -7,7 +7,7 @@ from typing import Any
 
 from crossbody.cases.errors import InvalidValue
 
-ALL = ("friction", "contacts", "meshes", "overlaps", "limits", "actuators", "loops", "tendons")
+ALL = ("friction", "contacts", "medium", "meshes", "overlaps", "limits", "actuators", "loops", "tendons")
 
 
 def without_meshes(without: str) -> bool:
@@ -112,6 +112,11 @@ def _contacts(model: Any) -> None:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 
 
+def _medium(model: Any) -> None:
+    model.opt.density = model.opt.viscosity = 0.0
+    model.opt.wind[:] = 0.0
+
+
 def _limits(model: Any) -> None:
     model.jnt_limited[:] = 0
     model.tendon_limited[:] = 0
@@ -144,6 +149,7 @@ _ONE: dict[str, Callable[[Any, int], None]] = {"actuator": _actuator, "loop": _l
 _WHOLE: dict[str, Callable[[Any], None]] = {
     "friction": _friction,
     "contacts": _contacts,
+    "medium": _medium,
     "limits": _limits,
     "actuators": _every(_actuator, "nu"),
     "loops": _every(_loop, "neq"),

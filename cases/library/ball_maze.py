@@ -24,6 +24,7 @@ from crossbody.cases.case import Case, Coordinate, Law, Parameter, Value
 from crossbody.cases.mechanisms.maze import geometry
 from crossbody.cases.mechanisms.maze.claims import claims, fallen
 from crossbody.cases.mechanisms.maze.limits import limits
+from crossbody.cases.mechanisms.maze.metrics import METRICS
 
 
 def _positive(default: float, unit: str, doc: str) -> Parameter:
@@ -121,6 +122,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
             unilateral=np.arange(rows) < NORMAL,
         ),
         claims=claimed,
+        metrics=METRICS,
         limits=limits(variant, claimed, fallen(p, maze)),
         discrete=DISCRETE,
         tight=TIGHT,

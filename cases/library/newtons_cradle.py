@@ -15,9 +15,11 @@ from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
 from crossbody.cases.mechanisms.cradle.limits import limits
+from crossbody.cases.mechanisms.cradle.metrics import METRICS, SLIDING
 from crossbody.cases.mechanisms.cradle.motion import Motion
-from crossbody.cases.mechanisms.cradle.scene import FROZEN, Row, law, row
+from crossbody.cases.mechanisms.cradle.scene import FROZEN, Row, law, row, scene
 from crossbody.cases.parameters import NumberOrWord, Numbers
+from crossbody.cases.scene_rows import law_of
 
 AUTO = "auto"
 
@@ -98,6 +100,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     if t_end == AUTO:
         t_end = horizon(balls, motion) if sliders else PENDULUMS_S
     q0, v0 = _start(mechanism, balls, parameters)
+    made = scene(parameters, mechanism, law(balls, rule))
     claims = _claims(balls, rule)
     return Case(
         name="newtons_cradle",
@@ -106,14 +109,16 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         mechanism=mechanism,
         parameters={**parameters, "t_end": t_end},
         coordinates=tuple(Coordinate(name=f"ball {i}", unit=_UNITS[mechanism]) for i in range(balls.n)),
-        contacts=tuple(f"balls {i} and {i + 1}" for i in range(balls.n - 1)),
+        contacts=tuple(tendon.name for tendon in made.tendons),
         q0=q0,
         v0=v0,
         t_end=float(t_end),
-        law=law(balls, rule),
+        law=law_of(made),
+        scene=made,
         collisions=rule,
         closed_form=motion if sliders and rule in FROZEN else None,
         claims=claims,
+        metrics={**METRICS, **(SLIDING if sliders else {})},
         limits=limits(mechanism, rule, balls.gap, claims),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

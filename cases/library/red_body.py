@@ -16,6 +16,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Claim, Coordinate, Law, Parameter, Tier, Value
 from crossbody.cases.errors import SceneError
 from crossbody.cases.mechanisms.red_body.limits import limits
+from crossbody.cases.mechanisms.red_body.metrics import METRICS
 from crossbody.cases.mechanisms.red_body.order import STAGES, Fall, inequalities
 
 _LONGER = 1.1
@@ -169,6 +170,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         law=law(p),
         collisions=_RULES[variant],
         claims=claims,
+        metrics=METRICS,
         limits=limits(variant, claims),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

@@ -16,6 +16,7 @@ from crossbody.cases.errors import InvalidValue
 from crossbody.cases.mechanisms.soft import robot
 from crossbody.cases.mechanisms.soft import scene as soft
 from crossbody.cases.mechanisms.soft.claims import claims, limits
+from crossbody.cases.mechanisms.soft.metrics import METRICS
 
 PARAMETERS = {
     **soft.FINGERS,
@@ -59,6 +60,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         collisions="resolved",
         tight=1e-11 if whole else 1e-12,
         claims=claimed,
+        metrics=METRICS,
         limits=limits(variant, claimed, p),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

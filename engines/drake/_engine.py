@@ -16,7 +16,7 @@ from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.drake import _scene
-from crossbody.engines.drake._plant import offsets, plant
+from crossbody.engines.drake._plant import plant
 from crossbody.engines.drake._scene import SceneRun
 from crossbody.engines.drake._simulate import Sim
 from crossbody.engines.drake._symbolic import system
@@ -26,7 +26,7 @@ USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4
 """What a Simulator of 1.51.1 starts with."""
 
 
-def _runner(case: Case, scene: Line, sim: Sim, shift: Floats, max_steps: int, dt: float) -> Callable[[], Trajectory]:
+def _runner(case: Case, scene: Line, sim: Sim, max_steps: int, dt: float) -> Callable[[], Trajectory]:
     n = len(scene.masses)
 
     def integrate() -> Trajectory:
@@ -36,8 +36,7 @@ def _runner(case: Case, scene: Line, sim: Sim, shift: Floats, max_steps: int, dt
         told = sim.run(case.t_end, max_steps, lambda t, x: rows.append((t, x)))
         wall = perf_counter() - start
         t, x = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
-        q, v = x[:, :n] - shift, x[:, n:]
-        q[0], v[0] = scene.q0, scene.v0
+        q, v = x[:, :n], x[:, n:]
         lam = _multipliers(scene, sim, t, x, dt)
         outcome, what = _ended(case, scene, t, q, v, max_steps, told)
         place = f"t = {t[-1]:g} s, q = {q[-1].tolist()}, v = {v[-1].tolist()}"
@@ -67,7 +66,7 @@ def _multipliers(scene: Line, sim: Sim, t: Floats, x: Floats, dt: float) -> Floa
     else:
         change = sim.rates(t, x)[:, n:] + scene.gravity
     lam = scene.transmitted(change)
-    rounding = 1e-9 * float(scene.masses.max()) * max(scene.gravity, 1e-3)
+    rounding = 1e-9 * float(scene.masses.max()) * max(abs(scene.gravity), 1e-3)
     return np.where(scene.unilateral, np.where(lam > rounding, lam, 0.0), lam)
 
 
@@ -87,10 +86,10 @@ class Drake(Engine):
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
-        """Mechanisms that are not on a line; contacts of a plant that never open."""
+        """Cases of their own kernels that are not on a line; contacts of a plant that never open."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
-        if case.scene is not None:
+        if case.general and case.scene is not None:
             return _scene.why_not(case.scene)
         reason = why_not("Drake", case)
         if reason is None and profile != "matched" and not case.law.unilateral.all():
@@ -114,21 +113,21 @@ class Drake(Engine):
         if reason is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
-        if case.scene is not None:
+        if case.general:
             return SceneRun(case=case, profile=profile, settings=used)
         scene, dt, physics = line(case), float(used.get("dt", 0.0)), {}
         if profile == "matched":
-            root, shift = system(scene), np.zeros(len(scene.masses))
+            root = system(scene)
             physics = {"masses": scene.masses, "constants": {"a0": scene.a0, "a1": scene.a1, "a2": scene.a2}}
         else:
             root, made = plant(scene, dt)
-            shift, physics = np.array(offsets(scene)), _read(scene, made)
-        start = np.concatenate((scene.q0 + shift, scene.v0))
+            physics = _read(scene, made)
+        start = np.concatenate((scene.q0, scene.v0))
         sim = Sim(root, start, str(used.get("scheme", USUAL_SCHEME)), float(used.get("rtol", 0.0)))
         law = {"law": law_name(case)} if profile == "matched" else {}
         return PeerRun(
             engine=self.name, profile=profile, settings=used | law,
-            integrate=_runner(case, scene, sim, shift, int(used["max_steps"]), dt),
+            integrate=_runner(case, scene, sim, int(used["max_steps"]), dt),
             physics={"gravity": scene.gravity, "q0": case.q0, "v0": case.v0} | physics,
             follows=followed(case) if profile == "matched" else None,
         )  # fmt: skip
@@ -137,8 +136,8 @@ class Drake(Engine):
 def _read(scene: Line, made: Any) -> dict[str, Any]:
     """Return the plant's numbers; its contact has a stiffness, and constants of the law are none of it."""
     context = made.CreateDefaultContext()
-    masses = [made.GetBodyByName(f"ball {i}").get_mass(context) for i in range(len(scene.masses))]
-    gravity = -float(made.gravity_field().gravity_vector()[2])
+    masses = [made.GetBodyByName(name).get_mass(context) for name in scene.bodies]
+    gravity = -float(made.gravity_field().gravity_vector() @ scene.axis)
     return {"masses": masses, "gravity": gravity}
 
 

@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import AddContactMaterial, Box, ProximityProperties, Sphere
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, ContactModel, CoulombFriction
-from pydrake.multibody.tree import PrismaticJoint, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, SpatialInertia, UnitInertia
 from pydrake.systems.framework import DiagramBuilder
 
+from crossbody.cases.rotations import matrices
 from crossbody.engines._line import Line
 
-THICK = 10.0  # m, of the floor
+THICK = 10.0
+"""Sides of the box that stands for a plane, m."""
 
 
 def plant(scene: Line, dt: float) -> tuple[Any, Any]:
@@ -23,18 +25,20 @@ def plant(scene: Line, dt: float) -> tuple[Any, Any]:
     """
     builder = DiagramBuilder()
     made, _ = AddMultibodyPlantSceneGraph(builder, dt)
-    axis = np.array([0.0, 0.0, 1.0] if scene.floor else [1.0, 0.0, 0.0])
-    made.mutable_gravity_field().set_gravity_vector(np.array([0.0, 0.0, -scene.gravity]))
-    for i, mass in enumerate(scene.masses.tolist()):
-        inertia = SpatialInertia(mass, np.zeros(3), UnitInertia.SolidSphere(scene.radius))
-        body = made.AddRigidBody(f"ball {i}", inertia)
-        made.AddJoint(PrismaticJoint(f"ball {i}", made.world_frame(), body.body_frame(), axis))
-        sphere = Sphere(scene.radius)
-        made.RegisterCollisionGeometry(body, RigidTransform(), sphere, f"ball {i}", _material(scene))
-    if scene.floor:
-        place = RigidTransform(np.array([0.0, 0.0, -scene.radius - 0.5 * THICK]))
-        floor = Box(THICK, THICK, THICK)
-        made.RegisterCollisionGeometry(made.world_body(), place, floor, "floor", _material(scene))
+    made.mutable_gravity_field().set_gravity_vector(-scene.gravity * scene.axis)
+    frames = {"": made.world_body()}
+    bodies = zip(scene.bodies, scene.masses.tolist(), scene.places, strict=True)
+    for name, mass, place in bodies:
+        inertia = SpatialInertia(mass, np.zeros(3), UnitInertia.SolidSphere(1.0))
+        frames[name] = body = made.AddRigidBody(name, inertia)
+        before = made.AddFrame(FixedOffsetFrame(f"before {name}", made.world_frame(), RigidTransform(place)))
+        made.AddJoint(PrismaticJoint(name, before, body.body_frame(), scene.axis))
+    for shape in scene.shapes:
+        turned = RotationMatrix(matrices(np.array(shape.orientation)))
+        plane, at = shape.type == "plane", np.array(shape.position)
+        place = RigidTransform(turned, at - plane * 0.5 * THICK * turned.matrix()[:, 2])
+        solid = Box(THICK, THICK, THICK) if plane else Sphere(shape.size[0])
+        made.RegisterCollisionGeometry(frames[shape.body], place, solid, shape.name, _material(scene))
     made.set_contact_model(ContactModel.kPoint)
     made.Finalize()
     return builder.Build(), made
@@ -47,8 +51,3 @@ def _material(scene: Line) -> Any:
         dissipation=0.0, point_stiffness=stiffness, friction=CoulombFriction(0.0, 0.0), properties=found
     )  # fmt: skip
     return found
-
-
-def offsets(scene: Line) -> list[float]:
-    """Position of every joint at q = 0, m."""
-    return [0.0 if scene.floor else i * (2.0 * scene.radius + scene.gap) for i in range(len(scene.masses))]

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from crossbody.cases.rotations import matrices
-from crossbody.cases.scene import Actuator, Joint, Loop, RowLaw, Scene, Shape, Tendon
+from crossbody.cases.scene import Actuator, Body, Joint, Loop, RowLaw, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
 
 POINT = 1e-15
 """Radius of a corner, m: below the rounding of any place, and above 0, which no ball has."""
+
+LEAST = 2e-15
+"""The smallest moment of inertia that MuJoCo admits, kg m^2 (twice mjMINVAL): it has no point masses."""
 
 
 def compiled(spec: Any, scene: Scene) -> Any:
@@ -41,12 +44,13 @@ def compiled(spec: Any, scene: Scene) -> Any:
     return model
 
 
-def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
+def spec_of(scene: Scene, *, by_corners: bool = False, solids: Collection[str] = ()) -> Any:
     """Return a scene as an editable model.
 
     Args:
         scene: what it is made of.
         by_corners: whether every corner of a hull is a shape of its own: MuJoCo has but a few contacts of a mesh.
+        solids: bodies whose mass and inertia MuJoCo takes from their shapes.
     """
     spec = mujoco.MjSpec()
     spec.compiler.balanceinertia = False
@@ -56,11 +60,10 @@ def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
     bodies = {"": spec.worldbody}
     for body in scene.bodies:
         added = bodies[body.parent].add_body(
-            name=body.name, pos=body.position, quat=body.orientation, mass=body.mass, ipos=body.com,
-            gravcomp=body.weightless, explicitinertial=True,
-        )  # fmt: skip
-        # The full inertia stands in the order xx yy zz xy xz yz.
-        added.fullinertia = body.inertia if body.mass > 0.0 else np.full(6, np.nan)
+            name=body.name, pos=body.position, quat=body.orientation, gravcomp=body.weightless
+        )
+        if body.name not in solids:
+            _add_inertia(added, body)
         bodies[body.name] = added
         for joint in scene.joints:
             if joint.body == body.name:
@@ -77,6 +80,14 @@ def spec_of(scene: Scene, *, by_corners: bool = False) -> Any:
         else:
             _add_contact(spec, bodies, contact)
     return spec
+
+
+def _add_inertia(added: Any, body: Body) -> None:
+    added.explicitinertial, added.mass, added.ipos = True, body.mass, body.com
+    if body.mass > 0.0 and any(body.inertia):
+        added.fullinertia = body.inertia  # in the order xx yy zz xy xz yz
+    else:
+        added.inertia = (LEAST if body.mass > 0.0 else 0.0,) * 3
 
 
 def _bounds(bounds: tuple[float, ...]) -> tuple[bool, tuple[float, ...]]:

@@ -18,6 +18,7 @@ from crossbody.cases.scene import Joint, Scene, Tendon
 from crossbody.engines._contacts import TURN, Contacts, Indices, closing, drift
 from crossbody.engines._scene import angle_of, places
 from crossbody.engines.mujoco._observe import numbers, pose_of
+from crossbody.engines.nearest import Pose, cross
 
 
 class Drift:
@@ -33,7 +34,9 @@ class Drift:
         self.model, self.data, self.contacts = model, mujoco.MjData(model), contacts
         self.numbers = numbers(scene)
         self.pose = pose_of(self.data, self.numbers)
+        self.carriers = np.array([self.numbers[body] for body in contacts.bodies], dtype=np.intp)
         self.bounded, self.at, self.place = scene.bounded, *places(scene)
+        self.row = np.repeat(np.arange(model.ntendon), model.ten_J_rownnz)  # of each entry of the tendons' Jacobian
 
     def __call__(self, q: Floats, v: Floats, parts: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
         """Return that of some of what may have bounds, 0 of a sum of joints, and of some rows of the contacts."""
@@ -44,48 +47,54 @@ class Drift:
             mujoco.mj_kinematics(self.model, self.data)
             along, turn = self.contacts.lying(self.pose, rows)
 
-        def rates(t: float) -> Floats:
-            self.data.qpos[:] = q
-            mujoco.mj_integratePos(self.model, self.data.qpos, v, t)
-            mujoco.mj_kinematics(self.model, self.data)
-            mujoco.mj_comPos(self.model, self.data)
-            mujoco.mj_comVel(self.model, self.data)
-            found = [self._rate(self.bounded[i], v) for i in parts]
-            if len(rows):
-                found += closing(self.contacts.touches(self.pose, rows, along), self._carry).tolist()
-            return np.array(found)
+        def rates(times: Floats) -> Floats:
+            found, states = [], []
+            for t in times:
+                self.data.qpos[:] = q
+                mujoco.mj_integratePos(self.model, self.data.qpos, v, t)
+                mujoco.mj_kinematics(self.model, self.data)
+                mujoco.mj_comPos(self.model, self.data)
+                found.append(self._rates(parts, v) if len(parts) else [])
+                if len(rows):
+                    mujoco.mj_comVel(self.model, self.data)
+                    states.append(self._state())
+            own = np.array(found).reshape(len(times), -1)
+            return np.concatenate([own, self._closing(states, rows, along)], axis=1) if len(rows) else own
 
         lengths, touches = np.split(drift(rates, v, turn), [len(parts)])
         return lengths, touches
 
-    def _rate(self, part: Joint | Tendon, v: Floats) -> float:
-        """Return how fast an angle of a ball joint or a distance of points changes, 0 of anything else."""
-        if isinstance(part, Joint):
-            return self._angle_rate(part, v) if part.type == "ball" and part.limited else 0.0
-        return self._length_rate(part) if part.bodies else 0.0
+    def _state(self) -> tuple[Floats, ...]:
+        """Return poses and twists of all bodies, and about which points these are: their trees' centres of mass."""
+        data = self.data
+        centres = data.subtree_com[self.model.body_rootid]
+        return data.xmat.reshape(-1, 3, 3).copy(), data.xpos.copy(), data.cvel.copy(), centres
 
-    def _angle_rate(self, joint: Joint, v: Floats) -> float:
+    def _closing(self, states: Sequence[tuple[Floats, ...]], rows: Sequence[int], along: dict[int, bool]) -> Floats:
+        """Return the rates of gaps (m, n) at some instants."""
+        R, p, twists, centres = (np.array(part) for part in zip(*states, strict=True))
+
+        def carried(bodies: Indices, points: Floats) -> Floats:
+            k = self.carriers[bodies]
+            velocity: Floats = twists[:, k, 3:] + cross(twists[:, k, :3], points - centres[:, k])
+            return velocity
+
+        def poses(body: str) -> Pose:
+            return R[:, self.numbers[body]], p[:, self.numbers[body]]
+
+        return closing(self.contacts.touches(poses, rows, along), carried)
+
+    def _rates(self, parts: Sequence[int], v: Floats) -> list[float]:
+        """Return how fast angles of ball joints and distances of points change, 0 of anything else."""
+        mujoco.mj_tendon(self.model, self.data)
+        J = np.zeros((self.model.ntendon, self.model.nv))
+        J[self.row, self.model.ten_J_colind] = self.data.ten_J
+        lengths, n = (J @ v).tolist(), len(self.bounded) - len(J)
+        return [lengths[i - n] if i >= n else self._angle_rate(self.bounded[i], v) for i in parts]
+
+    def _angle_rate(self, joint: Joint | Tendon, v: Floats) -> float:
+        """Return how fast the angle of a ball joint changes; 0 of any other."""
+        if not isinstance(joint, Joint) or joint.type != "ball" or not joint.limited:
+            return 0.0
         first, turn = self.place[joint.name], angle_of(self.data.qpos[self.at[joint.name] :][:4])
         return float(turn @ v[first : first + 3] / np.linalg.norm(turn))
-
-    def _length_rate(self, tendon: Tendon) -> float:
-        at = []
-        for body, position in zip(tendon.bodies, tendon.positions, strict=True):
-            R, p = self.pose(body)
-            at.append(p + R @ np.array(position))
-        one, two = (self._carried(body, point) for body, point in zip(tendon.bodies, at, strict=True))
-        apart = at[1] - at[0]
-        return float(apart @ (two - one) / np.linalg.norm(apart))
-
-    def _carry(self, bodies: Indices, points: Floats) -> Floats:
-        """Return the velocities (n, 3) of points of the bodies of the contacts."""
-        names = [self.contacts.bodies[i] for i in bodies]
-        return np.array([self._carried(body, point) for body, point in zip(names, points, strict=True)])
-
-    def _carried(self, body: str, point: Floats) -> Floats:
-        """Return the velocity of a point of a body; MuJoCo's twists are about a tree's centre of mass."""
-        k = self.numbers[body]
-        (a, b, c), linear = self.data.cvel[k, :3], self.data.cvel[k, 3:]
-        x, y, z = point - self.data.subtree_com[self.model.body_rootid[k]]
-        velocity: Floats = linear + np.array([b * z - c * y, c * x - a * z, a * y - b * x])
-        return velocity

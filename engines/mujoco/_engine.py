@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -53,7 +54,8 @@ class MujocoRun(Run):
         heard = (f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys((*self.said, *warned)))
         message = " ".join(w for w in (march.message, self.rounded, *heard) if w)
         counts = {"located": march.trials}
-        found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
+        with captured():  # gaps are looked at with the same model, and have no more to say
+            found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
         return found if scene.acting is None else scene.acting.told(found)
 
     def native(self) -> float:
@@ -84,7 +86,7 @@ class Mujoco(Engine):
 
     name = "mujoco"
     profiles: Mapping[str, str] = {
-        "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events; memoryless",
+        "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events",
         "default": "the obvious model: contact constants, integrator (Euler) and step (2 ms) as MuJoCo sets them",
         "as_is": "a robot file as it stands: its own step, integrator, solref, solimp and cone",
     }
@@ -106,13 +108,12 @@ class Mujoco(Engine):
         """Mechanisms without a model here cannot be run."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
-        known = MECHANISMS.names()
         if profile == "as_is" and case.scene is None:
             return f"The profile as_is runs a robot file as it stands, and {case.name} is none; its own is default."
-        if case.mechanism in known:
-            own = getattr(MECHANISMS.load(case.mechanism), "why_not", None)
+        if (name := _module(case)) in MECHANISMS.names():
+            own = getattr(MECHANISMS.load(name), "why_not", None)
             return own(case, profile) if own else None
-        return f"MuJoCo has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
+        return f"MuJoCo has no model of the mechanism {name!r}; it has: {', '.join(MECHANISMS.names())}."
 
     def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> Run:
         """Compile the model of a case.
@@ -131,24 +132,20 @@ class Mujoco(Engine):
         reason = self.why_not(case, profile)
         if reason is not None:
             raise CaseUnsupported(reason)
-        mechanism = MECHANISMS.load(case.mechanism)
-        known = _known(case, mechanism.default_step(case, profile))
+        mechanism = MECHANISMS.load(_module(case))
+        with captured(), _refused(case):
+            known = _known(case, mechanism.default_step(case, profile))
         known |= getattr(mechanism, "settings", lambda *_: {})(case, profile)
         used = _settings.chosen(self.name, profile, known, settings)
         dt, rounded = _dividing(case, float(used["dt"])) if "dt" in used else (0.0, "")
         used = used | ({"dt": dt} if rounded else {})
         own = profile == "matched" and "dt" not in settings  # nobody's step was changed
-        with captured() as said:
-            try:
-                if hasattr(mechanism, "prepare"):
-                    run: Run = mechanism.prepare(case, profile, used)
-                    return run
-                more = {name: value for name, value in used.items() if name not in ("dt", "max_steps")}
-                scene: Scene = mechanism.build(case, profile, float(used["dt"]), **more)
-            except CrossbodyError:
-                raise  # ours, and it is a ValueError too
-            except ValueError as error:
-                raise CaseUnsupported(f"MuJoCo refuses the model of {case.label}: {error}.") from None
+        with captured() as said, _refused(case):
+            if hasattr(mechanism, "prepare"):
+                run: Run = mechanism.prepare(case, profile, used)
+                return run
+            more = {name: value for name, value in used.items() if name not in ("dt", "max_steps")}
+            scene: Scene = mechanism.build(case, profile, float(used["dt"]), **more)
         followed = getattr(mechanism, "followed", None)
         return MujocoRun(
             case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said),
@@ -166,7 +163,23 @@ class Mujoco(Engine):
         reason = self.why_not(case, "matched")
         if reason is not None:
             raise CaseUnsupported(reason)
-        return linearise(MECHANISMS.load(case.mechanism), case, spot)
+        return linearise(MECHANISMS.load(_module(case)), case, spot)
+
+
+@contextmanager
+def _refused(case: Case) -> Iterator[None]:
+    """Say in MuJoCo's words what it does not like of a model."""
+    try:
+        yield
+    except CrossbodyError:
+        raise  # ours, and it is a ValueError too
+    except ValueError as error:
+        raise CaseUnsupported(f"MuJoCo refuses the model of {case.label}: {error}.") from None
+
+
+def _module(case: Case) -> str:
+    """Return what builds a case's model: that of all scenes, where it is one."""
+    return "scene" if case.scene is not None else case.mechanism
 
 
 def _dividing(case: Case, dt: float) -> tuple[float, str]:

@@ -32,6 +32,7 @@ from crossbody.cases.files.warned import captured
 from crossbody.engines.linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix
+from crossbody.engines.mujoco._rows import LIMITS, TOUCH
 
 EPS = 1e-5
 """Step of the centred differences, in the units of the coordinates."""
@@ -39,7 +40,7 @@ ONE_SIDED = 1e-6
 """The step that MuJoCo's documentation suggests for one-sided differences."""
 RESOLVED = 0.05
 """Largest product of the step whose logarithm is taken and the fastest pole."""
-ONE_WAY = (int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT), int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
+ONE_WAY = (*(int(kind) for kind in LIMITS), TOUCH)
 """Rows whose force is bounded by 0."""
 PRESS = 10.0
 """Times the force by which a row changes in the differences: how hard one is pressed that carries less."""

@@ -13,7 +13,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact
-from crossbody.engines._contacts import Contacts, end_of
+from crossbody.cases.scene_rows import rows_of
+from crossbody.engines._contacts import TOGETHER, Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import corner_names
@@ -21,10 +22,9 @@ from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._observe import numbers
 from crossbody.engines.nearest import corners
 
-TOGETHER = 64
-"""Instants at which gaps of shapes are computed at once."""
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
+FRICTIONAL = (mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL,)
 Present = tuple[int, int]
 """Where a row stands in MuJoCo's arrays, and among the scene's."""
 
@@ -34,10 +34,11 @@ class Rows:
 
     Attributes:
         always: number of rows that are always on; they stand first in both.
+        frictional: whether edges of friction pyramids, whose sum is the normal force, are rows of contacts too.
     """
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
-        self.scene, self.model, self.data = scene, model, data
+        self.scene, self.model, self.data, self.frictional = scene, model, data, False
         self.always = sum(loop.width for loop in scene.loops)
         self.places: dict[tuple[int, int, bool], int] = {}
         row = self.always
@@ -48,6 +49,9 @@ class Rows:
                 if np.isfinite(bound):
                     self.places[kind, i, bool(upper)] = row
                     row += 1
+        ends = [(kind, i) for kind, i, _ in self.places]
+        self.sole = {(kind, i): row for (kind, i, _), row in self.places.items() if ends.count((kind, i)) == 1}
+        self.cubic, self.forces = np.array([law.a2 for law in rows_of(scene)[1]]), Forces(scene)
         self.touching = Contacts(scene)
         self.nc = row + self.touching.count
         named = mjcf.names(model, "geom")
@@ -74,26 +78,32 @@ class Rows:
         ]
         return [int(self.model.pair(name).id) for part in names for name in part]
 
-    def constants(self) -> dict[str, Any]:
-        """Return the law of every row as the model has it: a0, a1, a2 where solref is direct, else the pairs."""
+    def constants(self, *, own: bool = False) -> dict[str, Any]:
+        """Return the law of every row as the model has it: a0, a1, a2 where it is the case's, else the pairs."""
         model = self.model
         solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
         bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
         solref += [bounds[kind][i] for kind, i, _ in self.places]
-        solref += [model.pair_solref[i] for i in self.pair_ids()]
+        solref += [model.pair_solref[i] for i in self.pair_ids()] if model.npair else []
+        solref += [model.geom_solref[part] for part, _ in map(sorted, self.touches)] if not model.npair else []
         pairs = np.array(solref).reshape(-1, 2)
-        if (pairs >= 0.0).any():
+        if own or (pairs > 0.0).any():
             return {"solref": pairs}
-        return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), np.zeros(len(pairs))), strict=True))
+        return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), self.cubic), strict=True))
 
     def present(self) -> Iterator[Present]:
         """Yield what MuJoCo has a row for now, of those that may open."""
         data = self.data
-        for j in range(data.ne, data.nefc):
-            kind, part = int(data.efc_type[j]), int(data.efc_id[j])
-            if kind in LIMITS:
+        first, last = data.ne, data.nefc
+        if first == last:
+            return
+        rows = zip(data.efc_type[first:last].tolist(), data.efc_id[first:last].tolist(), strict=True)
+        for j, (kind, part) in enumerate(rows, first):
+            if (row := self.sole.get((kind, part))) is not None:
+                yield j, row
+            elif kind in LIMITS:
                 yield j, self._place(j, kind, part)
-            elif kind == TOUCH and self._geoms(part) in self.touches:
+            elif (kind == TOUCH or (self.frictional and kind in FRICTIONAL)) and self._geoms(part) in self.touches:
                 yield j, self._touch(part)
 
     def lam(self) -> Floats:
@@ -103,6 +113,14 @@ class Rows:
         for j, row in self.present():
             lam[row] += data.efc_force[j]
         return lam
+
+    def jacobian(self) -> Floats:
+        """Return H (nc, nv); 0 of a row that is not there."""
+        J, H = np.array(self.data.efc_J).reshape(-1, self.model.nv), np.zeros((self.nc, self.model.nv))
+        H[: self.always] = J[: self.always]
+        for j, row in self.present():
+            H[row] = J[j]
+        return H
 
     def _geoms(self, part: int) -> frozenset[int]:
         """Return the shapes of a contact; in a file as it stands some meet whose pairs have no rows."""
@@ -142,21 +160,21 @@ class Rows:
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
         data = mujoco.MjData(self.model)
-        forces = Forces(self.scene)
 
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
             first = self.nc - self.touching.count
             gaps, energy = np.empty((len(q), self.nc)), np.empty((len(q), 2))
-            gaps[:, first:] = self._apart(q, data)
+            gaps[:, first:], lengths = self._apart(q, data), np.empty((len(q), self.model.ntendon))
             for i in range(len(q)):
                 data.qpos[:], data.qvel[:] = q[i], v[i]
                 mujoco.mj_fwdPosition(self.model, data)
                 mujoco.mj_fwdVelocity(self.model, data)
                 mujoco.mj_energyPos(self.model, data)
                 mujoco.mj_energyVel(self.model, data)
-                gaps[i, :first] = [*data.efc_pos[: self.always], *forces.bounds(q[i], data.ten_length)]
+                gaps[i, : self.always], lengths[i] = data.efc_pos[: self.always], data.ten_length
                 spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
                 energy[i] = data.energy[1], data.energy[0] + spared.sum()
+            gaps[:, self.always : first] = self.forces.bounds(q, lengths)
             return gaps, energy
 
         return observe
@@ -166,13 +184,13 @@ class Rows:
         gaps, bodies, n = np.empty((len(q), self.touching.count)), numbers(self.scene), self.model.nbody
         if not self.touching.count:
             return gaps
-        R, p = np.empty((TOGETHER, n, 3, 3)), np.empty((TOGETHER, n, 3))
+        R, p, ways = np.empty((TOGETHER, n, 3, 3)), np.empty((TOGETHER, n, 3)), dict[int, bool]()
         for first in range(0, len(q), TOGETHER):
             part = q[first : first + TOGETHER]
             for k, position in enumerate(part):
                 data.qpos[:] = position
                 mujoco.mj_kinematics(self.model, data)
                 R[k], p[k] = data.xmat.reshape(-1, 3, 3), data.xpos
-            met = self.touching.touches(lambda name: (R[:, bodies[name]], p[:, bodies[name]]))
-            gaps[first : first + TOGETHER] = met.gap[: len(part)]
+            poses = {name: (R[: len(part), i], p[: len(part), i]) for name, i in bodies.items()}
+            gaps[first : first + TOGETHER] = self.touching.recorded(poses.__getitem__, ways)
         return gaps

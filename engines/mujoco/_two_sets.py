@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Law, Mode
 from crossbody.cases.arrays import Floats
-from crossbody.engines._cradle import one_set
 from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import elastic_part
+from crossbody.engines._real_time import one_set
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._globals import Hook
 from crossbody.engines.mujoco._observe import mass_matrix

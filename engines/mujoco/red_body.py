@@ -16,8 +16,8 @@ import numpy as np
 from crossbody.cases import Case, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.engines import _red_body
-from crossbody.engines._cradle import one_set
 from crossbody.engines._log import Modes
+from crossbody.engines._real_time import one_set
 from crossbody.engines._red_body import ROWS, RedBody
 from crossbody.engines.mujoco._audit import audit
 from crossbody.engines.mujoco._direct import without_regularisation

@@ -1,9 +1,10 @@
-"""Any scene in MuJoCo: matched, built from the scene; as_is, the file as it stands."""
+"""Any scene in MuJoCo: matched, built from the scene; default, with contacts as MuJoCo sets them; as_is, a file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,23 +13,29 @@ import mujoco
 import numpy as np
 from scipy.linalg import eig, null_space
 
-from crossbody.cases import Case, CaseUnsupported, Parameter, SceneError
+from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
 from crossbody.cases.scene_contacts import frictional
+from crossbody.cases.scene_rows import rows_of, under_law
 from crossbody.engines._acting import Acting
+from crossbody.engines._real_time import followed as real_time
+from crossbody.engines._scale import depths, resolving_step
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix, numbers
+from crossbody.engines.mujoco._obvious import Obvious, obvious
 from crossbody.engines.mujoco._rows import Rows
 from crossbody.engines.mujoco._scene import Scene as Prepared
 from crossbody.engines.mujoco._switched import Switched
 
+FASTEST = 100.0
+"""Times the speed that a scene can have: a run has diverged."""
 SLOWEST, OF_RATE, OF_ROWS = 1e-3, 0.02, 0.05
 """Largest step of the matched profile, s, and the parts that it is of the fastest time constant of forces and of that
 of rows that open: Runge-Kutta 4 leaves (1/50)^4 a time constant, and rows act for a few of theirs."""
@@ -41,7 +48,11 @@ two or three iterations, and without an end it takes a hundred. Where rows may, 
 STIFF = 1e3
 """Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
 method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
-1e-3, 1e-4 by 1e-6 (`tests/test_bounds_at_rest.py`). Loops in space bear many times what moves, and want 1e-7."""
+1e-3, 1e-4 by 1e-6 (`tests/reference/test_bounds_at_rest.py`). Loops in space bear many times what moves: 1e-7."""
+ROUNDS = 3
+"""Of PGS, with one row."""
+SOLVES = 4
+"""Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
 DEPENDENT = 1e-6
 """Singular value of the loops' rows, over the largest, below which one depends on the others."""
 SOFT = "The file's rows are soft: their law varies with depth."
@@ -50,12 +61,14 @@ HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
-    if profile == "default":
-        return "What MuJoCo makes of a robot file by itself is the profile as_is; default is one of the shipped cases."
+    if profile == "default" and case.file:
+        return (
+            "What MuJoCo makes of a robot file by itself is the profile as_is; default is that of scenes without one."
+        )
     if case.scene is not None and (found := frictional(case.scene)):
         return found
     if profile != "as_is":
-        return "MuJoCo's rows have no cubic term: a2 must be 0." if case.law.a2.any() else None
+        return None
     if not case.file:
         return "There is no file to run as it stands."
     try:
@@ -76,10 +89,33 @@ def default_step(case: Case, profile: str) -> float:
     """Return the file's own step, s, or for matched parts of the fastest time constants of forces and of rows."""
     if profile == "as_is":
         return float(_from_file(case).opt.timestep)
-    opening = case.law.unilateral
-    poles = [np.roots([1.0, a1, a0]) for a0, a1 in zip(case.law.a0[opening], case.law.a1[opening], strict=True)]
+    if profile == "default":
+        return float(mujoco.MjModel.from_xml_string("<mujoco/>").opt.timestep)
+    case = followed(case, profile) or case
+    law, opening = case.law, case.law.unilateral
+    deep = 0.0
+    if law.a2.any():
+        model = matched(_scene(case))
+        deep = _reach(case, Switched(_scene(case), model, mujoco.MjData(model)))[0]
+    if not case.general:  # nothing but rows moves its bodies fast
+        return min(SLOWEST, resolving_step(law, deep))
+    stiffness = law.a0 + 3.0 * law.a2 * deep**2
+    poles = [np.roots([1.0, a1, k]) for k, a1 in zip(stiffness[opening], law.a1[opening], strict=True)]
     rate = float(np.abs(np.concatenate([np.zeros(1), *poles])).max())
     return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
+
+
+def followed(case: Case, profile: str) -> Case | None:
+    """Return the case whose equations the profile integrates, if not its own; None too for constants of MuJoCo's."""
+    return real_time(case) if profile == "matched" else None
+
+
+def _reach(case: Case, rows: Switched) -> tuple[float, float]:
+    """Return how deep rows get, m or rad, and how fast, by what drives them at the start."""
+    rows.data.qpos[:], rows.data.qvel[:] = case.q0, case.v0
+    law = case.law
+    deep, fast = depths(np.stack([law.a0, law.a1, law.a2]), *rows.approach(), law.unilateral)
+    return float(deep.max(initial=0.0)), float(fast.max(initial=0.0))
 
 
 def fastest(scene: Scene, q: Floats, v: Floats) -> float:
@@ -133,43 +169,68 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     Raises:
         ValueError: MuJoCo's own, for a model that it refuses.
     """
-    scene = _scene(case)
+    scene = _scene(followed(case, profile) or case)
     if profile == "as_is":
         model = held(_from_file(case))
         model = model if reader == "file" else rebuilt(scene, model)
+    elif profile == "default":
+        model = obvious(scene)
     else:
         model = matched(scene)
     data = mujoco.MjData(model)
     switched = Switched(scene, model, data) if profile == "matched" else None
-    rows, acting = switched or Rows(scene, model, data), Acting(case)
+    rows, acting = switched or (Obvious if profile == "default" else Rows)(scene, model, data), Acting(case)
     driver = Forces(scene) if profile == "matched" and scene.activated else None
     prepared = Prepared(
-        model=model, data=data, nc=len(case.contacts), start=_start(case, model, data, acting, driver),
+        model=model, data=data, nc=len(case.contacts), start=_start(case, data, rows, acting, driver),
         modes=rows.modes, lam=rows.lam,
-        safe=lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()),
+        safe=_guard(followed(case, profile) or case, data, rows),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
-        hook=_hook(scene, switched, driver) if switched else None, always=True,
+        hook=_hook(scene, switched, driver) if switched else None,
+        always=driver is not None or (switched is not None and switched.wakeful),
         machine="level" if switched else "memoryless",
     )  # fmt: skip
     if switched is not None and switched.nc > switched.always:
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
-    prepared.audit = _audit(case, profile, model, rows)
+    prepared.audit = _audit(case, profile, scene, model, rows)
     return prepared
+
+
+def _guard(case: Case, data: Any, rows: Rows) -> Callable[[], bool]:
+    """Return what tells whether a state is finite and not 100 times faster than what drives the start explains.
+
+    Of a robot nobody knows what its inputs will do.
+    """
+    rates: Floats = data.qvel
+    if case.general:
+        return lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(rates).all())
+    speed = _reach(case, rows)[1] if isinstance(rows, Switched) else 0.0
+    data.qpos[:], data.qvel[:] = case.q0, case.v0
+    mujoco.mj_forward(rows.model, data)
+    fastest = FASTEST * (speed + float((np.abs(rates) + np.abs(data.qacc_smooth) * case.t_end).max())) or np.inf
+    return lambda: bool(np.abs(rates).max() < fastest)
 
 
 def _scene(case: Case) -> Scene:
     if case.scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
-    return case.scene
+    return under_law(case.scene, case.law)
 
 
 def _from_file(case: Case) -> Any:
-    """Return MuJoCo's own reading of the file, less what is left out of every engine."""
-    without = str(case.parameters.get("without", ""))
-    model, _ = mjcf.read(Path(case.file), without)
-    strip(model, without)
-    return model
+    """Return MuJoCo's own reading of the file, less what is left out of every engine: a copy of what was read last."""
+    known = _READ[0] if _READ else None
+    if known is None or known[0] is not case:
+        without = str(case.parameters.get("without", ""))
+        model, _ = mjcf.read(Path(case.file), without)
+        strip(model, without)
+        _READ[:] = [known := (case, model)]
+    return copy(known[1])
+
+
+_READ: list[tuple[Case, Any]] = []
+"""The last case whose file was read, and its model: a run asks several times, and a mesh takes long to compile."""
 
 
 def matched(scene: Scene) -> Any:
@@ -189,15 +250,22 @@ def matched(scene: Scene) -> Any:
     option.disableflags |= int(off.mjDSBL_AUTORESET | off.mjDSBL_REFSAFE)
     model = compiled(spec, scene)
     without_regularisation(model)
+    if len(rows_of(scene)[0]) == 1:  # one row PGS solves exactly, however hard
+        model.opt.solver, model.opt.iterations = mujoco.mjtSolver.mjSOL_PGS, ROUNDS
+        return model
     model.dof_invweight0[:] *= STIFF
     model.tendon_invweight0[:] *= STIFF
     return model
 
 
-def _start(case: Case, model: Any, data: Any, acting: Acting, driver: Forces | None) -> Callable[[], None]:
+def _start(case: Case, data: Any, rows: Rows, acting: Acting, driver: Forces | None) -> Callable[[], None]:
+    model = rows.model
+
     def start() -> None:
         acting.reset()
         mujoco.mj_resetData(model, data)
+        if isinstance(rows, Switched):
+            rows.last = np.zeros(rows.nc)  # not in place: multipliers that are recorded are these arrays
         data.qpos[:], data.qvel[:] = case.q0, case.v0
         if driver is not None:
             driver.begin(case.act0)
@@ -241,14 +309,23 @@ def _change(scene: Scene, data: Any, acting: Acting, driver: Forces | None) -> C
     return change
 
 
-def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
+def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> dict[str, Any]:
     """Masses, M and bias at zero input; rows where all of them are always on."""
+    model = copy(model)  # rows are put on here
     data = mujoco.MjData(model)
+    entered = profile == "matched" and not case.general  # of a robot the states are not those of rows that act
+    of_run, rows = rows, type(rows)(scene, model, data)
+    if isinstance(rows, Switched) and isinstance(of_run, Switched):
+        rows.surface[:] = of_run.surface
+    hook = rows.hook() if entered and isinstance(rows, Switched) else None
 
     def look(q: Floats, v: Floats) -> None:
+        if isinstance(rows, Switched) and entered:
+            rows.arm((int(Mode.BILATERAL),) * rows.always + (int(Mode.CONTACT),) * (rows.nc - rows.always))
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = q, v
-        mujoco.mj_forward(model, data)
+        with hooked(hook):
+            mujoco.mj_forward(model, data)
 
     def M(q: Floats) -> Floats:
         look(q, np.zeros(model.nv))
@@ -260,19 +337,25 @@ def _audit(case: Case, profile: str, model: Any, rows: Rows) -> dict[str, Any]:
 
     def H(q: Floats) -> Floats:
         look(q, np.zeros(model.nv))
-        return np.array(data.efc_J).reshape(-1, model.nv)[: rows.nc]
+        return rows.jacobian()
 
     def lam(q: Floats, v: Floats) -> Floats:
-        look(q, v)
-        return np.array(data.efc_force[: rows.nc])
+        for _ in range(SOLVES if entered else 1):  # what softness leaves of it is R times the change since the last
+            look(q, v)
+            found = rows.lam()
+        return found
 
+    weightless = bool(model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
     found: dict[str, Any] = {
-        "masses": model.body_mass[1:].copy(), "gravity": float(np.linalg.norm(model.opt.gravity)),
+        "masses": model.body_mass[1:].copy(),
+        "gravity": 0.0 if weightless else float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
-    if profile == "matched":
-        found["constants"] = rows.constants()
+    if profile != "as_is":
+        found["constants"] = rows.constants(own=profile == "default")
     hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
-    if rows.nc > rows.always:
+    if profile == "default" and not case.general:
+        return found | {"hidden": hidden, "lam": lam}
+    if rows.nc > rows.always and not entered:
         return found | {"hidden": {**hidden, "H": HIDDEN, "lam": HIDDEN}}
     return found | {"hidden": hidden, "H": H} | ({"lam": lam} if profile == "matched" else {})

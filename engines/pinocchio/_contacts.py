@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
-from crossbody.engines._contacts import Contacts, Indices, Poses, closing, drift
+from crossbody.cases.scene_contacts import by_shapes
+from crossbody.engines._contacts import TOGETHER, Contacts, Indices, Poses, closing, drift
 from crossbody.engines.nearest import Pose, cross
 
 WORLD = pin.LOCAL_WORLD_ALIGNED
@@ -35,6 +36,16 @@ class ContactRows:
     def heights(self, q: Floats, rows: Sequence[int] | None = None) -> Floats:
         """Return h (n,) of some rows, or of all."""
         return self.contacts.touches(self._now(q), rows, self.along).gap if self.count else np.zeros(0)
+
+    def recorded(self, q: Floats) -> Floats:
+        """Return h (m, n) of recorded positions (m, nq), one after the other."""
+        gaps, ways = [np.zeros((0, self.count))], dict[int, bool]()
+        for first in range(0, len(q) if self.count else 0, TOGETHER):
+            found = [
+                [now(body) for body in self.contacts.bodies] for now in map(self._now, q[first : first + TOGETHER])
+            ]
+            gaps.append(self.contacts.recorded(self._stacked(found), ways))
+        return np.concatenate(gaps) if self.count else np.zeros((len(q), 0))
 
     def parted(self, q: Floats) -> tuple[Floats, Floats]:
         """Return by how much the shapes that may lie along each other do not, and to which side (`Contacts.parted`)."""
@@ -64,11 +75,28 @@ class ContactRows:
         along, turn = self.contacts.lying(self._now(q), rows)
         along |= self.along
 
-        def rates(t: float) -> Floats:
-            pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
-            return closing(self.contacts.touches(lambda body: self._pose(body, data), rows, along), self._carried)
+        def rates(times: Floats) -> Floats:
+            placed, twists, origins = [], [], []
+            for t in times:
+                pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
+                placed.append([self._pose(body, data) for body in self.contacts.bodies])
+                twists.append([pin.getVelocity(self.model, data, joint, WORLD).vector for joint in self.carriers])
+                origins.append(self._origins(data))
+            poses, moving, at = self._stacked(placed), np.array(twists), np.array(origins)
+
+            def carried(bodies: Indices, points: Floats) -> Floats:
+                twist = moving[:, bodies]
+                velocity: Floats = twist[..., :3] + cross(twist[..., 3:], points - at[:, bodies])
+                return velocity
+
+            return closing(self.contacts.touches(poses, rows, along), carried)
 
         return drift(rates, v, turn)
+
+    def _stacked(self, placed: Sequence[Sequence[Pose]]) -> Poses:
+        """Return what gives the poses of bodies at several instants at once (m, 3, 3) and (m, 3)."""
+        R, p = (np.array([[pose[k] for pose in one] for one in placed]) for k in (0, 1))
+        return {body: (R[:, i], p[:, i]) for i, body in enumerate(self.contacts.bodies)}.__getitem__
 
     def _now(self, q: Floats) -> Poses:
         """Return what gives the poses of bodies at q."""
@@ -80,13 +108,53 @@ class ContactRows:
         world = data.oMi[carrier] * pose
         return world.rotation, world.translation
 
-    def _carried(self, bodies: Indices, points: Floats) -> Floats:
-        """Return the velocities (n, 3) of points that bodies carry, where `drift` has moved them."""
-        data = self._moved
-        twists = np.array([pin.getVelocity(self.model, data, joint, WORLD).vector for joint in self.carriers])[bodies]
-        carried: Floats = twists[:, :3] + cross(twists[:, 3:], points - self._origins(data)[bodies])
-        return carried
-
     def _origins(self, data: Any) -> Floats:
         """Return where the joints are that carry the bodies (nb, 3)."""
         return np.array([data.oMi[joint].translation for joint in self.carriers]).reshape(-1, 3)
+
+
+class Points:
+    """Rows as Pinocchio's constraints of three components, the normal last, at positions q.
+
+    A contact is a point without friction between its shapes. A coordinate that is held is an anchor where it has its
+    value, whose other components the joint keeps anyway.
+    """
+
+    def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
+        self.model, self.data = model, model.createData()
+        loops = [loop for loop in scene.loops if loop.type == "joint" and not loop.second]
+        self.contacts, self.placed = Contacts(by_shapes(scene)), placed
+        self.anchors = [self._anchor(model.getJointId(loop.first), loop.polynomial[0]) for loop in loops]
+
+    def __call__(self, q: Floats) -> list[Any]:
+        """Return the constraints."""
+        found = list(self.anchors)
+        if not self.contacts.count:
+            return found
+        pin.forwardKinematics(self.model, self.data, q)
+        met = self.contacts.touches(self._pose)
+        for gap, normal, point, *bodies in zip(met.gap, met.normal, met.point, met.first, met.second, strict=True):
+            turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
+            world = pin.SE3(turn, point - 0.5 * gap * normal)
+            joints = [self.placed[self.contacts.bodies[body]][0] for body in bodies]
+            ends = [part for i in joints for part in (i, self.data.oMi[i].inverse() * world)]
+            contact = pin.PointContactConstraintModel(self.model, *ends)
+            contact.setFriction(0.0)
+            found.append(pin.ConstraintModel(contact))
+        return found
+
+    def _anchor(self, joint: int, value: float) -> Any:
+        """Return the point of a slide that is held, with the third axis along it."""
+        kind = self.model.joints[joint]
+        moved = kind.createData()
+        kind.calc(moved, np.array([value]))
+        turn = pin.SE3(
+            pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(moved.S)[:3]).matrix(), np.zeros(3)
+        )
+        world = self.model.jointPlacements[joint] * moved.M * turn
+        return pin.ConstraintModel(pin.PointAnchorConstraintModel(self.model, 0, world, joint, turn))
+
+    def _pose(self, body: str) -> Pose:
+        carrier, pose = self.placed[body]
+        world = self.data.oMi[carrier] * pose
+        return world.rotation, world.translation

@@ -24,6 +24,7 @@ class Coordinates:
 
     Attributes:
         nq, nv: numbers of positions and of velocities, in both.
+        same: whether these are the same in both.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -42,6 +43,7 @@ class Coordinates:
                 self.frees.append((q, v))
             if joint.type in ("free", "ball"):
                 self.turns.append((q + 3, v + 3) if joint.type == "free" else (q, v))
+        self.same = not self.turns and not self.reference.any()
         self._last: Floats = np.zeros(0)
         self._blocks: list[tuple[int, Floats]] = []
         self._theirs, self._ours = np.arange(self.nq), np.arange(self.nq)  # where each entry stands in the other's

@@ -31,7 +31,13 @@ from crossbody.engines.pinocchio._smooth import Smooth, SmoothFlow
 MECHANISMS = Registry("mechanism of Pinocchio", "crossbody.engines.pinocchio")
 STEPS = Parameter(default=200_000, doc="bound on the number of steps", low=1, high=1e9)
 RTOL = Parameter(default=1e-10, doc="relative tolerance", low=1e-14, high=1e-1)
-METHOD = Parameter(default="Adams", doc="linear multistep method of CVODE", choices=("Adams", "BDF"))
+METHODS, AUTO = ("Adams", "BDF"), "auto"
+METHOD = Parameter(default="Adams", doc="linear multistep method of CVODE", choices=METHODS)
+METHOD_OF_STIFF = replace(
+    METHOD, default=AUTO, doc="that, or auto: which goes further by a right-hand side", choices=(AUTO, *METHODS)
+)
+TRIED = 250
+"""Steps by which the methods are compared: their start, at order 1, takes less than half of them."""
 SOLVER = Parameter(default="forwardDynamics", doc="how v' and lam are solved for", choices=tuple(ALGEBRA))
 
 
@@ -127,12 +133,12 @@ class Pinocchio(Engine):
         _settings.check_case(case)
         profile = _settings.profile_of(self.name, self.profiles, profile)
         known = MECHANISMS.names()
-        if case.mechanism not in known:
-            return f"Pinocchio has no model of the mechanism {case.mechanism!r}; it has: {', '.join(known)}."
-        if hasattr(MECHANISMS.load(case.mechanism), "why_not"):
-            own: str | None = MECHANISMS.load(case.mechanism).why_not(case, profile)
-            return own
-        if profile == "admm" and not hasattr(MECHANISMS.load(case.mechanism), "build"):
+        if (name := _module(case)) not in known:
+            return f"Pinocchio has no model of the mechanism {name!r}; it has: {', '.join(known)}."
+        own = getattr(MECHANISMS.load(name), "why_not", lambda *_: None)(case, profile)
+        if own is not None or hasattr(MECHANISMS.load(name), "prepare"):
+            return str(own) if own is not None else None
+        if profile == "admm" and not hasattr(MECHANISMS.load(name), "build"):
             return "The profile admm steps contacts in time: the loops of this mechanism never open."
         if profile in RULES and not case.law.unilateral.all():
             return "An impact needs a contact that opens: a row that is always on has none."
@@ -162,7 +168,7 @@ class Pinocchio(Engine):
         if reason is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
-        mechanism = MECHANISMS.load(case.mechanism)
+        mechanism = MECHANISMS.load(_module(case))
         if hasattr(mechanism, "prepare"):
             run: Run = mechanism.prepare(case, used)
             return run
@@ -190,21 +196,27 @@ class Pinocchio(Engine):
         reason = self.why_not(case, "law")
         if reason is not None:
             raise CaseUnsupported(reason)
-        return linearise(MECHANISMS.load(case.mechanism), case, spot)
+        return linearise(MECHANISMS.load(_module(case)), case, spot)
+
+
+def _module(case: Case) -> str:
+    """Return what builds a case's model: that of all scenes, where it is one."""
+    return "scene" if case.scene is not None else case.mechanism
 
 
 def _known(case: Case, profile: str) -> dict[str, Parameter]:
     """The settings of a profile."""
-    if hasattr(MECHANISMS.load(case.mechanism), "SETTINGS"):
-        own: dict[str, Parameter] = MECHANISMS.load(case.mechanism).SETTINGS
+    mechanism = MECHANISMS.load(_module(case))
+    if hasattr(mechanism, "SETTINGS"):
+        own: dict[str, Parameter] = mechanism.SETTINGS
         return own
-    models = getattr(MECHANISMS.load(case.mechanism), "MODELS", None)
+    models = getattr(mechanism, "MODELS", None)
     if models is not None:
         model = Parameter(default=next(iter(models)), doc="source of the model", choices=tuple(models))
         return {"rtol": RTOL, "method": METHOD, "model": model, "max_steps": STEPS}
     if profile == "law":
-        stiff = case.scene is not None and len(case.law.a0) > 0  # a file's rows bind the steps of Adams' formulas
-        method = replace(METHOD, default="BDF") if stiff else METHOD
+        stiff = case.general and len(case.law.a0) > 0  # a file's rows bind the steps of Adams' formulas
+        method = METHOD_OF_STIFF if stiff else METHOD
         return {"rtol": RTOL, "method": method, "algebra": SOLVER, "max_steps": STEPS}
     e = Parameter(default=max(_bounces(case, {}), default=0.0), doc="restitution of every row", low=0.0, high=1.0)
     if profile in RULES:
@@ -253,10 +265,19 @@ def _bounces(case: Case, asked: Mapping[str, Any]) -> list[float]:
 def _flowing(machine: Callable[[], Machine], case: Case, scene: Scene, used: Mapping[str, Any]) -> Integrate:
     rtol, method, limit = float(used["rtol"]), str(used.get("method", "Adams")), int(used["max_steps"])
 
-    def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
+    def flown(log: Log, method: str, limit: int) -> Flow:
         flow = Flow(machine(), log, rtol, _absolute(scene, rtol), method, limit, scene.world, scene.coordinates)
         flow.run(*_start(case, scene), case.t_end)
-        return flow, {"rhs": flow.rhs}
+        return flow
+
+    def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
+        counts, paces = {}, {method: 0.0}
+        if method == AUTO:
+            tried = {one: (own := Log(), flown(own, one, min(limit, TRIED))) for one in METHODS}
+            paces = {one: own.motion[-1][0] / max(flow.rhs, 1) for one, (own, flow) in tried.items()}
+            counts = {"tried": sum(flow.rhs for _, flow in tried.values())}
+        flow = flown(log, max(paces, key=paces.__getitem__), limit)
+        return flow, {"rhs": flow.rhs, **counts}
 
     return integrate
 

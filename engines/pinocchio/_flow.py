@@ -14,7 +14,7 @@ from crossbody.cases.control import NotFinite
 from crossbody.engines._log import Log
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Settled, first_modes
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._rows import PinRows
+from crossbody.engines.pinocchio._rows import ULP, PinRows
 from crossbody.engines.pinocchio._scene import World
 from crossbody.reference.sundials.quiet import quiet
 
@@ -28,6 +28,8 @@ TINY = 1e-300
 """In place of a watched function that is exactly 0: it has not passed yet. CVODE complains of what stays at 0."""
 LOOKS = np.linspace(0.0, 1.0, 10)[1:-1].tolist()
 """Parts of a step at which rows are looked at that may have turned twice in it."""
+ROUNDED = 8.0 * ULP
+"""Part of the largest coordinate that rounding may make of a gap: what hangs side by side touches and parts by it."""
 SAME_INSTANT = 100
 """Events in a row without the time moving on that make a cycle."""
 
@@ -211,7 +213,8 @@ class Flow:
         """
         (h, rate), (end, rate_end) = (self.rows.gaps(*self._state(y)) for y in (before, step.y))
         free = np.array([m == Mode.FREE for m in self.modes], dtype=bool)
-        if any(free[i] and end[i] < 0.0 < h[i] and (i, 0) not in fired for i in range(len(h))):
+        noise = ROUNDED * float(np.abs(step.y[: self.n]).max(initial=0.0))
+        if any(free[i] and end[i] < -noise and h[i] > 0.0 and (i, 0) not in fired for i in range(len(h))):
             return float(step.t)
         dt, bend = float(step.t) - t, np.abs(rate_end - rate)
         fast = np.maximum(np.abs(rate), np.abs(rate_end)) + bend
@@ -220,7 +223,7 @@ class Flow:
             return None
         lowest = np.minimum(h, end)[may]
         dip, where = min((float(np.min(self._heights(before, step.y, dt, x)[may] - 0.5 * lowest)), x) for x in LOOKS)
-        return t + where * dt if dip < 0.0 else None
+        return t + where * dt if dip < -noise else None
 
     def _heights(self, before: Floats, after: Floats, dt: float, x: float) -> Floats:
         """Gaps (nc,) at a part x of a step of dt, s: where the cubic through both ends has the positions."""

@@ -9,16 +9,20 @@ A = s/2 (e0 1 - [e]x) R2', h = s e, H = A (J1 - J2) of the angular velocities w1
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
-from crossbody.engines.pinocchio._rows import ROUNDING, Solve, mass_matrix, point_jacobian, pose
+from crossbody.engines.nearest import cross as crossed
+from crossbody.engines.pinocchio._rows import ROUNDING, Solve, pose
 
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
@@ -26,76 +30,73 @@ NEAR = (1e-8, 1e-4)  # what a row adds to the others, over the first: below it f
 AXES = pin.LOCAL_WORLD_ALIGNED
 
 
-@dataclass(frozen=True, slots=True)
-class End:
-    """One end of a loop: the joint that carries it, and its pose in that joint's frame."""
-
-    joint: int
-    pose: Any
-
-
 class Joined:
     """Rows of the loops in space: three of points, and three of axes where it is a weld.
 
     Args:
-        model: Pinocchio's.
+        model: Pinocchio's; a copy gets a frame for every end.
         placed: body -> joint that carries it, and its pose in that joint's frame.
         loops: of type connect or weld.
     """
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], loops: Sequence[Loop]) -> None:
-        self.model, self.data = model, model.createData()
-        self.none, self.loops = np.zeros(model.nv), loops
+        self.loops, self.model = loops, model.copy()
         self.ends = [
             (
-                _end(placed[loop.first], loop.first_position, loop.orientation),
-                _end(placed[loop.second], loop.second_position, UPRIGHT),
+                _end(self.model, placed[loop.first], loop.first_position, loop.orientation),
+                _end(self.model, placed[loop.second], loop.second_position, UPRIGHT),
             )
             for loop in loops
         ]
+        self.data, self.none = self.model.createData(), np.zeros(model.nv)
 
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q)
-        return self._stacked(
-            lambda one, two: at(self.data, one).translation - at(self.data, two).translation,
-            lambda one, two, scale: scale * self._between(one, two)[1],
+        pin.framesForwardKinematics(self.model, self.data, q)
+        return self._heights()
+
+    def gradients(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return h (rows,) and H (rows, nv)."""
+        model, data = self.model, self.data
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+
+        def of_both(one: int, two: int) -> Floats:
+            return _velocity_of(model, data, one) - _velocity_of(model, data, two)
+
+        H = self._stacked(
+            lambda one, two: of_both(one, two)[:3],
+            lambda one, two, scale: scale * self._map(one, two) @ of_both(one, two)[3:],
         )
-
-    def jacobian(self, q: Floats) -> Floats:
-        """Return H (rows, nv)."""
-        pin.computeJointJacobians(self.model, self.data, q)
-
-        def carried(end: End) -> Floats:
-            return point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation)
-
-        def turned(end: End) -> Floats:
-            none: Floats = np.zeros((3, self.model.nv))
-            return (
-                pin.getJointJacobian(self.model, self.data, end.joint, AXES).reshape(6, -1)[3:] if end.joint else none
-            )
-
-        return self._stacked(
-            lambda one, two: carried(one) - carried(two),
-            lambda one, two, scale: scale * self._map(one, two) @ (turned(one) - turned(two)),
-        ).reshape(-1, self.model.nv)
+        return self._heights(), H.reshape(-1, model.nv)
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q, v, self.none)
+        model, data = self.model, self.data
+        moving(model, data, q, v, self.none)
 
-        def bent(one: End, two: End, scale: float) -> Floats:
-            (w1, c1), (w2, c2) = (angular(self.model, self.data, end) for end in (one, two))
-            own: Floats = self._map(one, two) @ (c1 - c2 - cross(w2, w1))
-            return scale * (own - 0.25 * (w1 - w2) @ (w1 - w2) * self._between(one, two)[1])
+        def bent(one: int, two: int, scale: float) -> Floats:
+            w1, w2 = (pin.getFrameVelocity(model, data, end, AXES).angular for end in (one, two))
+            c1, c2 = (pin.getFrameClassicalAcceleration(model, data, end, AXES).angular for end in (one, two))
+            own = self._map(one, two) @ (c1 - c2 - cross(w2, w1))
+            bent: Floats = scale * (own - 0.25 * (w1 - w2) @ (w1 - w2) * self._between(one, two)[1])
+            return bent
 
-        def pulled(end: End) -> Floats:
-            return moved(self.model, self.data, end)[1]
+        def pulled(end: int) -> Floats:
+            found: Floats = pin.getFrameClassicalAcceleration(model, data, end, AXES).linear
+            return found
 
         return self._stacked(lambda one, two: pulled(one) - pulled(two), bent)
 
+    def _heights(self) -> Floats:
+        poses = self.data.oMf
+        return self._stacked(
+            lambda one, two: poses[one].translation - poses[two].translation,
+            lambda one, two, scale: scale * self._between(one, two)[1],
+        )
+
     def _stacked(
-        self, points: Callable[[End, End], Floats], axes: Callable[[End, End, float], Floats]
+        self, points: Callable[[int, int], Floats], axes: Callable[[int, int, float], Floats]
     ) -> Floats:  # fmt: skip
         """Return what each loop's rows are, one below the other."""
         parts: list[Floats] = []
@@ -103,16 +104,17 @@ class Joined:
             parts += [points(one, two)] + ([axes(one, two, loop.torque_scale)] if loop.type == "weld" else [])
         return np.concatenate(parts)
 
-    def _between(self, one: End, two: End) -> tuple[float, Floats]:
+    def _between(self, one: int, two: int) -> tuple[float, Floats]:
         """Return e0 and e of the first's axes seen from the second's."""
-        x, y, z, w = pin.Quaternion(at(self.data, two).rotation.T @ at(self.data, one).rotation).coeffs()
+        poses = self.data.oMf
+        x, y, z, w = pin.Quaternion(poses[two].rotation.T @ poses[one].rotation).coeffs()
         sign = 1.0 if w >= 0.0 else -1.0
         return sign * w, sign * np.array([x, y, z])
 
-    def _map(self, one: End, two: End) -> Floats:
+    def _map(self, one: int, two: int) -> Floats:
         """Return A over the torque scale."""
         e0, e = self._between(one, two)
-        found: Floats = 0.5 * (e0 * np.eye(3) - pin.skew(e)) @ at(self.data, two).rotation.T
+        found: Floats = 0.5 * (e0 * np.eye(3) - pin.skew(e)) @ self.data.oMf[two].rotation.T
         return found
 
 
@@ -122,55 +124,20 @@ def cross(a: Floats, b: Floats) -> Floats:
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
-def at(data: Any, end: End) -> Any:
-    """Return the pose of an end in the world."""
-    return data.oMi[end.joint] * end.pose
+def moving(model: Any, data: Any, q: Floats, v: Floats, none: Floats) -> None:
+    """Let the frames move with v, and with no more acceleration (nv,) than that makes of itself."""
+    pin.forwardKinematics(model, data, q, v, none)
+    pin.updateFramePlacements(model, data)
 
 
-def angular(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
-    """Return its angular velocity and acceleration."""
-    if end.joint == 0:
-        return np.zeros(3), np.zeros(3)
-    rate = pin.getVelocity(model, data, end.joint, AXES)
-    return rate.angular, pin.getClassicalAcceleration(model, data, end.joint, AXES).angular
-
-
-def moved(model: Any, data: Any, end: End) -> tuple[Floats, Floats]:
-    """Return velocity and acceleration of its point."""
-    if end.joint == 0:
-        return np.zeros(3), np.zeros(3)
-    arm = data.oMi[end.joint].rotation @ end.pose.translation
-    turn, spin = angular(model, data, end)
-    rate = pin.getVelocity(model, data, end.joint, AXES).linear
-    own = pin.getClassicalAcceleration(model, data, end.joint, AXES).linear
-    return rate + cross(turn, arm), own + cross(spin, arm) + cross(turn, cross(turn, arm))
+def _velocity_of(model: Any, data: Any, end: int) -> Floats:
+    """Return the Jacobian (6, nv) of the velocity of a frame, after computeJointJacobians."""
+    found: Floats = pin.getFrameJacobian(model, data, end, AXES).reshape(6, -1)  # of one column it is a vector
+    return found
 
 
 class Spans:
     """Distances of two points: lengths, and their derivatives along Pinocchio's velocities.
-
-    Args:
-        model, placed: as of `Joined`.
-        tendons: those between points.
-    """
-
-    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
-        self.model, self.data = model, model.createData()
-        self.ends = [ends_of(placed, tendon) for tendon in tendons]
-
-    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return l (nt,) and dl/dv (nt, nv)."""
-        pin.computeJointJacobians(self.model, self.data, q)
-        lengths, rows = np.zeros(len(self.ends)), np.zeros((len(self.ends), self.model.nv))
-        for i, (one, two) in enumerate(self.ends):
-            lengths[i], n = apart(self.data, one, two)
-            J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
-            rows[i] = n @ (J[1] - J[0])
-        return lengths, rows
-
-
-class Strings:
-    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
 
     With W = v2 - v1 of the points and n from the first to the second, W_t what of W is not along n:
 
@@ -182,56 +149,108 @@ class Strings:
     """
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
-        self.model, self.data, self.none = model, model.createData(), np.zeros(model.nv)
-        self.rows: list[tuple[float, float, End, End]] = []  # sign, bound, ends
-        for tendon in tendons:
-            ends = ends_of(placed, tendon)
-            for sign, bound in zip((1.0, -1.0), tendon.range, strict=True):
-                if np.isfinite(bound):
-                    self.rows.append((sign, bound + sign * tendon.margin, ends[0], ends[1]))
+        self.model, self.data = model, model.createData()
+        points = [tuple(zip(tendon.bodies, tendon.positions, strict=True)) for tendon in tendons]
+        known = list(dict.fromkeys(point for pair in points for point in pair))
+        ends = [(placed[body][0], placed[body][1] * pose(place, UPRIGHT)) for body, place in known]
+        which = [[known.index(point) for point in pair] for pair in points]
+        self.one, self.two = np.array(which, dtype=int).reshape(-1, 2).T
+        self.joints, self.arms = [joint for joint, _ in ends], np.array([at.translation for _, at in ends])
+        self.moving = np.zeros((len(ends), model.nv))  # 1 where a coordinate moves an end
+        for row, carrier in zip(self.moving, self.joints, strict=True):
+            for joint in list(model.supports[carrier])[1:]:
+                row[model.joints[joint].idx_v :][: model.joints[joint].nv] = 1.0
+
+    def _apart(self) -> tuple[Floats, Floats, Floats]:
+        """Return the points of the ends (ne, 3), distances (nt,), and directions from first to second (nt, 3)."""
+        poses = [self.data.oMi[joint] for joint in self.joints]
+        turned = np.array([pose.rotation for pose in poses]) @ self.arms[:, :, None]
+        origins, arms = np.array([pose.translation for pose in poses]), turned[:, :, 0]
+        points = origins + arms
+        # What moves alike stays as far apart to the last bit: bodies that hang side by side touch, or do not.
+        way = (origins[self.two] - origins[self.one]) + (arms[self.two] - arms[self.one])
+        d = np.sqrt(np.einsum("ij,ij->i", way, way))
+        return points, d, way / d[:, None]
+
+    def lengths(self, q: Floats) -> Floats:
+        """Return l (nt,)."""
+        pin.forwardKinematics(self.model, self.data, q)
+        return self._apart()[1]
+
+    def __call__(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return l (nt,) and dl/dv (nt, nv): an end's n.v is n.(linear) + (x cross n).(angular), as of the origin."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        points, d, n = self._apart()
+        J = self.data.J.reshape(6, -1)  # of one column it is a vector
+
+        def along(ends: Any) -> Floats:
+            found: Floats = self.moving[ends] * (n @ J[:3] + crossed(points[ends], n) @ J[3:])
+            return found
+
+        return d, along(self.two) - along(self.one)
+
+    def bend(self, q: Floats, v: Floats) -> Floats:
+        """Return d'' at v' = 0 (nt,)."""
+        pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
+        points, d, n = self._apart()
+        carried = self.moving * v
+        twist, change = (carried @ part.reshape(6, -1).T for part in (self.data.J, self.data.dJ))
+        rate = twist[:, :3] + crossed(twist[:, 3:], points)
+        own = change[:, :3] + crossed(change[:, 3:], points) + crossed(twist[:, 3:], rate)
+        W, a = (part[self.two] - part[self.one] for part in (rate, own))
+        across = W - np.einsum("ij,ij->i", n, W)[:, None] * n
+        total: Floats = np.einsum("ij,ij->i", n, a) + np.einsum("ij,ij->i", across, across) / d
+        return total
+
+
+class Strings:
+    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
+
+    Args:
+        model, placed, tendons: as of `Spans`.
+    """
+
+    def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
+        self.spans = Spans(model, placed, tendons)
+        rows = [
+            (i, sign, bound + sign * tendon.margin)
+            for i, tendon in enumerate(tendons)
+            for sign, bound in zip((1.0, -1.0), tendon.range, strict=True)
+            if np.isfinite(bound)
+        ]
+        of, self.sign, self.bound = np.array(rows).reshape(-1, 3).T
+        self.of = of.astype(int)
+
+    @property
+    def chained(self) -> bool:
+        """Whether the ends move apart from each other, or as one, and one bound each makes no ring of them."""
+        kinds, group = np.unique(self.spans.moving, axis=0, return_inverse=True)
+        one, two = (group[ends][self.of] for ends in (self.spans.one, self.spans.two))
+        joined = connected_components(coo_array((np.ones(len(one)), (one, two)), (len(kinds),) * 2), directed=False)[0]
+        return bool((np.count_nonzero(kinds, axis=0) <= 1).all()) and len(one) == len(kinds) - joined
 
     def heights(self, q: Floats) -> Floats:
         """Return h (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q)
-        return np.array([sign * (apart(self.data, one, two)[0] - bound) for sign, bound, one, two in self.rows])
+        found: Floats = self.sign * (self.spans.lengths(q)[self.of] - self.bound)
+        return found
 
-    def jacobian(self, q: Floats) -> Floats:
-        """Return H (rows, nv)."""
-        pin.computeJointJacobians(self.model, self.data, q)
-        found = []
-        for sign, _, one, two in self.rows:
-            J = [point_jacobian(self.model, self.data, end.joint, at(self.data, end).translation) for end in (one, two)]
-            found.append(sign * apart(self.data, one, two)[1] @ (J[1] - J[0]))
-        return np.array(found).reshape(-1, self.model.nv)
+    def gradients(self, q: Floats) -> tuple[Floats, Floats]:
+        """Return h (rows,) and H (rows, nv)."""
+        lengths, rows = self.spans(q)
+        return self.sign * (lengths[self.of] - self.bound), self.sign[:, None] * rows[self.of]
 
     def drift(self, q: Floats, v: Floats) -> Floats:
         """Return H' v (rows,)."""
-        pin.forwardKinematics(self.model, self.data, q, v, self.none)
-        found = []
-        for sign, _, one, two in self.rows:
-            (v1, a1), (v2, a2) = (moved(self.model, self.data, end) for end in (one, two))
-            d, n = apart(self.data, one, two)
-            across = (v2 - v1) - n @ (v2 - v1) * n
-            found.append(sign * (n @ (a2 - a1) + across @ across / d))
-        return np.array(found)
+        found: Floats = self.sign * self.spans.bend(q, v)[self.of]
+        return found
 
 
-def apart(data: Any, one: End, two: End) -> tuple[float, Floats]:
-    """Return the distance of two ends, and the direction from the first to the second."""
-    way = at(data, two).translation - at(data, one).translation
-    d = float(np.linalg.norm(way))
-    return d, way / d
-
-
-def ends_of(placed: dict[str, tuple[int, Any]], tendon: Tendon) -> tuple[End, End]:
-    """Return the ends of a tendon between points."""
-    one, two = (_end(placed[body], place, UPRIGHT) for body, place in zip(tendon.bodies, tendon.positions, strict=True))
-    return one, two
-
-
-def _end(placed: tuple[int, Any], position: Any, orientation: Any) -> End:
+def _end(model: Any, placed: tuple[int, Any], position: Any, orientation: Any) -> int:
+    """Return the number of a new frame at a pose on a body."""
     joint, where = placed
-    return End(joint, where * pose(position, orientation))
+    frame = pin.Frame(f"end {model.nframes}", joint, where * pose(position, orientation), pin.FrameType.OP_FRAME)
+    number: int = model.addFrame(frame)
+    return number
 
 
 def loose_rows(A: Floats, widths: Sequence[int], rank: int) -> tuple[list[int], float]:
@@ -276,12 +295,16 @@ def by_least_norm(
         dependent: singular value of the rows, over the largest, that counts as zero.
     """
 
+    @cache
+    def holding(count: int) -> NDArray[np.intp]:
+        return np.setdiff1d(np.arange(count), left_out)
+
     def solve(q: Floats, v: Floats, J: Floats, gamma: Floats) -> tuple[Floats, Floats]:
-        holds = np.ones(len(J), dtype=bool)
-        holds[list(left_out)] = False
-        root = np.linalg.cholesky(mass_matrix(model, data, q))
-        free = np.linalg.solve(root, tau - pin.nonLinearEffects(model, data, q, v))
-        A = np.linalg.solve(root, J[holds].T).T
+        holds = holding(len(J))
+        root = np.linalg.cholesky(pin.crba(model, data, q).T)  # which reads what is below the diagonal alone
+        right = np.vstack([tau - pin.nonLinearEffects(model, data, q, v), J[holds]])
+        parts = np.linalg.solve(root, right.T)
+        free, A = parts[:, 0], parts[:, 1:].T
         U, s, Vt = np.linalg.svd(A, full_matrices=False)
         kept = s > dependent * s[0]
         missing = -gamma[holds] - A @ free

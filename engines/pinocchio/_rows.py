@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,9 +64,15 @@ ALGEBRA = {"forwardDynamics": by_forward_dynamics, "kkt": by_dense_kkt}
 
 def mass_matrix(model: Any, data: Any, q: Floats) -> Floats:
     """M(q) (nv, nv); crba fills the upper triangle alone."""
-    upper = np.triu(pin.crba(model, data, q))
-    full: Floats = upper + np.triu(upper, 1).T
+    full: Floats = np.array(pin.crba(model, data, q))
+    below = _below(len(full))
+    full[below] = full.T[below]
     return full
+
+
+@cache
+def _below(n: int) -> Any:
+    return np.tril_indices(n, -1)
 
 
 def pose(position: Any, orientation: Any) -> Any:
@@ -146,15 +153,12 @@ class PinRows:
         h, H = self.gradient_of(q, slice(None))
         return np.array(h), H @ v
 
-    def gap_acceleration(self, q: Floats, v: Floats, vd: Floats) -> Floats:
-        """H'' of every row (nc,)."""
-        total: Floats = self.jacobian(q) @ vd + self.drift(q, v)
-        return total
-
-    def pressure(self, q: Floats, v: Floats, vd: Floats) -> tuple[Floats, Floats]:
-        """-(h'' + law) of every row if it were entered now (nc,), and its rounding (nc,), m/s^2."""
-        (h, hd), (a0, a1, a2) = self.gaps(q, v), self.entered
-        hdd, spring, damper = self.gap_acceleration(q, v, vd), (a0 + a2 * h * h) * h, a1 * hd
+    def pressure(
+        self, q: Floats, v: Floats, vd: Floats, rows: Chosen = slice(None)
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """-(h'' + law) of rows if they were entered now (n,), and its rounding (n,), m/s^2."""
+        (h, H), (a0, a1, a2) = self.gradient_of(q, rows), self.entered[:, rows]
+        hdd, spring, damper = H @ vd + self.drift_of(q, v, rows), (a0 + a2 * h * h) * h, a1 * (H @ v)
         state = 8 * ULP * (a0 * np.abs(q).max() + a1 * np.abs(v).max())
         noise: Floats = ROUNDING * (np.abs(hdd) + np.abs(spring) + np.abs(damper)) + state
         return -(hdd + spring + damper), noise

@@ -15,7 +15,9 @@ from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
-from crossbody.engines.pinocchio._contacts import ContactRows
+from crossbody.engines._real_time import followed as real_time
+from crossbody.engines._scale import depths
+from crossbody.engines.pinocchio._contacts import ContactRows, Points
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
@@ -40,9 +42,14 @@ def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: bounds and loops follow the law alone."""
     if case.scene is not None and (found := frictional(case.scene)):
         return found
-    if profile != "law":
+    if profile != "law" and case.general:
         return "The rows of a scene follow the law: impacts in no time and time stepping have none."
     return None
+
+
+def followed(case: Case, profile: str) -> Case | None:
+    """Return the case whose equations the profile integrates, if not its own; None for the other profiles."""
+    return real_time(case, two_sets=True) if profile == "law" else None
 
 
 def build(case: Case, algebra: str) -> Prepared:
@@ -50,93 +57,172 @@ def build(case: Case, algebra: str) -> Prepared:
     scene = case.scene
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
+    law = (real_time(case, two_sets=True) or case).law
     forces = parts.Forces(scene)
-    rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space)), forces)
     model, placed = tree(scene)
     armature = forces.armature
     model.armature[:] = armature
     to = Coordinates(scene)
     forces.spans = spans(scene, model, placed, to)
     centres = at_centres(scene, forces, model, model.createData(), placed)
+    lifting = bool(scene.pushes) or any(body.weightless for body in scene.bodies)
+    bends = any(armature[first : first + 3].any() for _, first in to.frees)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
-        ours = forces(to.ours(q), to.velocities(q, v)) - armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + centres(q)
+        ours = forces(to.ours(q), to.velocities(q, v))
+        if bends:
+            ours -= armature * to.bend(q, v)
+        tau[:] = to.back(q, ours) + centres(q) if lifting else to.back(q, ours)
 
-    loops, strings = [loop for loop in scene.loops if loop.in_space], [one for one in scene.tendons if one.bodies]
-    in_space: list[Joined | Strings] = [
-        *([Joined(model, placed, loops)] if loops else []), *([Strings(model, placed, strings)] if strings else []),
-    ]  # fmt: skip
-    touching, order = ContactRows(scene, model, placed), _order(scene)
-
-    def heights(q: Floats) -> Floats:
-        own = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
-        return np.concatenate([own[order], touching.heights(q)])
-
-    def own_gradients(q: Floats) -> Gradients:
-        h = np.concatenate([rows.heights(to.ours(q)), *(part.heights(q) for part in in_space)])
-        H = np.concatenate([to.back(q, rows.jacobian(to.ours(q))), *(part.jacobian(q) for part in in_space)])
-        return h[order], H[order]
-
-    @LastAsked
-    def gradients(q: Floats) -> Gradients:
-        (h, H), (gaps, N) = own_gradients(q), touching.gradients(q)
-        return np.concatenate([h, gaps]), np.concatenate([H, N])
-
-    def gradient_of(q: Floats, chosen: Chosen) -> Gradients:
-        if isinstance(chosen, slice):
-            return gradients(q)
-        wanted = np.array(chosen)
-        before = wanted < len(order)
-        if before.all():
-            h, H = own_gradients(q)
-            return h[wanted], H[wanted]
-        h, H = np.empty(len(wanted)), np.empty((len(wanted), model.nv))
-        h[~before], H[~before] = touching.gradients(q, (wanted[~before] - len(order)).tolist())
-        if before.any():
-            h[before], H[before] = (part[wanted[before]] for part in own_gradients(q))
-        return h, H
-
-    def drift_of(q: Floats, v: Floats, chosen: Chosen) -> Floats:
-        wanted = np.arange(len(order) + touching.count)[chosen]
-        before = wanted < len(order)
-        total: Floats = np.empty(len(wanted))
-        if before.any():
-            own = [rows.drift(to.ours(q), to.velocities(q, v)), *(part.drift(q, v) for part in in_space)]
-            total[before] = np.concatenate(own)[order][wanted[before]]
-        total[~before] = touching.drift(q, v, list(wanted[~before] - len(order)))
-        return total
-
+    acting = None if forces.none and to.same and not lifting else apply
+    gaps = Gaps(scene, forces, (model, placed), to)
     pinned = PinRows(
-        model, lambda q: gradients(q)[1], lambda q: gradients(q)[0], lambda q, v: drift_of(q, v, slice(None)),
-        law=case.law, algebra=algebra, forces=apply, drift_of=drift_of, gradient_of=gradient_of,
+        model, lambda q: gaps.gradients(q)[1], gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
+        law=law, algebra=algebra, forces=acting, drift_of=gaps.drift_of, gradient_of=gaps.gradient_of,
     )  # fmt: skip
-    pinned.near[len(order) :] = DIPS
-    if touching.contacts.turning:
-        pinned.ways = Ways(touching, len(order), gradients.forget)
-    start = to.theirs(case.q0)
-    if _may_depend(scene, touching.count):
+    pinned.near[gaps.own :] = DIPS
+    if gaps.touching.contacts.turning:
+        pinned.ways = Ways(gaps.touching, gaps.own, gaps.gradients.forget)
+    start = to.theirs(case.q0), to.back(to.theirs(case.q0), case.v0)
+    if _may_depend(scene, gaps):
         widths = [loop.width for loop in scene.loops]
-        root = np.linalg.cholesky(mass_matrix(model, pinned.data, start))
-        A = np.linalg.solve(root, gradients(start)[1][: sum(widths)].T).T
+        root = np.linalg.cholesky(mass_matrix(model, pinned.data, start[0]))
+        A = np.linalg.solve(root, gaps.gradients(start[0])[1][: sum(widths)].T).T
         loose = loose_rows(A, widths, case.rank) if widths else ()
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
-        rows=pinned, observe=_observe(scene, model, placed, forces, heights, to),
-        sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)),
-        start=(start, to.back(start, case.v0)), chart=lambda q, v: (to.ours(q), to.velocities(q, v)),
+        rows=pinned, points=() if case.general else Points(scene, model, placed),
+        observe=_observe(scene, model, placed, forces, gaps, to),
+        sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)) if case.general else _sizes(pinned, *start),
+        start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
 
 
-def _may_depend(scene: Scene, touching: int) -> bool:
+def _sizes(rows: PinRows, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Return how far coordinates move while a row is closed (nq,), and how fast (nv,), by what the start drives."""
+    (h, H), free = rows.gradient_of(q, slice(None)), rows.accelerate(q, v, (int(Mode.FREE),) * rows.nc)[0]
+    deep, fast = depths(rows.entered, h, H @ v, H @ free + rows.drift(q, v), rows.unilateral)
+    depth, speed = float(deep.max(initial=0.0)), float(fast.max(initial=0.0))
+    across = float(np.abs(H).max(initial=0.0)) or 1.0
+    far = depth or float(np.abs(q).max(initial=0.0)) or 1.0
+    return np.full(len(q), far / across), np.full(len(v), (speed or 1.0) / across)
+
+
+class Gaps:
+    """Gaps of all rows of a scene by Pinocchio's kinematics: loops, bounds, then contacts of shapes.
+
+    Attributes:
+        own: number of rows before those of contacts.
+        touching: the contacts.
+        steady: whether H is the same everywhere.
+    """
+
+    def __init__(self, scene: Scene, forces: parts.Forces, tree: tuple[Any, Placed], to: Coordinates) -> None:
+        self.to, self.nv = to, tree[0].nv
+        self.rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space)), forces)
+        loops, strings = [loop for loop in scene.loops if loop.in_space], [one for one in scene.tendons if one.bodies]
+        self.in_space: list[Joined | Strings] = [
+            *([Joined(*tree, loops)] if loops else []), *([Strings(*tree, strings)] if strings else []),
+        ]  # fmt: skip
+        self.touching, self.order = ContactRows(scene, *tree), _order(scene)
+        self.own = len(self.order)
+        self.steady = to.same and not (self.rows.bends or self.in_space or self.touching.count)
+        self.gradients, self._own = LastAsked(self._gradients), LastAsked(self._all_own)
+        self.still = np.zeros(self.own)
+
+    def heights(self, q: Floats) -> Floats:
+        """Return h (nc,)."""
+        own = self._heights(q)
+        return np.concatenate([own, self.touching.heights(q)]) if self.touching.count else own
+
+    def _heights(self, q: Floats) -> Floats:
+        if self.steady:
+            return self.rows.heights(q)
+        own = [self.rows.heights(self.to.ours(q)), *(part.heights(q) for part in self.in_space)]
+        return np.concatenate(own)[self.order]
+
+    def recorded(self, q: Floats) -> Floats:
+        """Return h (m, nc) of recorded positions (m, nq)."""
+        if self.steady:
+            found: Floats = q @ self.rows.straight.T + self.rows.offset
+            return found
+        own = np.array([self._heights(one) for one in q]).reshape(len(q), -1)
+        return np.concatenate([own, self.touching.recorded(q)], axis=1)
+
+    def _all_own(self, q: Floats) -> Gradients:
+        """Return h and H of the rows before those of contacts."""
+        if not len(self.rows.offset) and len(self.in_space) == 1:
+            return self.in_space[0].gradients(q)
+        ours = self.to.ours(q)
+        own = (self.rows.heights(ours), self.to.back(q, self.rows.jacobian(ours)))
+        if not self.in_space:
+            return own
+        h, H = zip(own, *(part.gradients(q) for part in self.in_space), strict=True)
+        return np.concatenate(h)[self.order], np.concatenate(H)[self.order]
+
+    def _gradients(self, q: Floats) -> Gradients:
+        if not self.touching.count:
+            return self._own(q)
+        (h, H), (gaps, N) = self._own(q), self.touching.gradients(q)
+        return np.concatenate([h, gaps]), np.concatenate([H, N])
+
+    def gradient_of(self, q: Floats, chosen: Chosen) -> Gradients:
+        """Return h and H of some rows."""
+        if self.steady:
+            return self.rows.heights(q)[chosen], self.rows.straight[chosen]
+        if isinstance(chosen, slice):
+            return self.gradients(q)
+        wanted = np.array(chosen)
+        before = wanted < self.own
+        if before.all():
+            h, H = self._own(q)
+            return h[wanted], H[wanted]
+        h, H = np.empty(len(wanted)), np.empty((len(wanted), self.nv))
+        h[~before], H[~before] = self.touching.gradients(q, (wanted[~before] - self.own).tolist())
+        if before.any():
+            h[before], H[before] = (part[wanted[before]] for part in self._own(q))
+        return h, H
+
+    def drift_of(self, q: Floats, v: Floats, chosen: Chosen) -> Floats:
+        """Return H' v of some rows."""
+        if self.steady:
+            return self.still[chosen]
+        if not self.touching.count:
+            return self._own_drift(q, v)[chosen]
+        wanted = np.arange(self.own + self.touching.count)[chosen]
+        before = wanted < self.own
+        total: Floats = np.empty(len(wanted))
+        if before.any():
+            total[before] = self._own_drift(q, v)[wanted[before]]
+        total[~before] = self.touching.drift(q, v, list(wanted[~before] - self.own))
+        return total
+
+    def _own_drift(self, q: Floats, v: Floats) -> Floats:
+        if not len(self.rows.offset) and len(self.in_space) == 1:
+            return self.in_space[0].drift(q, v)
+        own = self.rows.drift(self.to.ours(q), self.to.velocities(q, v))
+        if not self.in_space:
+            return own
+        return np.concatenate([own, *(part.drift(q, v) for part in self.in_space)])[self.order]
+
+
+def _may_depend(scene: Scene, gaps: Gaps) -> bool:
     """Return whether rows that act at once may depend on each other; bounds of joints alone do not.
 
-    Planar loops have rows that do, joints that are coupled and both at their bounds, and bodies on many feet.
+    Planar loops have rows that do, joints that are coupled and both at their bounds, and bodies on many feet. Where H
+    is the same everywhere, it tells. Distances do not where bodies that move apart from each other make no ring of
+    them: the last of a chain moves by coordinates of its own.
     """
+    H, touching = gaps.rows.straight, gaps.touching.count
+    if gaps.steady and np.linalg.matrix_rank(H) == len(H):
+        return False
+    alone = not touching and not len(H) and len(gaps.in_space) == 1
+    if alone and all(isinstance(part, Strings) and part.chained for part in gaps.in_space):
+        return False
     bounds = [part for part in scene.bounded if np.isfinite(part.range).any()]
     tendons = any(isinstance(part, Tendon) for part in bounds)
     return bool(scene.loops) or touching > 1 or (bool(bounds) and (touching > 0 or tendons))
@@ -247,7 +333,7 @@ def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed
 
 
 def _observe(
-    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, heights: Heights, to: Coordinates
+    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, gaps: Gaps, to: Coordinates
 ) -> Any:  # fmt: skip
     """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     data = model.createData()
@@ -267,7 +353,7 @@ def _observe(
                     height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
                     energy[i, 1] += body.weightless * body.mass * height
         energy[:, 1] += forces.energy(to.ours(q))
-        return np.array([heights(one) for one in q]).reshape(len(q), -1), energy
+        return gaps.recorded(q), energy
 
     return observe
 

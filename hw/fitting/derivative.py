@@ -18,8 +18,8 @@ from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.rk4 import march
 from crossbody.hw.models._contract import Model
-from crossbody.hw.replaying.lift import check_measured, lift
-from crossbody.hw.replaying.windows import Window, overlap
+from crossbody.hw.windows.lift import check_measured, lift
+from crossbody.hw.windows.window import Window, overlap
 from crossbody.reference import System
 
 Floats = NDArray[np.float64]

@@ -17,8 +17,8 @@ from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.derivative import apart
 from crossbody.hw.models._contract import Model
-from crossbody.hw.replaying.replay import run_window
-from crossbody.hw.replaying.windows import Window, overlap
+from crossbody.hw.windows.run import run_window
+from crossbody.hw.windows.window import Window, overlap
 
 Floats = NDArray[np.float64]
 STEP = 0.1

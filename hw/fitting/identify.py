@@ -19,7 +19,7 @@ from crossbody.hw.fitting.judged import Search, judged, unjudged
 from crossbody.hw.fitting.search import search
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.windows import Window, windows
+from crossbody.hw.windows.window import Window, windows
 
 LONGEST_DELAY = 0.1
 """Bound on an identified delay, s."""

@@ -13,10 +13,10 @@ from crossbody.hw.models._contract import Floats, Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.reference import simulate
 from crossbody.reference.delta import control, forward, jacobians, paths, scene
+from crossbody.reference.delta.kernels import arm as arm
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS
 from crossbody.reference.delta.model import law_of, system
 from crossbody.reference.delta.robot import Robot
-from crossbody.reference.systems import delta_arm as arm
 
 CONTROLLER = ("controller", "mass_matrix", "kp", "kd", "ki", "clamp", "period", "delay", "bits", "limit")
 TITLE = "Delta robot: recorded torques, or the recorded reference through the rig's controller"

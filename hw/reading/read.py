@@ -12,10 +12,10 @@ import numpy as np
 
 from crossbody.cases import InvalidValue, LogFormatError, arguments
 from crossbody.hw import formats
-from crossbody.hw.checks.every import Checks
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading import repair as _repair
 from crossbody.hw.reading import store as _store
+from crossbody.hw.reading.checks import Checks
 from crossbody.hw.reading.collect import collect
 from crossbody.hw.reading.columns import Columns, Role, dump_columns, load_columns
 from crossbody.hw.reading.hash import file_hash

@@ -13,11 +13,11 @@ import numpy as np
 from crossbody.cases import Coordinate, Limit, Outcome, Trajectory, Value
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying import measures as _measures
-from crossbody.hw.replaying.impacts import impacts, least_of, matched
-from crossbody.hw.replaying.rates import Floats, rates_by_fit
-from crossbody.hw.replaying.turns import deviation, difference, increments, way
-from crossbody.hw.replaying.whiteness import Correlation, autocorrelation, crosscorrelation, noise_level, stride_of
-from crossbody.hw.replaying.windows import Window
+from crossbody.hw.windows.impacts import impacts, least_of, matched
+from crossbody.hw.windows.rates import Floats, rates_by_fit
+from crossbody.hw.windows.turns import deviation, difference, increments, way
+from crossbody.hw.windows.whiteness import Correlation, autocorrelation, crosscorrelation, noise_level, stride_of
+from crossbody.hw.windows.window import Window
 
 ENOUGH = 50
 """Averages of residuals from which on their correlations tell something: the band is then .36 wide."""

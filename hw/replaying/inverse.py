@@ -24,10 +24,10 @@ from crossbody.engines.equations import system_of
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.lift import check_measured, closed_by, lift, rows_at
 from crossbody.hw.replaying.rank import conditions
-from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, Rows, derivatives, felt
-from crossbody.hw.replaying.windows import recorded_inputs
+from crossbody.hw.windows.lift import check_measured, closed_by, lift, rows_at
+from crossbody.hw.windows.rates import DEGREE, HALF, Floats, Rows, derivatives, felt
+from crossbody.hw.windows.window import recorded_inputs
 from crossbody.reference import System
 
 

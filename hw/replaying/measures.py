@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.hw.replaying.whiteness import noise_level
+from crossbody.hw.windows.whiteness import noise_level
 
 Floats = NDArray[np.float64]
 REACH = 0.25
@@ -17,6 +17,12 @@ RIVAL = 0.9
 """Part of the highest correlation from which on a maximum may be the delay: real models are off by that much."""
 ALIKE = 0.8
 """Part of the correlation that noise admits, from which on two motions have the same shape."""
+REPEATS = 0.1
+"""Angle between a motion and itself moved (arc cosine of their correlation), up to which the motion repeats itself."""
+EXPLAINED = 3.0
+"""That angle over the one between measurement and prediction where they are most alike, up to which a maximum that is
+lower for the model's error alone may be the delay. Of 1,200 motions of three harmonics, whose amplitudes and phases the
+model has wrong by 0, 5 and 20 %, none was given a wrong delay; with 0.9 of the highest maximum alone one was."""
 NEARER = 0.8
 """How much nearer to 0 a maximum must be than its rival on the other side."""
 
@@ -63,7 +69,7 @@ def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = 
     The correlation is taken by FFT within each window and normalised by the energy of both at each lag; a parabola
     through a maximum and its neighbours gives parts of a sample. (Of increments: slow drifts would hide the peak.)
     A motion that repeats itself correlates nearly as well at lags of whole periods, and what is left to tell them apart
-    is the model's error: of all maxima that are nearly as high as the highest, the one nearest to 0 is taken.
+    is the model's error: of all maxima that this error may have lowered, the one nearest to 0 is taken.
 
     Args:
         a: of the measurement, equidistant, one array a window.
@@ -85,14 +91,41 @@ def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = 
         return math.nan
     if rho.max() < ALIKE * _ceiling(a):
         return math.nan
-    rivals = peaks[rho[peaks] >= RIVAL * rho.max()]
+    rivals = _rivals(b, most, rho, peaks[rho[peaks] >= RIVAL * rho.max()])
     k = int(rivals[np.argmin(np.abs(lags[rivals]))])
     other = rivals[np.sign(lags[rivals]) == -np.sign(lags[k])]
     if len(other) and lags[k] and abs(lags[k]) > NEARER * np.min(np.abs(lags[other])):
         return math.nan
-    low, top, high = rho[k - 1 : k + 2]
+    return step * (float(lags[k]) + _vertex(rho, k)[0])
+
+
+def _vertex(rho: Floats, k: int) -> tuple[float, float]:
+    """Where the parabola through rho[k] and its neighbours has its maximum, in samples behind k, and how high it is."""
+    low, top, high = (float(x) for x in rho[k - 1 : k + 2])
     bend = low - 2.0 * top + high
-    return float(step * (lags[k] + (0.5 * (low - high) / bend if bend < 0.0 else 0.0)))
+    return (0.5 * (low - high) / bend, top - (low - high) ** 2 / (8.0 * bend)) if bend < 0.0 else (0.0, top)
+
+
+def _angle(rho: Floats, k: int) -> float:
+    """Angle between two motions near lag k from their correlations, rad; of the highest within two samples."""
+    near = k - 2 + int(np.argmax(rho[k - 2 : k + 3]))
+    return math.acos(min(_vertex(rho, near)[1], 1.0))
+
+
+def _rivals(b: Sequence[Floats], most: int, rho: Floats, peaks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those maxima that are the delay if the highest is so by the model's error alone.
+
+    The prediction moved to the one and to the other lag are phi apart. If it were the lower one, the model's error
+    would have to lie along their difference for the higher one to be nearer than phi: by chance for small angles only.
+    Windows shorter than twice the lags cannot be held against themselves: all maxima stay.
+    """
+    best = int(peaks[np.argmax(rho[peaks])])
+    reach = 2 * most + 4
+    if len(peaks) == 1 or reach >= min(map(len, b)):
+        return peaks
+    alone = _lagged(b, b, reach)[1]
+    limit = max(REPEATS, EXPLAINED * math.acos(min(_vertex(rho, best)[1], 1.0)))
+    return np.array([k for k in peaks if k == best or _angle(alone, reach + int(k) - best) <= limit])
 
 
 def _ceiling(a: Sequence[Floats]) -> float:

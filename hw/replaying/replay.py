@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from crossbody import engines
 from crossbody.cases import (
     CaseUnsupported,
     EngineUnavailable,
@@ -24,14 +23,12 @@ from crossbody.hw import models
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.comparison import Comparison, Prediction
-from crossbody.hw.replaying.rates import Floats
 from crossbody.hw.replaying.starts import fitted_starts
-from crossbody.hw.replaying.system import run_once
-from crossbody.hw.replaying.windows import Window, windows
+from crossbody.hw.windows.rates import Floats
+from crossbody.hw.windows.run import run_window
+from crossbody.hw.windows.window import Window, windows
 
 KINDS = ("forward", "closed_loop")
-REFERENCE = {"rtol": 1e-8}
-"""Settings of the reference: far below what a rig measures."""
 
 
 @checked_arguments
@@ -116,30 +113,6 @@ def _predict(
         messages=tuple(run.message for run, *_ in runs if run.message),
         wall_s=sum(run.wall_s for run, *_ in runs), steps=sum(run.steps for run, *_ in runs),
     )  # fmt: skip
-
-
-def run_window(
-    model: Model, numbers: Mapping[str, Value], window: Window, name: str, profile: str, settings: Mapping[str, Any]
-) -> tuple[Trajectory, dict[str, Any]]:
-    """One window on one engine: the motion, and what was really used.
-
-    Raises:
-        CaseUnsupported, EngineUnavailable: if the engine cannot do it.
-    """
-    case = model.build(numbers, window.segment)
-    asked = dict(model.settings.get(name, {})) | dict(settings)
-    engine = engines.load(name)
-    reason = model.why_not.get(name) or engine.why_not(case, profile)
-    if reason is not None:
-        raise CaseUnsupported(reason)
-    if name == "reference":
-        used = REFERENCE | asked
-        solver = "compiled" if profile == "matched" else profile
-        # Where inputs change at every sample its steps end there: samples of their own would cost a third more.
-        samples = None if len(window.segment.times) else window.t - window.t[0]
-        return run_once(case, solver, samples=samples, **used), {**used, "profile": solver}
-    prepared = engine.prepare(case, profile, **asked)
-    return prepared.run(), dict(prepared.settings) | {"profile": prepared.profile}
 
 
 def _looped(

@@ -10,8 +10,8 @@ import numpy as np
 from crossbody.cases import Value
 from crossbody.hw.fitting.derivative import Exact
 from crossbody.hw.models._contract import Model
-from crossbody.hw.replaying.rates import HALF
-from crossbody.hw.replaying.windows import Window
+from crossbody.hw.windows.rates import HALF
+from crossbody.hw.windows.window import Window
 
 ROUNDS = 2
 """Of Gauss and Newton with the first derivatives: over a few samples the motion is all but linear in its start."""

@@ -17,9 +17,9 @@ from crossbody.engines.equations import system_of
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.inverse import Inferred, noise_of, pushed, shift_of
-from crossbody.hw.replaying.lift import check_measured
-from crossbody.hw.replaying.rates import DEGREE, HALF, Floats, derivatives
-from crossbody.hw.replaying.windows import recorded_inputs
+from crossbody.hw.windows.lift import check_measured
+from crossbody.hw.windows.rates import DEGREE, HALF, Floats, derivatives
+from crossbody.hw.windows.window import recorded_inputs
 from crossbody.reference.linear import Unknown, filtered
 
 

@@ -17,8 +17,8 @@ from scipy.signal import lfilter
 
 from crossbody.cases import InvalidValue
 from crossbody.cases.entry_points import checked_arguments, checked_fields
-from crossbody.hw.checks.every import Checks
 from crossbody.hw.formats import Group
+from crossbody.hw.reading.checks import Checks
 from crossbody.hw.reading.columns import Role, Signal
 from crossbody.hw.reading.log import Channel, Log, Provenance
 from crossbody.hw.reading.plan import Source

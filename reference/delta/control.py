@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
+from crossbody.reference.delta.kernels import control as compiled
 from crossbody.reference.delta.kinematics import MOTORS, inverse, jacobians
 from crossbody.reference.delta.robot import Robot, Servo
 from crossbody.reference.kinds import Floats
-from crossbody.reference.systems import _delta_control as compiled
 
 Path = Callable[[Floats], tuple[Floats, Floats, Floats]]
 """A reference: times (n,) to position, velocity and acceleration (n, 3)."""

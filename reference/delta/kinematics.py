@@ -11,9 +11,9 @@ from crossbody.cases import InvalidValue, SceneError
 from crossbody.cases.arguments import shown
 from crossbody.cases.arrays import frozen, numbers
 from crossbody.cases.entry_points import checked_arguments
+from crossbody.reference.delta.kernels import kinematics as compiled
 from crossbody.reference.delta.robot import Robot
 from crossbody.reference.kinds import Floats
-from crossbody.reference.systems import _delta_kinematics as compiled
 
 MOTORS = np.array([0, 3, 6])
 OTHERS = np.array([1, 2, 4, 5, 7, 8])

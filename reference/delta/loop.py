@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.reference.delta.control import Linearising, Proportional, knots
+from crossbody.reference.delta.kernels import control as compiled
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS, closed_pose, flange, jacobians, virtual_jacobian
 from crossbody.reference.delta.model import system
 from crossbody.reference.delta.robot import Robot
@@ -20,7 +21,6 @@ from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._linearise import linearise
 from crossbody.reference.linear._model import LinearModel
 from crossbody.reference.linear.differences import differences
-from crossbody.reference.systems import _delta_control as compiled
 
 STEP = 1e-3
 AXES = "xyz"

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from crossbody.cases import InvalidValue, Law, SceneError
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.delta.kinematics import vector
 from crossbody.reference.delta.robot import Robot, Servo
 from crossbody.reference.kinds import Floats
-from crossbody.reference.systems import delta as kernels
 
 if TYPE_CHECKING:
     from crossbody.reference.delta.control import Program

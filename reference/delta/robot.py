@@ -9,9 +9,9 @@ import numpy as np
 
 from crossbody.cases import InvalidValue
 from crossbody.cases.entry_points import checked_arguments, checked_fields
+from crossbody.reference.delta.kernels import arm as arm
+from crossbody.reference.delta.kernels import robot as kernels
 from crossbody.reference.kinds import Floats
-from crossbody.reference.systems import delta as kernels
-from crossbody.reference.systems import delta_arm as arm
 
 
 @checked_fields

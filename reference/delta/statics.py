@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue, SceneError
 from crossbody.cases.entry_points import checked_arguments
+from crossbody.reference.delta.kernels import kinematics as compiled
 from crossbody.reference.delta.kinematics import MOTORS, OTHERS, vector, virtual_jacobian
 from crossbody.reference.delta.robot import Robot
 from crossbody.reference.kinds import Floats
-from crossbody.reference.systems import _delta_kinematics as compiled
 
 
 def closure_jacobian(robot: Robot, q: ArrayLike) -> Floats:

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from crossbody.reference.kinds import Floats
 
-COARSE, FINE = 8, 16  # degrees tried
+SCREENING, COARSE, FINE = 4, 8, 16  # degrees tried: the first only to tell that nothing fires
 HALVINGS = 6
 TAIL = 2  # coefficients taken for what is left out
 CAUTION = 8.0  # what is left out, in units of that
@@ -29,7 +29,7 @@ AT_START = 1e-6  # part of an interval from whose start a root cannot be told: a
 NEARLY_REAL = 1e-3  # imaginary part, in half intervals, below which a root may be a double one
 ULP = float(np.finfo(np.float64).eps)
 
-PLACES = {degree: -np.cos(np.pi * np.arange(degree + 1) / degree) for degree in (COARSE, FINE)}
+PLACES = {degree: -np.cos(np.pi * np.arange(degree + 1) / degree) for degree in (SCREENING, COARSE, FINE)}
 SERIES = {degree: np.linalg.inv(chebyshev.chebvander(x, degree)) for degree, x in PLACES.items()}
 
 Terms = Callable[[float], Floats]
@@ -39,7 +39,7 @@ LARGEST = 1e290
 
 def stay_above(terms: Terms, a: float, b: float) -> NDArray[np.bool_]:
     """Return which of the terms (k,) have series on [a, b] that stay above zero; all guards are screened at once."""
-    series, tail = _series(terms, a, b, COARSE)[1:]
+    series, tail = _series(terms, a, b, SCREENING)[1:]
     return _least(series) > CAUTION * tail
 
 

@@ -21,13 +21,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crossbody.reference import kernels
+from crossbody.reference.delta import scene
+from crossbody.reference.delta.kernels import robot as _delta
+from crossbody.reference.delta.kernels import servo as _servo
+from crossbody.reference.delta.kernels.arm import geometry, rotate, trig, turn, velocity
+from crossbody.reference.delta.kernels.control import reflected
+from crossbody.reference.delta.kernels.kinematics import control_jacobian, flange, frame, holding, spread
+from crossbody.reference.delta.kernels.linear import dot
 from crossbody.reference.kinds import Array, Floats, Index
-from crossbody.reference.systems import _delta_servo as _servo
 from crossbody.reference.systems import _soft_fingers as _fingers
-from crossbody.reference.systems import delta as _delta
-from crossbody.reference.systems._delta_control import reflected
-from crossbody.reference.systems._delta_kinematics import control_jacobian, flange, frame, holding, spread
-from crossbody.reference.systems._delta_linear import dot
+from crossbody.reference.systems import delta as robot
 from crossbody.reference.systems._soft_fingers import (
     BLOCK_MASS,
     BT,
@@ -39,7 +42,6 @@ from crossbody.reference.systems._soft_fingers import (
     pid,
     smooth,
 )
-from crossbody.reference.systems.delta_arm import geometry, rotate, trig, turn, velocity
 
 if TYPE_CHECKING:
     from crossbody.cases import Law
@@ -182,7 +184,6 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
         law: of the nine rows.
     """
     from crossbody.reference import System
-    from crossbody.reference.delta import scene
 
     values = _fingers.values(parameters, (*_fingers.NAMES, *PATH))
     return System(
@@ -194,11 +195,11 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
 
 def check_start(parameters: Mapping[str, Any], q0: Floats, v0: Floats) -> None:
     """Raise SceneError for a start that does not close the loops."""
-    _delta.check_start(parameters, q0[:9], v0[:9])
+    scene.check_start(parameters, q0[:9], v0[:9])
 
 
 def listed(p: Floats) -> dict[str, Any]:
     """What the parity audit lists: masses of the robot's bodies, the pads and the block, kg, and gravity."""
-    own = _delta.listed(p)
+    own = robot.listed(p)
     soft = [p[_F + PAD_MASS], p[_F + PAD_MASS], p[_F + BLOCK_MASS]]
     return own | {"masses": np.concatenate([own["masses"], soft])}

@@ -15,9 +15,9 @@ import numpy as np
 from crossbody.reference import kernels
 from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
-from crossbody.reference.pairs.rows import bend
 from crossbody.reference.tree import forces, layout
 from crossbody.reference.tree.forces import by, clamped
+from crossbody.reference.tree.pair_rows import bend
 
 SMALL = 1e-3  # m or rad, and 1/s: coordinates are known to the tolerance of this at least
 ROUNDING = 1e-14  # of a value

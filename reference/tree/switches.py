@@ -11,8 +11,8 @@ from crossbody.reference import kernels
 from crossbody.reference.kernels import CHANGED, GIVEN, START, TOUCHED, UNCHANGED
 from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
-from crossbody.reference.pairs.rows import chosen, lowest, touch, turn, upside_down
 from crossbody.reference.tree import balls, kinks, layout, sweeps
+from crossbody.reference.tree.pair_rows import chosen, lowest, touch, turn, upside_down
 
 FREE, CONTACT = 0, 1  # modes, as in crossbody.cases.Mode
 

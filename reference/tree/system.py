@@ -9,9 +9,9 @@ import numpy as np
 
 from crossbody.cases import Law
 from crossbody.cases.control import Control
-from crossbody.cases.files.case import rows_of
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import WAYS, contacts
+from crossbody.cases.scene_rows import rows_of
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._redundant import ranked
@@ -84,7 +84,8 @@ def system(
     fields: dict[str, Any] = dict(
         n=scene.nv, nq=scene.nq, above=dof_parents(table),
         parameters=parameters, **turning,
-        a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral, **_friction(scene, len(law.a0)),
+        a0=law.a0, a1=law.a1, a2=law.a2, b0=law.b0, b1=law.b1, unilateral=law.unilateral,
+        **_friction(scene, len(law.a0)),
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS,
     )  # fmt: skip

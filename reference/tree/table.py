@@ -129,7 +129,7 @@ def tabulate(scene: Scene) -> Table:
         SceneError: for a scene without joints, or one that the kernels cannot do.
     """
     if not scene.joints:
-        raise SceneError("The scene has no joint: nothing can move.")
+        raise SceneError("The scene has no joint: nothing can move; valid: a joint or freejoint in one body at least.")
     builder = _Builder(scene)
     return builder.table()
 

@@ -3,7 +3,7 @@
 The sweeps of `sweeps` are run in Python on symbols in place of positions and velocities. What depends on the model
 alone, every index and every branch, is gone from the record; what is zero, or one, drops out. LLVM compiles it: .1 to
 .6 s for 6 to 18 degrees of freedom, kept on disk. The operations that are left stand in the order of the general code,
-so that both give the same numbers to the last bit (`tests/test_traced.py`).
+so that both give the same numbers to the last bit (`tests/reference/test_traced.py`).
 
 A kernel calls it by its address in the parameters, so that nothing else is compiled for a model.
 """

@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from crossbody.reports.analysis.bode import OUTPUTS, UNITS
-from crossbody.reports.pages.styles import COLOURS, DASHES
+from crossbody.reports.figures.styles import COLOURS, DASHES
 
 
 def bode(rows: pd.DataFrame) -> go.Figure:

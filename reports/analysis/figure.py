@@ -7,7 +7,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from crossbody.reports.pages.styles import COLOURS, DASHES
+from crossbody.reports.figures.styles import COLOURS, DASHES
 
 RESPONDING = 1e-12
 """Part of the largest magnitude below which a response is none."""

@@ -12,7 +12,8 @@ from crossbody import engines
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import Truth, law_of, truth_of
+from crossbody.reports.judging.truth import law_of, truth_of
+from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs.jobs import Pick
 
 GRID = 2001

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from crossbody.reports.pages.styles import COLOURS, DASHES
+from crossbody.reports.figures.styles import COLOURS, DASHES
 
 APART = 1.0
 """Decades of error between two labels of a line, twice the decades of time."""

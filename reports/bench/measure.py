@@ -22,7 +22,7 @@ from crossbody.cases import Case, CaseUnsupported, Trajectory
 from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
-from crossbody.reports.judging.truth import Truth
+from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.jobs import Pick, of_case
 

@@ -85,7 +85,7 @@ def states(case: Case, theirs: Mapping[str, Any]) -> list[tuple[Floats, Floats]]
     """
     draw = np.random.default_rng(SEED)
     n, nv = len(case.q0), len(case.v0)
-    if case.scene is not None or not case.law.unilateral.any() or "gap" not in theirs:
+    if case.general or not case.law.unilateral.any() or "gap" not in theirs:
         near = [(case.q0 + draw.uniform(-0.1, 0.1, n), draw.uniform(-1.0, 1.0, nv)) for _ in range(STATES)]
         return [(normalised(q, case.quaternions), v) for q, v in near]
     return [_entered(case, theirs["gap"], theirs["H"], draw) for _ in range(STATES)]

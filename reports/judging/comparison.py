@@ -20,7 +20,7 @@ from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
 from crossbody.reports.judging.stored import Deviations, defaults, deviations, differing, words
-from crossbody.reports.judging.truth import Truth, truth_of
+from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import (
     Regression,
     Verdict,
@@ -31,11 +31,14 @@ from crossbody.reports.judging.verdict import (
     judge,
     limit_for,
 )  # fmt: skip
+from crossbody.reports.measuring.truth import TRUTH, Truth
 
-GROWING = frozenset({"position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path"})
-"""Metrics that compare a motion with the truth's."""
-TRUTH = "truth"
-"""Engine and metric of the row that judges the truth itself."""
+GROWING = frozenset({
+    "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
+    "largest position (importer)", "largest event_times (importer)",
+})  # fmt: skip
+"""Metrics that compare a motion with the truth's, or those of two readers of a file: rounding grows as the motion has
+it."""
 LARGEST = "largest"
 """Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 FLOOR = 0.5
@@ -62,6 +65,7 @@ class Entry:
         own: truth of the equations that the engine really integrates; None where they are the case's own.
         hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
         crashed: what it threw, where it did not come back with an outcome.
+        took_s: what all of that took, preparation and the runs that tell the parts of its error too, s.
     """
 
     engine: str
@@ -76,6 +80,7 @@ class Entry:
     own: Truth | None = None
     hidden: Mapping[str, str] = field(default_factory=dict)
     crashed: str = ""
+    took_s: float = 0.0
 
 
 def compare(
@@ -135,9 +140,9 @@ def check_names(case: Case) -> None:
 
     Raises:
         UnknownName: for a metric or an engine that does not exist; the valid ones are listed.
-        InvalidValue: for a limit that is negative or not a number.
+        InvalidValue: for a limit that is negative or not a number, and for a metric with the name of another.
     """
-    known = {*metrics.names(), "audit", "*", *LARGEST_PARTS}
+    known = {*metrics.of(case), "audit", "*", *LARGEST_PARTS}
     for kind, named in (("claims", case.claims), ("limits", case.limits)):
         for name in (each.metric for each in named):
             if name not in known:
@@ -343,8 +348,7 @@ def crash(error: Exception) -> str:
 
 def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict]:
     """A row for every metric that says something; one that throws is a row too, so that the others are judged."""
-    for name in metrics.names():
-        metric = metrics.load(name)
+    for name, metric in metrics.of(judge_.case).items():
         wanted = name in judge_.claims or judge_.limit(name) is not None
         if metric.CLAIMED and not wanted:
             continue

@@ -25,12 +25,12 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import turned
-from crossbody.reports.metrics._align import clock, matched
+from crossbody.reports.measuring.alignment import clock, matched
 from crossbody.reports.metrics.position import scale_of
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 PARTS = ("importer", "model", "step")
 SPLIT = ("position", "event_times")

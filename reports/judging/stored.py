@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import sys
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
@@ -98,35 +97,3 @@ def _block(stored: Mapping[str, Any]) -> str:
 def _short(value: float) -> float | str:
     """Three digits; a word for what JSON has no number for."""
     return float(f"{value:.3g}") if math.isfinite(value) else str(value)
-
-
-def _measured(name: str, variant: str) -> list[tuple[Case, Entry, Deviations]]:
-    """What all engines that are installed give on one variant."""
-    from crossbody import engines
-    from crossbody.reports.judging.comparison import measured
-    from crossbody.reports.runs import jobs
-
-    (case,) = jobs.load_cases([name], variant, {})
-    result = jobs.run_case(case, jobs.picks(engines.names()), tell=print, refine=False)
-    return [(case, entry, measured(case, entry, result.truth)) for entry in result.entries if entry.run]
-
-
-def main(names: list[str]) -> None:
-    """Run cases, all if none is named, one process a core, and store what they gave; each as soon as it is there.
-
-    Raises:
-        CrossbodyError: for a name that does not exist.
-    """
-    from joblib import Parallel, delayed
-
-    from crossbody import cases
-
-    wanted = [(name, variant) for name in names or cases.names() for variant in cases.variants(name)]
-    for found in Parallel(n_jobs=-1, return_as="generator_unordered")(delayed(_measured)(*one) for one in wanted):
-        write(found)
-
-
-if __name__ == "__main__":
-    from crossbody.reports.judging import stored
-
-    stored.main(sys.argv[1:])

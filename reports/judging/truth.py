@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,8 @@ from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Outcome, T
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
-from crossbody.reports.judging._between import between
-from crossbody.reports.judging.modes import violated
+from crossbody.reports.measuring.modes import violated
+from crossbody.reports.measuring.truth import Truth, sample_times
 
 if TYPE_CHECKING:
     from crossbody.engines import Run
@@ -35,8 +34,6 @@ LADDER = (1.0, 10.0)
 """Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
 NUDGE, DIRECTIONS, INSTANTS = 1e-7, 2, 201
 """By how much of the largest velocity a start is put off, in how many directions, and when it is looked at."""
-METHODS = ("Adams", "BDF")
-"""Of CVODE: the second costs less where rows, dampers or servos are stiff."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
 STEPS, GROWTH = 1e4, 10.0
@@ -45,62 +42,6 @@ AGREES = STEPS * GROWTH
 """Largest disagreement of the two, in units of the looser tolerance; it is never more than `PARTED`."""
 GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Truth:
-    """A motion that is taken to be right.
-
-    Attributes:
-        tier: how it is known.
-        source: in words, with the agreement of tier C.
-        trajectory: the motion, dense enough to plot, both sides of every event.
-        at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
-        agreement: metric -> how far the two sources of tier C are apart; empty for the others.
-        trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
-        parted: when the two sources part, s; infinite if they never do.
-        allowed: largest disagreement of the two sources, relative; NaN where there is one source alone.
-        growth: rate at which the two part, 1/s; NaN unless they do.
-        grows: how many times more than in free flight an error of the start grows; 1 where it was not measured.
-        tight: tolerance of the compiled run; NaN of another source.
-        joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
-            each other and rest unloaded.
-    """
-
-    tier: Tier
-    source: str
-    trajectory: Trajectory
-    at: Callable[[Floats], Trajectory]
-    agreement: dict[str, float]
-    trusted: float = math.inf
-    parted: float = math.inf
-    allowed: float = math.nan
-    growth: float = math.nan
-    tight: float = math.nan
-    grows: float = 1.0
-    joined: bool = False
-
-
-def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
-    """Times that show a motion: a grid, more of them from each event to the next if that is short, events twice.
-
-    Args:
-        run: whose events.
-        t_end: horizon, s.
-        grid: points on the horizon.
-        inside: points on each interval between events that is shorter than a tenth of the horizon.
-    """
-    events = np.array([e.t for e in run.events if e.t <= t_end])
-    parts = [np.linspace(0.0, t_end, grid)]
-    edges = np.unique(np.concatenate([[0.0], events, [t_end]]))
-    parts += [np.linspace(a, b, inside)[1:-1] for a, b in pairwise(edges) if b - a < 0.1 * t_end]
-    times: Floats = np.sort(np.concatenate([np.unique(np.concatenate([*parts, events])), events]))
-    return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
-
-
-def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:
-    """A run as the truth for others: an engine refined against itself, or a measurement."""
-    return Truth(tier=tier, source=source, trajectory=run, at=between(run), agreement={})
 
 
 def truth_of(case: Case) -> Truth:
@@ -171,7 +112,7 @@ def tightened(case: Case) -> tuple[Case, Trajectory]:
 
     Stiff rows on small masses reach theirs before.
     """
-    if case.scene is None:
+    if not case.general:
         return case, _tight(case)
     from crossbody.engines import load
 
@@ -215,7 +156,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     tier = Tier.D if other == "compiled" else Tier.C
     who, loose, why = other, SECOND * case.tight, ""
     shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
-    second = _witness(case) if case.scene is not None and tier is Tier.C else None
+    second = _witness(case) if case.general and tier is Tier.C else None
     if isinstance(second, Trajectory):
         who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "the scene alone"
     else:
@@ -224,7 +165,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
     truth = _held_against(
         Truth(
             tier=tier, source="", trajectory=dense, at=at, agreement={}, tight=case.tight,
-            grows=_growing(case, dense, at), joined=case.scene is not None,
+            grows=_growing(case, dense, at), joined=case.general,
         ),
         second,
         case,
@@ -250,21 +191,22 @@ def _witness(case: Case) -> Trajectory | str:
     try:
         pinocchio = engines.load("pinocchio")
         part, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
-        cost, steps, method = min((*_seconds(pinocchio.prepare(part, "law", rtol=rtol, method=m)), m) for m in METHODS)
+        cost, steps = seconds(pinocchio.prepare(part, "law", rtol=rtol))
         if cost > SHARE * WITNESS_S:
             return f"Pinocchio would share the scene alone, and take about {cost / SHARE:.0f} s"
         most = max(1000, int(WITNESS_S * steps / cost))  # contacts later on may want far more steps than the first part
-        run = pinocchio.prepare(case, "law", rtol=rtol, method=method, max_steps=most).run()
+        run = pinocchio.prepare(case, "law", rtol=rtol, max_steps=most).run()
     except (EngineUnavailable, CaseUnsupported) as error:
         return str(error).removesuffix(".")
     return run if run.outcome.ok else f"Pinocchio ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
 
 
-def _seconds(run: Run) -> tuple[float, int]:
-    """Time that a run takes of one processor, s, and its steps."""
+def seconds(run: Run) -> tuple[float, int]:
+    """Return the time that a run takes of one processor, s, without that of choosing its method, and its steps."""
     began = process_time()
-    steps = run.run().steps
-    return process_time() - began, steps
+    found = run.run()
+    used, tried = (found.counts.get(name, 0) for name in ("rhs", "tried"))
+    return (process_time() - began) * used / max(used + tried, 1) if tried else process_time() - began, found.steps
 
 
 def _rechecked(truth: Truth, case: Case) -> Truth:
@@ -282,7 +224,7 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
 def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) -> float:
     """By how much more than in free flight errors of a scene's start grow: its velocities are put off, on its rows."""
     fastest = float(np.max(np.abs(truth.v), initial=0.0))
-    if case.scene is None or not truth.outcome.ok or not 0.0 < fastest < math.inf:
+    if not case.general or not truth.outcome.ok or not 0.0 < fastest < math.inf:
         return 1.0
     from crossbody.engines import load
     from crossbody.engines.equations import system_of
@@ -318,8 +260,8 @@ def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> 
 
 def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats]:
     """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
-    from crossbody.reports.metrics._align import aligned
-    from crossbody.reports.metrics._scale import RESTS
+    from crossbody.reports.measuring.alignment import aligned
+    from crossbody.reports.measuring.scale import RESTS
 
     inside, exact = aligned(truth, second)
     scale = max(float(np.max(np.abs(truth.trajectory.q), initial=0.0)), RESTS)

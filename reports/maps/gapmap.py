@@ -16,10 +16,10 @@ import pandas as pd
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory
+from crossbody.cases.contacts import CLOSED
+from crossbody.cases.mechanisms.cradle.metrics import distance, row
 from crossbody.cases.mechanisms.cradle.rules import RULES
-from crossbody.reports.metrics._contacts import CLOSED
-from crossbody.reports.metrics._cradle import distance, row
-from crossbody.reports.metrics._switching import made
+from crossbody.reports.measuring.switching import made
 from crossbody.reports.runs.jobs import Pick
 
 LARGEST_S = 3.0

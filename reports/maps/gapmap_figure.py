@@ -6,8 +6,8 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from crossbody.reports.figures.styles import COLOURS, DASHES
 from crossbody.reports.maps.gapmap import PATTERN
-from crossbody.reports.pages.styles import COLOURS, DASHES
 
 ROWS = {"energy_created": "energy created / energy in [1]", PATTERN: "pattern distance / speed in [1]"}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import plotly.graph_objects as go
 
-from crossbody.reports.pages.styles import COLOURS
+from crossbody.reports.figures.styles import COLOURS
 
 ENDS = (("arrived", "in the centre", "circle", COLOURS[2]), ("lost", "not there at the end", "x", COLOURS[3]))
 LINE = 17

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.reports.metrics._contacts import CLOSED
-from crossbody.reports.metrics._lam import told
+from crossbody.cases.contacts import CLOSED
+from crossbody.reports.measuring.multipliers import told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._impulse import away
-from crossbody.reports.metrics._scale import energy
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.impulse import away
+from crossbody.reports.measuring.scale import energy
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

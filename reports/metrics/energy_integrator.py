@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.reports.metrics._scale import energy
+from crossbody.reports.measuring.scale import energy
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

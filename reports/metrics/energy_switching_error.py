@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from crossbody.reports.metrics._switching import made, parted
+from crossbody.reports.measuring.switching import made, parted
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.reports.metrics._contacts import AT_REST, CLOSED, LIGHT
-from crossbody.reports.metrics._equations import equations
+from crossbody.cases.contacts import AT_REST, CLOSED, LIGHT
+from crossbody.reports.measuring.equations import equations
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Event, Trajectory
     from crossbody.cases.arrays import Floats
     from crossbody.reference import System
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

@@ -17,16 +17,16 @@ import numpy as np
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
-from crossbody.reports.metrics._contacts import CLOSED
-from crossbody.reports.metrics._equations import equations, finite, spread
-from crossbody.reports.metrics._lam import told
+from crossbody.cases.contacts import CLOSED
+from crossbody.reports.measuring.equations import equations, finite, spread
+from crossbody.reports.measuring.multipliers import told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from crossbody.cases import Case, Inputs, Trajectory
     from crossbody.reference import System
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

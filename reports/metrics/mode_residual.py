@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.reports.metrics._equations import equations
+from crossbody.reports.measuring.equations import equations
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Event, Trajectory
     from crossbody.cases.arrays import Bytes, Floats
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

@@ -8,12 +8,12 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
-from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._scale import least, of_like
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False
@@ -36,11 +36,14 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
 def scale_of(exact: Trajectory, case: Case) -> Floats:
     """Return the largest |q_truth| (n,) of each coordinate; of its like, for one that rests but for rounding.
 
-    Where all of these rest, what the case says of their size. Errors below 1e-12, what absolute tolerances are, pass
-    the usual limit of 1e-6.
+    The joints of a scene, a robot's, are measured by the largest of their unit: one that hardly moves in the truth, by
+    the balance of others, tells of an engine that moves it how far that is, and not how still it ought to be. Where all
+    of these rest, what the case says of their size. Errors below 1e-12, what absolute tolerances are, pass the usual
+    limit of 1e-6.
     """
     own: Floats = np.max(np.abs(exact.q), axis=0)
     shared, smallest = of_like(own, case.coordinates), least(case.coordinates)
+    own = shared if case.scene is not None else own
     scale = np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
     scale[list(case.quaternions)] = 1.0  # rad
     return scale

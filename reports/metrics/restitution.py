@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from crossbody.reports.metrics._contacts import rates
+from crossbody.cases.contacts import rates
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = True

@@ -13,11 +13,11 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Coordinate
 from crossbody.cases.rotations import differences
-from crossbody.reports.metrics._scale import least, of_like
+from crossbody.reports.measuring.scale import least, of_like
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
+    from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports import sections
+from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
+from crossbody.reports.figures.styles import label, style
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import figures, grid
-from crossbody.reports.pages.figures import label, style, suits
+from crossbody.reports.pages.figures import suits
 from crossbody.reports.pages.html import Page
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results
-from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.runs.store import Trace
 
 PLOTTED = 900_000

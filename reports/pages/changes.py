@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from crossbody.reports.pages.section import Kind, Section, Table, columns, records
+from crossbody.reports.figures.section import Kind, Section, Table, columns, records
 
 KEY = ["case", "variant", "engine", "profile", "metric"]
 MOVED = 0.1

@@ -8,14 +8,13 @@ import numpy as np
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
-from crossbody.reports.metrics._impulse import with_collisions
+from crossbody.reports.figures.section import Figure
+from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.section import Figure
 from crossbody.reports.pages.sheet import Sheet
 from crossbody.reports.pages.strips import changing, modes
-from crossbody.reports.pages.styles import COLOURS, DASHES, TRUTH, label, style
-from crossbody.reports.pages.thin import POINTS
 from crossbody.reports.runs.store import Trace
+from crossbody.reports.runs.thin import POINTS
 
 SAMPLE = 16
 """Room of one sample of one line on a page, bytes (time and value as base64)."""
@@ -24,8 +23,6 @@ MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
 ROUNDING = 1e-17
 """Depth below which there is none, m."""
-
-__all__ = ["COLOURS", "DASHES", "FIGURES", "TRUTH", "label", "note", "points_for", "style", "suits"]
 
 
 def drawn(count: int) -> list[int]:

@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from crossbody.reports.pages.section import Figure, Kind, Section
+from crossbody.reports.figures.section import Figure, Kind, Section
 
 TEMPLATES = Path(__file__).parent / "templates"
 PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"

@@ -7,13 +7,13 @@ from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from crossbody.reports.figures.section import Section
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
 from crossbody.reports.pages.changes import changes
 from crossbody.reports.pages.html import Page
 from crossbody.reports.pages.results import CaseFiles, Results
-from crossbody.reports.pages.section import Section
 from crossbody.reports.pages.summary import engines
 
 SHOWN = 100

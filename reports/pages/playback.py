@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from crossbody.cases import CrossbodyError, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import scenes
+from crossbody.reports.figures.section import Section
+from crossbody.reports.figures.styles import label, style
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.section import Section
-from crossbody.reports.pages.styles import TRUTH, label, style
 from crossbody.reports.runs.store import Trace
 
 ROOM = 280_000

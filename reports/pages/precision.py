@@ -9,9 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from crossbody.reports.pages.section import Figure, Plot, Section
+from crossbody.reports.figures.section import Figure, Plot, Section
+from crossbody.reports.figures.styles import COLOURS
 from crossbody.reports.pages.sheet import plain
-from crossbody.reports.pages.styles import COLOURS
 from crossbody.reports.runs.study import read_json
 
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")

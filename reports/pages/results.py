@@ -11,9 +11,9 @@ import pandas as pd
 from pyarrow import ArrowException
 
 from crossbody.cases import OutputError
+from crossbody.reports.figures.section import records
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.pages.html import file_name
-from crossbody.reports.pages.section import records
 from crossbody.reports.runs.files import listed
 from crossbody.reports.runs.output import is_staged, recover
 from crossbody.reports.runs.store import Trace, load, peek
@@ -162,9 +162,15 @@ def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], di
     return found, walls
 
 
-def walls_of(out: Path) -> dict[tuple[str, str], float]:
-    """Run times of a folder, s, by case:variant and engine:profile."""
-    return _cases(out, verdicts_of(out))[1]
+def times_of(out: Path) -> dict[tuple[str, str], tuple[float, float | None]]:
+    """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile."""
+    cases, walls = _cases(out, verdicts_of(out))
+    abouts = [peek(path)["about"] for case in cases for path in case.paths]
+    took = {
+        (f"{about['case']}:{about['variant']}", f"{about['engine']}:{about['profile']}"): about.get("took_s")
+        for about in abouts
+    }
+    return {one: (wall, took[one]) for one, wall in walls.items()}
 
 
 def _wanted(verdicts: pd.DataFrame) -> dict[str, list[str]]:

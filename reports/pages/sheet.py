@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.reports.pages.styles import TRUTH, label, style
-from crossbody.reports.pages.thin import AROUND, keep
+from crossbody.reports.figures.styles import label, style
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
+from crossbody.reports.runs.thin import AROUND, keep
 
 FINE = 2e-5
 """Distance of samples over the horizon below which times are written in double precision."""

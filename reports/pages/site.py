@@ -13,11 +13,11 @@ from jinja2 import TemplateError
 
 from crossbody.cases import OutputError
 from crossbody.reports import sections as studies
+from crossbody.reports.figures.section import Section
 from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
 from crossbody.reports.pages.results import Results, read, verdicts_of
-from crossbody.reports.pages.section import Section
 from crossbody.reports.runs import beside, output
 from crossbody.reports.runs.output import replace_text
 from crossbody.reports.runs.study import read_json

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Mode, Trajectory
-from crossbody.reports.pages.section import Figure
+from crossbody.reports.figures.section import Figure
+from crossbody.reports.figures.styles import label
 from crossbody.reports.pages.sheet import plain
-from crossbody.reports.pages.styles import label
 from crossbody.reports.runs.store import Trace
 
 MODE_COLOURS = {

@@ -11,10 +11,10 @@ from typing import Any
 
 import pandas as pd
 
+from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.results import Results
-from crossbody.reports.pages.section import Kind, Section, Table, columns
 from crossbody.reports.runs.study import read_json
 
 REFERENCE = "reference:compiled"

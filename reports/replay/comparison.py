@@ -13,7 +13,7 @@ from crossbody.cases import Limit
 from crossbody.hw import Comparison, Fit, Log, Prediction
 from crossbody.reports.judging.comparison import table
 from crossbody.reports.judging.verdict import Verdict, Word, limit_for
-from crossbody.reports.pages.styles import TRUTH
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.replay import limits
 from crossbody.reports.runs.store import Trace, save
 

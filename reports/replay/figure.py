@@ -6,7 +6,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from crossbody.reports.pages.styles import COLOURS, DASHES
+from crossbody.reports.figures.styles import COLOURS, DASHES
 
 
 def _look(i: int) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from time import process_time
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,8 @@ from crossbody.cases import (
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
-from crossbody.reports.judging.truth import Truth, law_of, sample_times, truth_of, with_both_sides
+from crossbody.reports.judging.truth import law_of, seconds, truth_of, with_both_sides
+from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 
 DEFAULT_CASES = ("bouncing_ball",)
@@ -126,7 +127,7 @@ def _profiles(name: str, profile: str | None) -> Iterator[Pick]:
 
 def of_case(pick: Pick, case: Case) -> Pick:
     """Return a pick, or for one of all profiles the one that stands for it where the case is a scene."""
-    if not pick.every or pick.skipped or case.scene is None:
+    if not pick.every or pick.skipped or not case.general:
         return pick
     return replace(pick, profile=engines.load(pick.engine).of_scenes.get(pick.profile, pick.profile))
 
@@ -190,7 +191,9 @@ def run_case(
         tell(label)
         watch.limited(label, limit)
         why = watch.lost(label)
-        entries.append(ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine))
+        began = perf_counter()
+        entry = ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine)
+        entries.append(replace(entry, took_s=perf_counter() - began))
     watch.unlimited()
     _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
@@ -264,12 +267,10 @@ def _ran(
 
 def _dear(case: Case, pick: Pick, asked: Mapping[str, Value]) -> str:
     """Return what a run of a scene would cost where that is too much, by its first part; else nothing."""
-    if case.scene is None or pick.engine == "reference":
+    if not case.general or pick.engine == "reference":
         return ""
     prepared = prepare(replace(case, t_end=FIRST * case.t_end), pick, asked)
-    began = process_time()
-    prepared.run()
-    cost = (process_time() - began) / FIRST
+    cost = seconds(prepared)[0] / FIRST
     if cost <= DEAR_S:
         return ""
     return f"Too dear: it would take about {cost:.0f} s. -e {pick.engine}:{pick.profile} runs it all the same."
@@ -327,7 +328,7 @@ def _study(
     setting = next(iter(size))
     for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
         cost = _cost(setting, sizes, size[setting], took)
-        if case.scene is not None and cost > STUDIES_S:
+        if case.general and cost > STUDIES_S:
             return Study(why=f"Runs with other {setting} that tell it would take about {cost:.0f} s.", **told)
         known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
         runs = [known.get(one) or run(**of_scene, **{setting: one}, **samples) for one in sizes]

@@ -39,7 +39,7 @@ class Parts:
     def __init__(self, out: Path, command: str, identity: Mapping[str, Any]) -> None:
         digest = hashlib.sha256(json.dumps(identity, sort_keys=True, default=repr).encode()).hexdigest()[:16]
         self.out, self.path = out.absolute(), out.absolute() / f"{PARTS}{digest}"
-        self.command, self.found, self.lock = command, 0, -1
+        self.command, self.lock = command, -1
         self.first = output.first_missing(self.out)
         try:
             self._open()
@@ -61,10 +61,14 @@ class Parts:
         for name in files.listed(self.path):
             if name.startswith("."):
                 shutil.rmtree(self.path / name, ignore_errors=True)
-        self.found = len([name for name in files.listed(self.path) if name != ABOUT])
         manifest.replace_text(self.path / ABOUT, json.dumps({"command": self.command}))
         watch.resumable(f"Nothing was replaced; {self._kept()}")
         self._tell()
+
+    @property
+    def found(self) -> int:
+        """How many parts are complete, whichever process wrote them."""
+        return len([name for name in files.listed(self.path) if name != ABOUT and not name.startswith(".")])
 
     def _kept(self) -> str:
         return f"what is complete is kept in {self.out}, and the same command goes on."
@@ -101,7 +105,6 @@ class Parts:
             raise OutputError(f"{made} cannot be written: {error.strerror or error}.") from error
         finally:
             shutil.rmtree(made, ignore_errors=True)
-        self.found += 1
 
     def __enter__(self) -> Parts:
         return self

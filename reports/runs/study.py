@@ -18,14 +18,13 @@ from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import contacts
 from crossbody.cases.scene_plain import plain
 from crossbody.reports.judging.comparison import Entry, judged, table
-from crossbody.reports.judging.truth import Truth
 from crossbody.reports.judging.verdict import Verdict
-from crossbody.reports.metrics._align import aligned
-from crossbody.reports.pages.styles import TRUTH
-from crossbody.reports.pages.thin import keep
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.truth import TRUTH, Truth
 from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, save
+from crossbody.reports.runs.thin import keep
 
 CASE = "case.json"
 AUDIT = ["case", "engine", "profile", "quantity", "reference", "value", "difference", "tolerance", "same"]
@@ -119,7 +118,7 @@ def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
         "coordinates": [{"name": c.name, "unit": c.unit} for c in case.coordinates],
         "contacts": list(case.contacts), "parameters": dict(case.parameters), "units": dict(case.units),
     }  # fmt: skip
-    return found if case.scene is None else found | {"scene": plain(_drawn(case.scene))}
+    return found if case.scene is None or not case.general else found | {"scene": plain(_drawn(case.scene))}
 
 
 def _drawn(scene: Scene) -> Scene:
@@ -138,6 +137,7 @@ def _traces(result: CaseResult) -> list[Trace]:
 def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
     assert entry.run is not None
     about = _about(case, entry.engine, entry.profile) | {"settings": dict(entry.settings)}
+    about["took_s"] = entry.took_s
     about["steps"] = _steps(entry.run.t if entry.stepped is None else entry.stepped)
     return Trace(about=about, run=entry.run, truth=_beside(truth, entry.run))
 

@@ -16,7 +16,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
@@ -151,6 +151,57 @@ def _say_stopped(number: int, told: dict[str, object]) -> int:
     if sys.stderr.isatty():  # a bar may have hidden the cursor
         sys.stderr.write("\r\x1b[K\x1b[?25h")
     return _say(f"interrupted. {how}", 128 + number)
+
+
+def beside(tasks: Sequence[Callable[[], int]], jobs: int, told: Callable[[int], None]) -> int:
+    """Run tasks in processes beside this one, each watched like a command; the largest of their exit codes.
+
+    A task that fails says nothing: whoever wants its result finds it missing, and does it here, where faults are told.
+
+    Args:
+        tasks: each leaves its result on disk.
+        jobs: how many at once.
+        told: is given the index of each task that has ended.
+    """
+    left, running, worst = list(enumerate(tasks)), dict[int, int](), 0
+    try:
+        while left or running:
+            while left and len(running) < jobs:
+                index, task = left.pop(0)
+                running[_begun(task)] = index
+            process, status = os.wait()
+            if process in running:
+                worst = max(worst, os.waitstatus_to_exitcode(status))
+                told(running.pop(process))
+    finally:
+        for process in running:
+            _end(process)
+            os.waitpid(process, 0)
+    return worst
+
+
+def _begun(task: Callable[[], int]) -> int:
+    """Begin a task in a process that an interrupt of the terminal reaches through its parent alone."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    process = os.fork()
+    if process:
+        return process
+    code = 0
+    try:
+        os.setpgid(0, 0)
+        _die_with_parent()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
+            signal.signal(number, signal.SIG_DFL)
+        code = watched(lambda: _quietly(task))
+    finally:
+        os._exit(code)
+
+
+def _quietly(task: Callable[[], int]) -> int:
+    with suppress(Exception):
+        return task()
+    return 0
 
 
 class _Watch:

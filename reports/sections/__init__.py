@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from crossbody.cases.registry import Registry
-from crossbody.reports.pages.section import Section
+from crossbody.reports.figures.section import Section
 
 
 class Study(Protocol):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from crossbody.reports.pages.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns, records
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Equilibria and linear models"

@@ -11,10 +11,10 @@ import numpy as np
 from crossbody import engines
 from crossbody.cases import Case, CrossbodyError, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import Truth, from_run
-from crossbody.reports.metrics._align import matched
-from crossbody.reports.metrics._contacts import contacts
+from crossbody.reports.measuring.alignment import matched
+from crossbody.reports.measuring.truth import Truth, from_run
 
 SHARES = (33, 49)
 """How many instants of a run are looked at, evenly and from 1e-12 of the horizon on by their logarithm."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from crossbody.cases import InvalidValue, Tier, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.reports.judging.truth import Truth, from_run
-from crossbody.reports.metrics._align import aligned
-from crossbody.reports.metrics._contacts import contacts
+from crossbody.cases.contacts import contacts
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.truth import Truth, from_run
 from crossbody.reports.testing._offence import Signal, fail_if_any
 
 if TYPE_CHECKING:

@@ -14,8 +14,9 @@ from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, installed
 from crossbody.engines import Run
 from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
-from crossbody.reports.judging.truth import Truth, truth_of
+from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Verdict
+from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import jobs
 from crossbody.reports.runs.jobs import Pick
 from crossbody.reports.testing._parameters import Scene

@@ -15,8 +15,8 @@ import pytest
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reports.judging.truth import Truth
     from crossbody.reports.judging.verdict import Verdict
+    from crossbody.reports.measuring.truth import Truth
     from crossbody.reports.runs.jobs import Pick
     from crossbody.reports.testing._baseline import Baseline
     from crossbody.reports.testing._bench import Bench, Chosen

@@ -10,14 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Law, Value
+from crossbody.cases.case import Value
 from crossbody.cases.errors import SceneError
 from crossbody.cases.parameters import spread
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene, Shape, Tendon, Vector
 
 FROZEN = ("sequential", "simultaneous")
 SLOWER = 1e-4
@@ -97,19 +99,63 @@ def _arrival(parameters: Mapping[str, Value], mechanism: str) -> float:
     return 2.0 * math.sqrt(g * length) * abs(math.sin(0.5 * angle))
 
 
-def law(balls: Row, collisions: str) -> Law:
-    """Constants of the n - 1 rows.
+def law(balls: Row, collisions: str) -> RowLaw:
+    """Return the constants of every row.
 
     A frozen collision takes no time, so its constants are those of COLLISION, beta = (a0, 2 zeta sqrt(a0)). What is
     captured is held with a hundredth of their frequency and no oscillation (a double pole): it starts at h = h' = 0,
     has nothing to work off, and must not make the equations stiff again. Resolved, one set does everything: a second
     one would change the potential of spec 1.2 at the hand-over, and with it what is to be shown.
     """
-    rows = balls.n - 1
     w = math.sqrt(balls.a0)
-    fast = (balls.a0, 2.0 * balls.zeta * w)
-    slow = (SLOWER * balls.a0, 2.0 * math.sqrt(SLOWER) * w)
-    a, b = (slow, fast) if collisions in FROZEN else (fast, (0.0, 0.0))
-    full = (np.full(rows, value) for value in (*a, *b))
-    a0, a1, b0, b1 = full
-    return Law(a0=a0, a1=a1, a2=np.zeros(rows), b0=b0, b1=b1, unilateral=np.ones(rows, dtype=np.bool_))
+    a0, a1 = balls.a0, 2.0 * balls.zeta * w
+    if collisions not in FROZEN:
+        return RowLaw(a0=a0, a1=a1)
+    return RowLaw(a0=SLOWER * a0, a1=2.0 * math.sqrt(SLOWER) * w, b0=a0, b1=a1)
+
+
+def scene(parameters: Mapping[str, Value], mechanism: str, law: RowLaw) -> Scene:
+    """Return the balls on slides along x, or on strings beside each other; a tendon is what lies between neighbours.
+
+    Args:
+        parameters: of the case.
+        mechanism: "sliders", or "pendulums", of points at the ends of strings.
+        law: of every row.
+    """
+    radius, gap = float(parameters["radius"]), float(parameters["gap"])
+    hung = (0.0, 0.0, -float(parameters["length"]) if mechanism == "pendulums" else 0.0)
+    kinds = {"sliders": ("slide", (1.0, 0.0, 0.0)), "pendulums": ("hinge", (0.0, -1.0, 0.0))}
+    kind, axis = kinds[mechanism]
+    names = [f"ball {i}" for i in range(int(parameters["n"]))]
+    placed = [(i * (2.0 * radius + gap), 0.0, -hung[2]) for i in range(len(names))]
+    reaches = [(b[0] - a[0] - gap, gap) for a, b in pairwise(placed)]  # 2 r as places are rounded: a gap of 0 is 0
+    between = zip(pairwise(names), reaches, strict=True)
+    balls = zip(names, placed, masses(parameters).tolist(), strict=True)
+    return Scene(
+        bodies=tuple(Body(name=name, position=at, mass=mass, com=hung) for name, at, mass in balls),
+        joints=tuple(Joint(name=name, body=name, type=kind, axis=axis) for name in names),
+        shapes=tuple(Shape(name=name, body=name, size=(radius, 0.0, 0.0), position=hung) for name in names),
+        tendons=tuple(_between(mechanism, pair, hung, ends, law) for pair, ends in between),
+        gravity=(0.0, 0.0, -float(parameters["gravity"]) if mechanism == "pendulums" else 0.0),
+    )  # fmt: skip
+
+
+def _between(mechanism: str, pair: tuple[str, str], point: Vector, reach: tuple[float, float], law: RowLaw) -> Tendon:
+    """Return what lies between neighbours: a difference of coordinates, 0 of sliders that touch, or their distance.
+
+    Args:
+        mechanism: of the case.
+        pair: names of the neighbours.
+        point: where the ball is in its body, m.
+        reach: distance at which they touch, and their gap at rest, m.
+        law: of the row.
+    """
+    name, (touching, gap) = contact(pair), reach
+    if mechanism == "sliders":
+        return Tendon(name=name, joints=pair, coefficients=(-1.0, 1.0), range=(-gap, math.inf), law=law)
+    return Tendon(name=name, bodies=pair, positions=(point, point), range=(touching, math.inf), law=law)
+
+
+def contact(pair: tuple[str, str]) -> str:
+    """Return the name of the row of two neighbours."""
+    return f"{pair[0].replace(' ', 's ')} and {pair[1].split()[-1]}"

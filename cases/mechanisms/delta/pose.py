@@ -60,6 +60,16 @@ def _arm(p: Numbers, own: Floats) -> Floats:
     return np.array([math.atan2(ez, ey), math.atan2(math.hypot(own[0], z - ez), y - ey), math.atan2(own[0], z - ez)])
 
 
+def flanges(p: Numbers, q: Floats) -> Floats:
+    """Flange (n, 3), m, of poses q (n, 9): the mean of the tips of its arms, which one loop gap parts at most."""
+    a, b, c = np.moveaxis(q.reshape(-1, 3, 3), -1, 0)
+    x = p["l2"] * np.sin(b) * np.sin(c)
+    y = _offset(p) + p["l1"] * np.cos(a) + p["l2"] * np.cos(b)
+    z = p["l1"] * np.sin(a) + p["l2"] * np.sin(b) * np.cos(c)
+    mean: Floats = np.einsum("ijk,nik->nij", rotations(p), np.stack([x, y, z], axis=-1)).mean(axis=1)
+    return mean
+
+
 def symmetric_pose(p: Numbers, y: float) -> Floats:
     """Angles (9,) with all motors at y, rad, and the flange on the axis below the elbows.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Coordinate, Inputs, Law, Parameter, Value
+from crossbody.cases.mechanisms.delta.metrics import FOLLOWING, METRICS
 
 ROBOT = {
     "r_base": Parameter(default=0.125, unit="m", doc="radius of the hinges on the base", low=0.0),
@@ -75,6 +76,7 @@ def scene(
         v0=v0,
         t_end=float(parameters["t_end"]),
         law=law,
+        metrics={**METRICS, **(FOLLOWING if "period" in parameters else {})},
         units={k: parameter.unit for k, parameter in table.items()},
         **more,
     )

@@ -1,0 +1,166 @@
+"""A log cut into windows, each of which a model is started in anew from what was measured there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crossbody.cases import InvalidValue, SceneError, arguments
+from crossbody.hw.models._contract import Floats, Model, Segment
+from crossbody.hw.reading.log import Log
+from crossbody.hw.windows.impacts import impacts, least_of
+from crossbody.hw.windows.rates import rates_by_fit
+from crossbody.hw.windows.turns import advanced
+
+FEWEST = 8
+"""Samples of a window."""
+SAME = 1e-6
+"""Of a sample: two times this near are one."""
+BESIDE = 3
+"""Samples on each side of an impact at which no polynomial through neighbours gives a rate."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Window:
+    """One stretch of a log.
+
+    Attributes:
+        t (n,): recorded times, s; both ends belong to it.
+        age (n, k): how long after the window's beginning each measured value was true, s: its delay taken off.
+        y (n, k): measured coordinates.
+        u (n, nu): recorded inputs, in force from each time on.
+        segment: what a model needs to run it.
+        log: its rows.
+    """
+
+    t: Floats
+    age: Floats
+    y: Floats
+    u: Floats
+    segment: Segment
+    log: Log
+
+
+def windows(
+    log: Log, model: Model, restart: float | None = None, delay: float = 0.0, horizon: float | None = None
+) -> tuple[Window, ...]:
+    """Cut a log.
+
+    Where rates are not recorded, a window that would start beside an impact starts behind it: samples within three of
+    an impact show neither the rate before it nor the one behind.
+
+    Args:
+        log: what was recorded.
+        model: what it is replayed on.
+        restart: time from one restart to the next, s; 0 for one window; the model's usual one if None.
+        delay: of the measured coordinates beyond what the column map says, s.
+        horizon: length of a window, s; up to the next restart if None. Longer ones overlap.
+
+    Raises:
+        SceneError: if the log lacks a coordinate, or a whole window.
+        InvalidValue: for a restart or a horizon outside its range.
+    """
+    model.check_log(log)
+    length = model.restart if restart is None else arguments.real("restart", restart)
+    delay = arguments.real("delay", delay)
+    if not 0.0 <= length < math.inf:
+        raise InvalidValue(f"restart is {length!r} s; it must be at least 0 (0: one free run).")
+    reach = length if horizon is None else arguments.real("horizon", horizon)
+    if not 0.0 <= reach < math.inf or (length == 0.0 and reach > 0.0) or (length > 0.0 and reach == 0.0):
+        raise InvalidValue(f"horizon is {reach!r} s; it must be above 0, and restart too.")
+    y, yd = model.read(model, log)
+    delays = _delays(log, model) + delay
+    driven = any(name in log.names("inputs") for name in model.inputs)
+    u = recorded_inputs(log, model) if driven else np.zeros((len(log), 0))
+    cuts = _cuts(log.time, length, reach)
+    if yd is None:
+        if model.falls >= 0:
+            cuts = _behind_impacts(log.time, y[:, model.falls], cuts)
+        starts = np.array([a for a, _ in cuts])
+        yd = np.zeros_like(y)
+        yd[starts] = rates_by_fit(log.time, y, starts)
+    return tuple(_window(log, y, yd, u, delays, model.turns, a, b) for a, b in cuts)
+
+
+def recorded_inputs(log: Log, model: Model) -> Floats:
+    """The inputs that drive a model (n, nu), in force from each of the log's times on.
+
+    Their delays, which the column map tells, are taken off, to the next sample.
+
+    Raises:
+        SceneError: naming those that the log does not have.
+    """
+    lacking = [name for name in model.inputs if name not in log.names("inputs")]
+    if lacking:
+        raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
+    return np.array([_in_force(log, name) for name in model.inputs]).reshape(len(model.inputs), len(log)).T
+
+
+def _in_force(log: Log, name: str) -> Floats:
+    channel = log.channel("inputs", name)
+    if channel.delay == 0.0:
+        return channel.values
+    rows = np.searchsorted(log.times("inputs", name), log.time + SAME * log.sample_time, side="right") - 1
+    return channel.values[np.maximum(rows, 0)]
+
+
+def _delays(log: Log, model: Model) -> Floats:
+    """Delay of every compared coordinate (k,), s, as the column map says; one for all where they are made of others."""
+    each = np.array([log.channel("coordinates", name).delay for name in model.channels])
+    return np.full(len(model.measured), each[0]) if model.needs else each
+
+
+def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:
+    """First and last row of every whole window."""
+    if restart == 0.0:
+        return [(0, len(t) - 1)]
+    starts = t[0] + restart * np.arange(max(0, int((t[-1] - t[0] - length) / restart + 1e-9) + 1))
+    edges = np.searchsorted(t, np.stack([starts, starts + length]) - 1e-9 * length)
+    found = [(int(a), int(b)) for a, b in edges.T if b - a >= FEWEST and b < len(t)]
+    if not found:
+        raise SceneError(
+            f"The log spans {t[-1] - t[0]:g} s with {len(t)} samples: no window of {length:g} s with {FEWEST} of them."
+        )
+    return found
+
+
+def _behind_impacts(t: Floats, y: Floats, cuts: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The same windows, but for starts that stand beside an impact; a window too short for that stays as it is."""
+    hits = impacts(t, y, least_of(t, y)).t
+    beside = np.zeros(len(t), dtype=bool)
+    for row in np.searchsorted(t, hits):
+        beside[max(0, row - BESIDE) : row + BESIDE + 1] = True
+    moved = [(a + int(np.argmin(beside[a:])), b) for a, b in cuts]
+    return [new if new[1] - new[0] >= FEWEST else old for new, old in zip(moved, cuts, strict=True)]
+
+
+def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, turns: Sequence[int], a: int, b: int) -> Window:
+    rows = slice(a, b + 1)
+    t = log.time[rows]
+    age = (t - t[0])[:, None] - delays
+    # The state at the window's beginning was measured a delay later: the rate carries it there.
+    start, rate = advanced(y[a], yd[a], delays, turns), yd[a]
+    driven = bool(u.shape[1])
+    segment = Segment(
+        y=start, yd=rate, t_end=float(t[-1] - t[0]), times=t[:-1] - t[0] if driven else np.zeros(0),
+        inputs=u[a:b] if driven else np.zeros((0, 0)),
+    )  # fmt: skip
+    last = float(log.time[b]) if b + 1 == len(log) else float(log.time[b + 1])
+    kept = log.window(float(t[0]), np.nextafter(last, math.inf) if b + 1 == len(log) else last)
+    return Window(t=t, age=age, y=y[rows], u=u[rows], segment=segment, log=kept)
+
+
+def overlap(cut: Sequence[Window]) -> int:
+    """How many of the windows behind it a window has samples in common with, at most; other logs begin anew."""
+    found = 0
+    for i, window in enumerate(cut):
+        count, last = 0, window.t[0]
+        for other in cut[i + 1 :]:
+            if not last < other.t[0] < window.t[-1]:
+                break
+            count, last = count + 1, other.t[0]
+        found = max(found, count)
+    return found

@@ -1,0 +1,1 @@
+"""What the commands do: check what is asked, run, judge, write, show."""

@@ -1,0 +1,131 @@
+"""What the command `bench` does: time, compare, write, show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+from pyarrow import ArrowException
+
+from crossbody.cases import CrossbodyError, InvalidValue, OutputError
+from crossbody.reports import voice
+from crossbody.reports.bench import against as bench_against
+from crossbody.reports.bench import measure, scenes, skip, throughput
+from crossbody.reports.bench.headline import headline
+from crossbody.reports.commands.shared import identity, key, where
+from crossbody.reports.pages import site as page
+from crossbody.reports.runs import files, jobs, output, study
+from crossbody.reports.runs.parts import Parts
+from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.runs.watch import LIMIT
+from crossbody.reports.voice import progress
+
+SHOWN = {
+    "bench": ["case", "engine", "profile", "knob", "setting", "error", "honesty", "error_between", "median_ms",
+              "iqr_ms", "call_ms", "native_ms", "control_ms", "outcome"],
+    "orders": ["case", "engine", "profile", "knob", "order", "promised", "says"],
+    "headline": ["case", "engine", "profile", "tier", "best_error", "engine_ms", "reference_ms", "ratio",
+                 "ratio_native", "least_ratio", "ahead", "says"],
+}  # fmt: skip
+
+
+def run(
+    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
+    repeats: int | None, full: bool, against: Path | None, command: str, limit: float = LIMIT,
+    minutes: float = math.inf,
+) -> int:  # fmt: skip
+    """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is run.
+    """
+    cases, picks = scenes.chosen(names, variant, jobs.parse_settings(pairs), full), scenes.picks(wanted)
+    base = None if against is None else bench_against.read(against)
+    if base is not None:
+        bench_against.check_common(base[0], [case.label for case in cases])
+    each = 60.0 * minutes / max(1, len(cases) * len(picks))
+    effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats, each=each)
+    output.check(out, "bench")
+    with Parts(out, command, identity("bench", cases, names, picks=picks, effort=effort)) as parts:
+        with progress(len(cases) * len(picks)) as tell:
+            for i, case in enumerate(cases):
+                if not parts.has(key(i, case)) and len(rows := measure.bench(case, picks, effort, tell, limit)):
+                    with parts.put(key(i, case)) as made:
+                        rows.to_parquet(made / "bench.parquet")
+        done = [parts.part(key(i, case)) for i, case in enumerate(cases) if parts.has(key(i, case))]
+        rows, orders = measure.joined([_part(path) for path in done])
+        if not len(rows):
+            raise InvalidValue(_nothing(picks))
+        tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
+        losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
+        write(out, tables | losses, provenance(command, repeats=effort.repeats))
+    show(tables | (losses if voice.as_json() else {}), out)
+    return tell_losses(losses["lost"], against) if losses else 0
+
+
+def _part(path: Path) -> pd.DataFrame:
+    """The rows of one case that is complete."""
+    try:
+        with files.open_inside(path, "bench.parquet") as file:
+            return pd.read_parquet(file)[list(measure.COLUMNS)]
+    except (OSError, ValueError, KeyError, ArrowException):
+        raise OutputError(f"{path} is no part of a benchmark; remove {path.parent}.") from None
+
+
+def _nothing(picks: Sequence[jobs.Pick]) -> str:
+    absent = " ".join(pick.skipped for pick in picks if pick.skipped)
+    return f"No engine asked for can run a case asked for. {absent}".strip()
+
+
+def write(out: Path, tables: Mapping[str, pd.DataFrame], told: Mapping[str, object]) -> None:
+    """Tables (Parquet, CSV, JSON) and the page, all or nothing; the first table names the study."""
+    with output.folder(out, next(iter(tables))) as made:
+        study.write(made, [], study.judge([], {}), told)
+        for name, table in tables.items():
+            study.write_table(made / name, table, told)
+        page.write(made)
+
+
+def show(tables: Mapping[str, pd.DataFrame], out: Path) -> None:
+    """The tables in the terminal, and where the page is."""
+    for name, table in tables.items() if not voice.told_as_json(tables) and not voice.quiet() else ():
+        print(f"\n{name}")
+        shown = table[SHOWN[name]] if name in SHOWN else table
+        print(shown.to_string(index=False, float_format=lambda x: "-" if math.isnan(x) else f"{x:.3g}"))
+    where(out)
+
+
+def tell_losses(losses: pd.DataFrame, against: Path | None) -> int:
+    """Every loss with its reason; 1 if there is one."""
+    for loss in losses.to_dict(orient="records") if not voice.as_json() else ():
+        print(f"lost {loss['what']}: {loss['case']} {loss['engine']}:{loss['profile']}: {loss['why']}.")
+    if not voice.silent():
+        print(f"Against {against}: {len(losses)} lost.")
+    return int(len(losses) > 0)
+
+
+def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequence[str] = ()) -> int:
+    """Write and show one table of its own; 1 if something in it failed."""
+    if not len(rows):
+        raise CrossbodyError(f"The table {name} has no rows.")
+    write(out, {name: rows}, provenance(command))
+    show({name: rows}, out)
+    for line in failed if not voice.as_json() else ():
+        print(f"outside: {line}")
+    return int(bool(failed))
+
+
+def alone(what: str, asked: tuple[object, ...], repeats: int | None, out: Path, command: str) -> int:
+    """The table of what is skipped, or of the throughput of many runs; the exit code.
+
+    Raises:
+        InvalidValue: if something was asked for that these do not have: they have their own scenes.
+    """
+    if any(asked):
+        raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
+    output.check(out, what)
+    rows = (skip if what == "skip" else throughput).measure(repeats or 5)
+    beyond = rows[~rows["held"].astype(bool)]
+    return table(what, rows, out, command, [str(text) for text in beyond["what"]])

@@ -1,0 +1,261 @@
+"""What `crossbody replay` and `crossbody identify` do: read the log, run, write tables and pages, show the metrics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from crossbody import hw
+from crossbody.cases import CaseUnsupported
+from crossbody.hw import Comparison, Fit, Log
+from crossbody.reports import voice
+from crossbody.reports.commands.shared import identity, where
+from crossbody.reports.judging.verdict import Word, exit_code
+from crossbody.reports.pages import site as page
+from crossbody.reports.replay import comparison as replay
+from crossbody.reports.replay import kept, limits
+from crossbody.reports.runs import jobs, output, study, watch
+from crossbody.reports.runs.jobs import DEFAULT_ENGINES
+from crossbody.reports.runs.parts import Parts
+from crossbody.reports.runs.provenance import provenance
+
+GRACE = 2.0
+"""Times the limit on an identification after which its process is ended: it stops by itself between two runs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """What both commands are told about a log.
+
+    Attributes:
+        path, columns, part, repair: as for `hw.read`.
+        memory: that reading may take over the file's own size, MB.
+        model: name of the model.
+        pairs: K=V, parameters of the model.
+        restart, horizon: s; None for the usual.
+        delay: of the measured coordinates beyond what the map says, s.
+        limits: NAME=VALUE, on metrics of the replay.
+    """
+
+    path: Path
+    columns: str | None
+    part: int | None
+    repair: Sequence[str]
+    model: str
+    pairs: Sequence[str]
+    restart: float | None
+    horizon: float | None
+    delay: float
+    memory: int = 1000
+    limits: Sequence[str] = ()
+
+    def log(self) -> Log:
+        """The log."""
+        room = self.memory * 1_000_000
+        return hw.read(self.path, self.columns, part=self.part, repair=self.repair, memory=room)
+
+
+def _ended(model: str, engine: str) -> bool:
+    """Whether an engine's process was ended, as it was told what it did."""
+    return any(label.startswith((f"{model} on {engine}:", f"{model} on {engine},")) for label in watch.all_lost())
+
+
+def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: str, limit: float = watch.LIMIT) -> int:
+    """Replay a log and write the report.
+
+    Args:
+        ask: log, map and model.
+        kind: "forward" or "closed_loop".
+        wanted: engines, E or E:PROFILE; all usual ones if empty.
+        out: folder to write.
+        command: what was typed, for provenance.
+        limit: time after which an engine that has not come back is ended with its process, s.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is written.
+    """
+    hw.models.load(ask.model)
+    output.check(out, "replay")
+    given = limits.parse(ask.limits)
+    engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
+    if not engines:
+        raise CaseUnsupported(f"No engine that was asked for has come back: {'; '.join(watch.all_lost())}.")
+    log = ask.log()
+    with Parts(out, command, _identity(ask, log, kind, wanted)) as parts, voice.progress(len(engines)) as bar:
+
+        def tell(text: str) -> None:
+            bar(text)
+            watch.limited(text, limit)
+
+        found = hw.replay(
+            log, ask.model, kind=kind, wanted=engines, parameters=jobs.parse_settings(ask.pairs), restart=ask.restart,
+            horizon=ask.horizon, delay=ask.delay, tell=tell, keep=kept.keeper(parts),
+        )  # fmt: skip
+        watch.unlimited()
+        limits.check(given, found)
+        rows = replay.verdicts(found, command, given)
+        _write(out, found, rows, provenance(command, log=replay.log_about(found)), {}, "replay")
+    metrics = _metrics(found, rows)
+    if not voice.told_as_json({"metrics": metrics, "findings": replay.findings(found)}):
+        if not voice.quiet():
+            _say(found, metrics)
+        _say_outside(rows)
+        where(out)
+    return exit_code(rows["verdict"])
+
+
+def _identity(ask: Ask, log: Log, kind: str, wanted: Sequence[str]) -> dict[str, Any]:
+    """What decides what a replay predicts: the numbers of the log, the model and its source, engines and windows."""
+    return identity(
+        f"replay {kind}", (), (), log=asdict(log.provenance), model=ask.model,
+        source=kept.source(hw.models.load(ask.model)), pairs=ask.pairs, windows=(ask.restart, ask.horizon, ask.delay),
+        wanted=wanted,
+    )  # fmt: skip
+
+
+def run_identify(
+    ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, budget: float, out: Path, command: str,
+    limit: float = watch.LIMIT,
+) -> int:  # fmt: skip
+    """Identify parameters, replay the log with them, and write the report.
+
+    Args:
+        ask: log, map and model.
+        free: names of the parameters; "delay" is that of the measured coordinates.
+        hold: every so manieth window is held out.
+        starts: "auto", "measured" or "free".
+        stride: of so many samples one is compared.
+        budget: time that the search may take, s.
+        out: folder to write.
+        command: what was typed, for provenance.
+        limit: time after which it is stopped, s; its process is ended where it does not stop then.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is written.
+    """
+    model = hw.models.load(ask.model)
+    output.check(out, "identify")
+    asked = limits.parse(ask.limits)
+    log, given = ask.log(), jobs.parse_settings(ask.pairs)
+    label = f"{ask.model} identified from {ask.path}"
+    if why := watch.lost(label):
+        raise CaseUnsupported(f"{label}: {why}")
+    watch.resumable("Nothing was replaced; the same command begins anew.")
+    watch.limited(label, GRACE * (1.0 + limit))
+    fit = hw.identify(
+        log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
+        stride=stride, delay=ask.delay, budget=budget, time_limit=limit,
+    )  # fmt: skip
+    found = hw.replay(
+        log, model, wanted=(model.engine,), parameters=fit.parameters, restart=ask.restart, horizon=ask.horizon,
+        delay=ask.delay + fit.delay,
+    )  # fmt: skip
+    watch.unlimited()
+    tables = {"identify": estimates(fit), "held_out": held_out(fit)}
+    told = {
+        "sensitivities": fit.sensitivities, "covariance": fit.covariance, "warnings": list(fit.warnings),
+        "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message, "outcome": fit.outcome,
+    }  # fmt: skip
+    limits.check(asked, found, (limits.HELD,))
+    rows = replay.verdicts(found, command, asked, fit)
+    tables["held_out"]["verdict"] = _held_verdicts(fit, rows)
+    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables, "identify")
+    more = {"warnings": pd.DataFrame({"text": list(fit.warnings)}), "metrics": _metrics(found, rows)}
+    if not voice.told_as_json(tables | more):
+        if not voice.quiet():
+            for shown in tables.values():
+                print(shown.to_string(index=False, float_format=lambda x: f"{x:.6g}"), end="\n\n")
+            print(f"{fit.sensitivities}\nIntervals: {fit.covariance}")
+        for warning in fit.warnings:
+            print(f"warning: {warning}")
+        _say_outside(rows)
+        where(out)
+    return exit_code(rows["verdict"]) if fit.success else 1
+
+
+def estimates(fit: Fit) -> pd.DataFrame:
+    """One row an identified parameter."""
+    halves = {one.name: one.values for one in fit.agreement}
+    return pd.DataFrame(
+        {
+            "name": e.name, "value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "start": e.start,
+            "identifiable": e.identifiable, "std": e.std, "freedom": e.freedom, "kept_low": e.kept_low,
+            "kept_high": e.kept_high, "first_half": halves.get(e.name, (math.nan, math.nan))[0],
+            "second_half": halves.get(e.name, (math.nan, math.nan))[1],
+        } for e in fit.estimates
+    )  # fmt: skip
+
+
+def held_out(fit: Fit) -> pd.DataFrame:
+    """One row a kind of error: with the parameters at the start and with the estimates, fitted windows and others."""
+    return pd.DataFrame(
+        {
+            "error": name, "fitted_before": fit.before[name][0], "fitted_after": fit.after[name][0],
+            "held_before": fit.before[name][1], "held_after": fit.after[name][1],
+            "change": 100.0 * (fit.after[name][1] / fit.before[name][1] - 1.0),
+        } for name in fit.before
+    )  # fmt: skip
+
+
+def _held_verdicts(fit: Fit, rows: pd.DataFrame) -> list[str]:
+    """What is said of every row of `held_out`: the rmse alone is judged."""
+    word = rows.loc[rows["metric"] == limits.HELD, "verdict"]
+    return [word.iloc[0] if name == "rmse" and len(word) else Word.INFO.value for name in fit.before]
+
+
+def _metrics(found: Comparison, rows: pd.DataFrame) -> pd.DataFrame:
+    """Every metric with its channel, and what the verdicts say of it."""
+    columns = ["who", "metric", "channel", "value", "unit", "expected", "limit", "verdict"]
+    said = rows.drop_duplicates(["engine", "profile", "metric"]).set_index(["engine", "profile", "metric"])
+    told = [
+        {"who": f"{r.engine}:{r.profile}", "metric": r.metric, "channel": r.channel, "value": r.value, "unit": r.unit}
+        | said.loc[(r.engine, r.profile, limits.label(r)), ["expected", "limit", "verdict"]].to_dict()
+        for r in found.rows()
+    ]  # fmt: skip
+    return pd.DataFrame(told, columns=columns)
+
+
+def _say_outside(rows: pd.DataFrame) -> None:
+    """One line a number that is outside its limit."""
+    for row in rows[rows["verdict"] == Word.OUTSIDE].to_dict(orient="records"):
+        best = f" of {row['expected']:g}" if row["expected"] else ""
+        print(
+            f"outside: {row['engine']}:{row['profile']} {row['metric']} is {row['value']:.4g} {row['unit']}, limit "
+            f"{row['limit']:.4g}{best}. {row['why']}"
+        )
+
+
+def _say(found: Comparison, metrics: pd.DataFrame) -> None:
+    print(f"{replay.tier(found.log)}: {found.log.provenance.file} on {found.model}, {len(found.windows)} windows")
+    for finding in found.log.findings:
+        print(f"note: {finding.channel}, row {finding.row}: {finding.text}")
+    named = (metrics["metric"] + " " + metrics["channel"]).str.strip() + " [" + metrics["unit"] + "]"
+    wide = metrics.assign(metric=named).pivot(index="metric", columns="who", values="value").loc[named.unique()]
+    print(wide.to_string(float_format=lambda x: f"{x:.5g}"))
+    for (engine, profile), why in found.skipped.items():
+        print(f"skipped {engine}:{profile}: {why}")
+
+
+def _write(
+    out: Path,
+    found: Comparison,
+    rows: pd.DataFrame,
+    told: Mapping[str, Any],
+    more: Mapping[str, pd.DataFrame],
+    name: str,
+) -> None:
+    with output.folder(out, name) as made:
+        study.write(made, [], rows, told)
+        tables = {
+            "replay": _metrics(found, rows), "findings": replay.findings(found), "residuals": replay.residuals(found),
+            "correlations": replay.correlations(found), **more,
+        }  # fmt: skip
+        for stem, shown in tables.items():
+            study.write_table(made / stem, shown, told)
+        replay.save_motions(made / "traces", found)
+        page.write(made)

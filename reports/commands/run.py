@@ -1,0 +1,185 @@
+"""What the command `run` does: run, judge, write, show."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from crossbody.cases import Case, InvalidValue, installed
+from crossbody.engines.equations import known, system_of
+from crossbody.reports import voice
+from crossbody.reports.judging.audit import SEED
+from crossbody.reports.judging.parts import PARTS, part_of
+from crossbody.reports.judging.verdict import Regression, Word, exit_code
+from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.pages import grid, html, results, site
+from crossbody.reports.runs import files, jobs, output, store, study, watch
+from crossbody.reports.runs.parts import Parts
+from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.runs.watch import LIMIT
+from crossbody.reports.voice import progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+from crossbody.reports.commands.shared import OF_USERS, identity, key, where
+
+WRONG = [Word.OUTSIDE, Word.CRASHED]
+WIDTH = 150  # of the table in a file or a pipe
+SHOWN = {"position": "position", **{part_of("position", part): part for part in PARTS}}
+"""Metrics in the terminal and their heads: the parts of the worst error of position add up to it."""
+COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
+
+
+def run(
+    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
+    rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
+    limit: float = LIMIT, strict: bool = False, at_once: int = 1,
+) -> int:  # fmt: skip
+    """Run, judge, write and show; the exit code.
+
+    `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one;
+    `limit` is the time that an engine may take for one case, s; `strict` makes a number wrong that left its
+    regression band; `at_once` is how many cases are run at once, in processes of their own.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is written.
+    """
+    if rtol is not None and not 1e-14 <= rtol <= 1e-1:
+        raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
+    cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
+    for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
+        click.echo(f"note: {sentence}", err=True)
+    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
+    output.check(out, "run")
+    site.check(against, others)
+    told = provenance(command, rtol=rtol, seed=SEED)
+    with Parts(out, command, identity("run", cases, names, picks=picks, rtol=rtol, settings=asked)) as parts:
+
+        def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
+            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit)
+            with parts.put(key(i, cases[i])) as made:
+                study.write_case(made, result, repeat(cases[i], names, pairs, rtol, settings))
+            return 0
+
+        lost = _beside(cases, parts, do, at_once)
+        with progress(len(cases) * (len(picks) + 1)) as tell:
+            for i in _missing(cases, parts):
+                do(i, tell)
+        with output.folder(out, "run") as made:
+            rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
+            site.write(made, against=against, others=others)
+    if voice.as_json():
+        print(voice.rows_as_json(rows))
+    else:
+        if any(case.control is not None for case in cases) and not voice.quiet():
+            show_controllers(out)
+        show(rows, out)
+    return max(lost, exit_code(rows["verdict"], rows["regression"] if strict else ()))
+
+
+def _missing(cases: Sequence[Case], parts: Parts) -> list[int]:
+    """Cases whose part is not there."""
+    return [i for i, case in enumerate(cases) if not parts.has(key(i, case))]
+
+
+def _beside(cases: Sequence[Case], parts: Parts, do: Callable[[int], int], at_once: int) -> int:
+    """Run the missing cases in processes beside this one; 1 if a run in one of them had to be ended, else 0."""
+    missing = _missing(cases, parts)
+    if min(at_once, len(missing)) < 2:
+        return 0
+    with progress(len(missing)) as tell:
+        return min(watch.beside([partial(do, i) for i in missing], at_once, lambda k: tell(cases[missing[k]].label)), 1)
+
+
+def findings(case: Case) -> tuple[str, ...]:
+    """Return sentences on what is strange in a case, and in the equations of a scene with loops."""
+    if case.scene is None or not case.scene.loops or not known(case):
+        return case.findings
+    return (*case.findings, *system_of(case).findings)
+
+
+def repeat(
+    case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
+) -> str:
+    """The command that reproduces the rows of one case, but for its engine."""
+    own = (name for name in names if name.endswith(OF_USERS) and case.name in (Path(name).stem, Path(name).name))
+    source = next(own, case.name)
+    words = ["crossbody", "run", source, "--variant", case.variant]
+    words += [word for pair in pairs for word in ("--set", pair)]
+    words += [word for pair in settings for word in ("--setting", pair)]
+    words += ["--rtol", f"{rtol:g}"] if rtol is not None else []
+    return shlex.join(words + installed.options())
+
+
+def show(rows: pd.DataFrame, out: Path) -> None:
+    """One line a run with its worst errors and verdicts, every row that is outside, and where the report is."""
+    from rich.console import Console
+
+    console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
+    if not voice.quiet():
+        console.print(_summary(rows, results.times_of(out)))
+        counts = rows["verdict"].value_counts()
+        console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
+    told = rows[rows["verdict"].isin(WRONG if voice.quiet() else [Word.SKIPPED, *WRONG])]
+    for row in told.to_dict(orient="records"):
+        run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
+        number = (
+            f" {row['value']:.4g} {row['unit']}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
+        )
+        text = f"{row['verdict']}: {run} {row['metric']}{number}. {row['why']}"
+        console.print(text, soft_wrap=True, highlight=False, markup=False)
+    lost = rows[rows["regression"] == Regression.LOST]
+    for row in lost.to_dict(orient="records"):
+        run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
+        text = f"more than a stored run gave: {run} {row['metric']} {row['value']:.4g} {row['unit']}"
+        console.print(f"{text}, band {row['band']:.3g}", soft_wrap=True, highlight=False, markup=False)
+    where(out)
+
+
+def show_controllers(out: Path) -> None:
+    """Print how much of each run's time was spent in a controller of the user's own."""
+    told = [store.peek(out / "traces" / name) for name in files.listed(out, "traces")]
+    for one in told:
+        about = one["about"]
+        if one.get("control_s") and about["engine"] != TRUTH:
+            run = f"{about['case']}:{about['variant']} {about['engine']}:{about['profile']}"
+            part = one["control_s"] / one["wall_s"]
+            print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")
+
+
+def _summary(rows: pd.DataFrame, times: Mapping[tuple[str, str], tuple[float, float | None]]) -> Any:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("case", "engine"):
+        table.add_column(name, no_wrap=True)
+    for name in (*SHOWN.values(), "run time", "in all", Word.WITHIN, "expected", Word.OUTSIDE):
+        table.add_column(name, justify="right", no_wrap=True)
+    for (case, variant, engine, profile), run in rows.groupby(["case", "variant", "engine", "profile"], sort=False):
+        values = run.drop_duplicates("metric").set_index("metric")[["value", "known"]].T.to_dict()
+        counts = run["verdict"].value_counts()
+        label, who = f"{case}:{variant}", f"{engine}:{profile}"
+        table.add_row(
+            label, who, *(_short(**values.get(metric, {})) for metric in SHOWN),
+            *map(grid.duration, times.get((label, who), (None, None))),
+            *(_count(int(counts.get(word, 0)), word) for word in (Word.WITHIN, Word.EXPECTED, Word.OUTSIDE)),
+        )  # fmt: skip
+    return table
+
+
+def _short(value: float = math.nan, known: float = math.nan) -> str:
+    """A number in two digits, or below what it is known to."""
+    below, number = html.bounded(value, known)
+    return "-" if number != number else f"{below}{number:.1e}"
+
+
+def _count(count: int, word: Word) -> str:
+    return f"[{COLOURS[word]}]{count}[/]" if count else "[dim]0[/]"

@@ -1,0 +1,47 @@
+"""What commands share: what decides their result, and where their report is."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from crossbody.cases import Case, installed
+from crossbody.cases.files.reading import SUFFIXES
+from crossbody.reports import voice
+from crossbody.reports.pages import site
+
+if TYPE_CHECKING:
+    pass
+
+
+OF_USERS = (".py", *SUFFIXES)
+"""How names of files end that are cases."""
+
+
+def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:
+    """What decides what a command computes: the sources too, and case files of one's own."""
+    from crossbody.reports.sweep.store import code
+
+    paths = [*(name for name in names if name.endswith(OF_USERS)), *_acting(cases)]
+    own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in paths]
+    scenes = [[case.label, dict(case.parameters)] for case in cases]
+    return {"kind": kind, "code": code(), "cases": scenes, "files": own, "plugins": installed.digests(), **more}
+
+
+def _acting(cases: Sequence[Case]) -> list[str]:
+    """Files that say what acts on the cases: tables of controls, controllers."""
+    told = [(str(case.parameters.get("ctrl", "")), str(case.parameters.get("control", ""))) for case in cases]
+    return sorted({name for table, control in told for name in (table, control.rpartition(":")[0]) if name})
+
+
+def key(number: int, case: Case) -> str:
+    """What tells the part of a case from those of the others, which may have its name."""
+    return f"{number} {case.label}"
+
+
+def where(out: Path) -> None:
+    """The path of the report, unless nothing but what is wrong is to be said."""
+    if not voice.silent():
+        print(f"Report: {(out / site.PAGE).absolute()}")

@@ -1,0 +1,82 @@
+"""What `crossbody list` prints: everything that has a name, or what one case can be asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from crossbody.cases import Parameter
+
+Named = dict[str, dict[str, str]]
+"""Heading -> name -> one line."""
+EVERYTHING = "(-inf, inf)"
+
+
+def everything() -> Named:
+    """Return all that has a name; imports none of it."""
+    from crossbody import cases, engines
+    from crossbody.hw import models
+    from crossbody.reports import metrics, suites
+
+    sources = {"Cases": cases, "Engines": engines, "Metrics": metrics, "Stress suites": suites}
+    sources["Models of logs"] = models
+    return {title: {name: source.summary(name) for name in source.names()} for title, source in sources.items()}
+
+
+def case(name: str) -> Named:
+    """Return variants, parameters, rows and own metrics of a case.
+
+    Args:
+        name: of a case, or the path of a file with one.
+
+    Raises:
+        CrossbodyError: if there is no such case.
+    """
+    from crossbody import cases
+    from crossbody.cases import loading
+
+    source = loading.module(name)
+    found = {variant: cases.load(name, variant) for variant in source.VARIANTS}
+    parameters = {key: _parameter(each) for key, each in source.PARAMETERS.items()}
+    own = {key: f"{metric.doc} [{metric.unit}]" for one in found.values() for key, metric in one.metrics.items()}
+    rows = {row: "" for one in found.values() for row in one.contacts}
+    told = {
+        "Variants": {variant: one.title for variant, one in found.items()},
+        "Parameters": parameters, "Rows": rows, "Metrics of its own": own,
+    }  # fmt: skip
+    return {title: named for title, named in told.items() if named}
+
+
+def _parameter(one: Parameter) -> str:
+    """Return its sentence, its default with the unit, and what is valid where that is bounded."""
+    default = f"{one.default:g}" if isinstance(one.default, float) else str(one.default)
+    told = [f"{default} {one.unit}".strip(), "" if one.valid == EVERYTHING else one.valid]
+    return f"{one.doc} ({'; '.join(filter(None, told)) or 'empty'})"
+
+
+def engine(name: str) -> Named:
+    """Return profiles of an engine, and versions of its packages.
+
+    Raises:
+        CrossbodyError: if there is no such engine, or it is not installed.
+    """
+    from crossbody import engines
+
+    found = engines.load(name)
+    return {"Profiles": dict(found.profiles), "Versions": dict(found.versions)}
+
+
+def one(name: str) -> Named:
+    """Return what can be asked of the case, file or engine of that name."""
+    from crossbody import engines
+
+    return engine(name) if name in engines.names() else case(name)
+
+
+def text(told: Named) -> str:
+    """Return it as aligned lines."""
+    lines = []
+    for title, named in told.items():
+        width = max(map(len, named), default=0)
+        lines += [f"{title}:", *(f"  {name:<{width}}  {line}".rstrip() for name, line in named.items())]
+    return "\n".join(lines)

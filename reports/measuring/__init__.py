@@ -1,0 +1,1 @@
+"""What metrics share: the truth, runs laid beside it, what errors are measured by."""

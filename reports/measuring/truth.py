@@ -1,0 +1,73 @@
+"""What a run is measured against: a motion that is taken to be right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from crossbody.cases import Tier, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.cases.between import between
+
+TRUTH = "truth"
+"""Name of the truth where engines have theirs, and of the row that judges it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """A motion that is taken to be right.
+
+    Attributes:
+        tier: how it is known.
+        source: in words, with the agreement of tier C.
+        trajectory: the motion, dense enough to plot, both sides of every event.
+        at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
+        agreement: metric -> how far the two sources of tier C are apart; empty for the others.
+        trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
+        parted: when the two sources part, s; infinite if they never do.
+        allowed: largest disagreement of the two sources, relative; NaN where there is one source alone.
+        growth: rate at which the two part, 1/s; NaN unless they do.
+        grows: how many times more than in free flight an error of the start grows; 1 where it was not measured.
+        tight: tolerance of the compiled run; NaN of another source.
+        joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
+            each other and rest unloaded.
+    """
+
+    tier: Tier
+    source: str
+    trajectory: Trajectory
+    at: Callable[[Floats], Trajectory]
+    agreement: dict[str, float]
+    trusted: float = math.inf
+    parted: float = math.inf
+    allowed: float = math.nan
+    growth: float = math.nan
+    tight: float = math.nan
+    grows: float = 1.0
+    joined: bool = False
+
+
+def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
+    """Times that show a motion: a grid, more of them from each event to the next if that is short, events twice.
+
+    Args:
+        run: whose events.
+        t_end: horizon, s.
+        grid: points on the horizon.
+        inside: points on each interval between events that is shorter than a tenth of the horizon.
+    """
+    events = np.array([e.t for e in run.events if e.t <= t_end])
+    parts = [np.linspace(0.0, t_end, grid)]
+    edges = np.unique(np.concatenate([[0.0], events, [t_end]]))
+    parts += [np.linspace(a, b, inside)[1:-1] for a, b in pairwise(edges) if b - a < 0.1 * t_end]
+    times: Floats = np.sort(np.concatenate([np.unique(np.concatenate([*parts, events])), events]))
+    return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
+
+
+def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:
+    """A run as the truth for others: an engine refined against itself, or a measurement."""
+    return Truth(tier=tier, source=source, trajectory=run, at=between(run), agreement={})

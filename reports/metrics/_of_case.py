@@ -1,0 +1,35 @@
+"""A metric that a case brings along, measured like the others."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crossbody.reports.measuring.alignment import aligned
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.cases.metric import CaseMetric
+    from crossbody.reports.measuring.truth import Truth
+
+
+class OfCase:
+    """A metric that a case brings along."""
+
+    def __init__(self, own: CaseMetric) -> None:
+        self.own, self.UNIT, self.CLAIMED = own, own.unit, not own.always
+
+    def measure(self, truth: Truth, run: Trajectory, case: Case) -> float | None:
+        """Return the number, or None where the run cannot tell."""
+        own = self.own
+        if own.number is not None:
+            return own.number(run, case)
+        if own.signal is not None:
+            inside, exact = aligned(truth, run)
+            return float(np.max(np.abs(own.signal(run, case)[inside] - own.signal(exact, case)), initial=0.0))
+        assert own.instants is not None
+        expected, found = own.instants(truth.trajectory, case), own.instants(run, case)
+        if len(expected) == 0 or len(expected) != len(found):
+            return None
+        return float(np.max(np.abs(found - expected)))

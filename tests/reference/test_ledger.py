@@ -1,0 +1,114 @@
+"""The energy account of spec 1.4: E(t) - E(0) = input - dissipated + work of every row."""
+
+import numpy as np
+import pytest
+from gusty import gusty
+from mechanisms import ball, flyby, oscillator, sliders
+from wall_pendulum import wall_pendulum
+
+from crossbody import cases, engines
+from crossbody.cases import Outcome
+from crossbody.reference import System, kernels, simulate
+
+SCENES = {
+    "listing": (ball(), [1.0], [0.0], {}),
+    "elastic": (ball(a1=0.0), [1.0], [0.0], {}),
+    "start below": (ball(), [-0.01], [0.0], {}),
+    "oscillator": (oscillator(-0.5), [1.0], [0.0], {}),
+    "pendulum": (flyby(1.0, 9.81, a0=25.0, a1=10.0, unilateral=False), [1.0, 0.0], [0.0, 0.0], {}),
+    "sliders": (sliders(4, a1=30.0), [0.0, 0.01, 0.02, 0.03], [1.0, 0.0, 0.0, 0.0], {}),
+    "stiff rest": (ball(a0=1e8, a1=2e4, a2=0.0), [0.01], [0.0], {}),
+}
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("name", SCENES)
+def test_ledger_closes(name, rtol):
+    system, q0, v0, more = SCENES[name]
+    run = simulate(system, q0, v0, 2.0, rtol=rtol, ledger=True, **more)
+    assert run.outcome.ok, run.message
+    account = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
+    residual = run.total_energy - run.total_energy[0] - account
+    scale = run.energy[:, 0].max() + np.ptp(run.energy[:, 1])
+    assert np.abs(residual).max() < 200.0 * rtol * scale + 1e-13
+
+
+@pytest.mark.parametrize("pole", [1e3, 3e3, 1e4])
+def test_ledger_closes_inside_long_steps_of_stiff_rows_too(pole):
+    """At samples between the ends of implicit steps, while a force drives a pendulum through a fluid."""
+    system, grid = wall_pendulum(5.0, pole=pole, drag=0.5), np.linspace(0.0, 2.0, 977)
+    for rtol in (1e-6, 1e-7):
+        run = simulate(
+            system, [np.sin(-0.5), -np.cos(0.5)], [0.0, 0.0], 2.0, rtol=rtol, ledger=True, samples=grid,
+            inputs=([0.0, 0.5], [[1.0], [-2.0]]),
+        )  # fmt: skip
+        assert run.counts["implicit_steps"] > 10
+        account = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
+        residual = run.total_energy - run.total_energy[0] - account
+        assert np.abs(residual).max() < 10.0 * rtol * run.energy[:, 0].max()
+
+
+def test_work_of_one_bounce_is_the_law_s():
+    # No gravity, linear law: the row takes m v^2 (1 - e^2) / 2.
+    system = ball(a0=1e4, a1=40.0, a2=0.0, gravity=0.0)
+    run = simulate(system, [0.01], [-1.0], 0.1, rtol=1e-11, ledger=True)
+    assert run.ledger.contact[-1, 0] == pytest.approx(0.5 * (run.v[-1, 0] ** 2 - 1.0), rel=1e-9)
+
+
+def test_input_force_does_no_work_without_a_power_kernel():
+    run = simulate(gusty(), [0.5], [0.0], 0.1, ledger=True)
+    assert np.all(run.ledger.input == 0.0)
+
+
+@kernels.power
+def _half_the_input(t, q, v, u, p, e):
+    e[0], e[1] = 0.5 * u[0] * v[0], 0.0
+
+
+def _pushed(power):
+    base = gusty()
+    return System(
+        n=1, inputs=1, parameters=base.p, a0=base.a0, a1=base.a1, dynamics=base.dynamics, gaps=base.gaps,
+        rows=base.rows, energy=base.energy, power=power,
+    )  # fmt: skip
+
+
+@kernels.power
+def _all_of_the_input(t, q, v, u, p, e):
+    e[0], e[1] = u[0] * v[0], 0.0
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9, 1e-12])
+def test_an_account_that_stays_open_is_not_finished(rtol):
+    """What the power kernel leaves out is missing, and told; the same run with it closes."""
+    inputs = ([0.0, 0.3, 0.6], [[2.0], [-3.0], [0.0]])
+    wrong, right = (
+        simulate(_pushed(power), [0.5], [0.0], 1.0, rtol=rtol, ledger=True, inputs=inputs)
+        for power in (_half_the_input, _all_of_the_input)
+    )
+    assert wrong.outcome is Outcome.INCONSISTENT
+    assert "energy account is open by" in wrong.message
+    assert right.outcome.ok, right.message
+    assert simulate(_pushed(_half_the_input), [0.5], [0.0], 1.0, rtol=rtol, inputs=inputs).outcome.ok
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(60))
+def test_random_runs_close_their_account_by_far(seed):
+    """What is taken for open lies far above what steps leave, whatever stiffness, tolerance and start."""
+    rng = np.random.default_rng(seed)
+    a0 = 10.0 ** rng.uniform(2, 9)
+    system = ball(
+        a0=a0, a1=rng.uniform(0, 3) * a0**0.5, a2=rng.choice([0.0, 1e6]), mass=10.0 ** rng.uniform(-3, 3),
+        gravity=rng.uniform(1, 20),
+    )  # fmt: skip
+    rtol = 10.0 ** rng.uniform(-11, -3)
+    run = simulate(system, [rng.uniform(-0.01, 2)], [rng.normal()], 2.0, rtol=rtol, ledger=True, shortcuts=False)
+    assert run.outcome.ok, run.message
+
+
+def test_a_first_step_that_is_some_tolerances_off_contradicts_nothing():
+    """A stiff ball begins inside the floor: its first step is fourteen times off what the tolerance adds."""
+    values = {"a0": 121796.9705728013, "a1": 570.2599202694515, "height": -0.005680055905624148}
+    case = cases.load("bouncing_ball", "linear", t_end=0.5, speed=-0.9301994487774878, **values)
+    assert engines.load("reference").prepare(case, "compiled").run().outcome.ok

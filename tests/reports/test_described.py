@@ -1,0 +1,42 @@
+"""`crossbody list CASE` says what a case can be asked for."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from crossbody import cases, engines
+from crossbody.cases import loading
+from crossbody.reports import described, metrics
+from crossbody.reports.cli import cli
+
+
+@pytest.mark.parametrize("name", cases.names())
+def test_a_case_is_listed_with_all_that_it_can_be_asked_for(name: str) -> None:
+    done = CliRunner().invoke(cli, ["list", name, "--json"])
+    assert done.exit_code == 0, done.output
+    told, source = json.loads(done.output), loading.module(name)
+    assert list(told["variants"]) == list(cases.variants(name))
+    assert list(told["parameters"]) == list(source.PARAMETERS)
+    for variant in cases.variants(name):
+        case = cases.load(name, variant)
+        assert set(case.contacts) <= set(told.get("rows", ()))
+        assert set(case.metrics) <= set(told.get("metrics of its own", ()))
+        assert not set(case.metrics) & set(metrics.names())
+
+
+@pytest.mark.parametrize("name", engines.names())
+def test_an_engine_is_listed_with_its_profiles(name: str) -> None:
+    try:
+        told = described.one(name)
+    except cases.EngineUnavailable:
+        pytest.skip(f"{name} is not installed")
+    assert told["Profiles"] == dict(engines.load(name).profiles)
+    assert told["Versions"]
+
+
+def test_an_unknown_case_is_a_sentence() -> None:
+    with pytest.raises(cases.UnknownName, match="There is no case 'newton'"):
+        described.case("newton")

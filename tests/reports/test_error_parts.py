@@ -1,0 +1,349 @@
+"""The parts of an engine's error: laws on made-up engines whose converged motion is known, and two real ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from places import ROBOTS
+
+from crossbody import cases, engines
+from crossbody.cases import Case, Mode, Tier, Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint, Scene
+from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
+from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.measuring.truth import Truth, from_run
+from crossbody.reports.runs import jobs
+
+BIPED = ROBOTS / "agility_cassie" / "cassie.xml"
+
+
+def motion(q: Any, t: Any, v: Any) -> Trajectory:
+    """A run without rows."""
+    nothing = np.zeros((len(t), 0))
+    return Trajectory(
+        t=t, q=q, v=v, gap=nothing, lam=nothing, energy=np.zeros((len(t), 2)), mode=nothing.astype(np.int8),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    """Two coordinates without rows, of size 1."""
+    from crossbody.cases.scene import Body, Joint, Scene
+
+    bodies = tuple(Body(name=x, mass=1.0, com=(0.0,) * 3, inertia=(1.0,) * 3 + (0.0,) * 3) for x in "ab")
+    joints = tuple(Joint(name=f"j{x}", body=x, type="slide", axis=(1.0, 0.0, 0.0)) for x in "ab")
+    return cases.from_scene(Scene(bodies=bodies, joints=joints), t_end=2.0)
+
+
+def wave(case: Case, dt: float, model: float, step: Callable[[Any], Any], order: float) -> Trajectory:
+    """A run at a step: the truth, a model error that grows, a step error of some order with a smooth shape."""
+    t = np.linspace(0.0, case.t_end, round(case.t_end / dt) + 1)
+    shape = np.stack([t**2, -np.sin(2.0 * t)], axis=1)
+    exact = np.stack([np.cos(3.0 * t), np.sin(3.0 * t)], axis=1)
+    return motion(exact + model * shape + dt**order * step(t), t, np.gradient(exact, t, axis=0))
+
+
+def smooth(t: Any) -> Any:
+    return np.stack([np.cos(5.0 * t) - 1.0, t], axis=1)
+
+
+def study(case: Case, steps: list[float], model: float, order: float, shape: Callable[[Any], Any] = smooth) -> Study:
+    runs = tuple(wave(case, dt, model, shape, order) for dt in steps)
+    return Study(setting="dt", sizes=tuple(steps), runs=runs)
+
+
+def split(case: Case, truth: Truth, run: Trajectory, made: Study) -> Split:
+    return splits(case, truth, run, made)["position"]
+
+
+STEPS = [0.02, 0.01, 0.005]
+
+
+@pytest.mark.parametrize("agreed", [0.0, 1e-9, 1e-4])
+def test_the_models_part_is_known_no_better_than_the_truth(case: Case, agreed: float) -> None:
+    truth = from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.C, "")
+    made = study(case, STEPS, 1e-3, 4.0)
+    sharp = split(case, truth, made.runs[0], made)
+    found = split(case, replace(truth, agreement={"position": agreed}), made.runs[0], made)
+    assert found.known["step"] == sharp.known["step"]
+    assert found.known["model"] == max(sharp.known["step"], agreed)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("model", [0.0, 1e-3])
+def test_parts_are_those_that_a_run_was_made_of_and_add_up(case: Case, order: float, model: float) -> None:
+    truth = replace(from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.A, ""))
+    made = study(case, STEPS, model, order)
+    found = split(case, truth, made.runs[0], made)
+    assert not found.missing
+    assert f"Order {order:.2f}" in found.says
+    assert found.largest["step"] == pytest.approx(2.0 * STEPS[0] ** order, rel=0.02)
+    assert found.largest["model"] == pytest.approx(model * case.t_end**2, rel=0.02, abs=found.known["model"])
+    whole = next(row.value for row in judged(case, [Entry(engine="x", profile="", run=made.runs[0])], truth, "")
+                 if row.metric == "position")  # fmt: skip
+    assert sum(found.there.values()) == pytest.approx(whole, rel=1e-12)
+
+
+def test_a_limit_is_known_to_what_it_is_off_by(case: Case) -> None:
+    """Over random mixtures of two orders, the converged motion is no farther from the right one than is said."""
+    rng = np.random.default_rng(1)
+    truth = from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.A, "")
+    for _ in range(30):
+        order, more, model = rng.integers(1, 5), 10.0 ** rng.uniform(-2, 1), 10.0 ** rng.uniform(-6, -2)
+        runs = []
+        for dt in STEPS:
+            run = wave(case, dt, model, smooth, float(order))
+            extra = more * dt ** (order + 1.0) * np.stack([np.sin(run.t), np.cos(4.0 * run.t)], axis=1)
+            runs.append(replace(run, q=run.q + extra))
+        made = Study(setting="dt", sizes=tuple(STEPS), runs=tuple(runs))
+        found = split(case, truth, runs[0], made)
+        if found.missing:
+            continue
+        right = model * case.t_end**2
+        assert abs(found.largest["model"] - right) <= found.known["model"] + 1e-4 * right
+
+
+def test_without_an_order_nothing_is_extrapolated(case: Case) -> None:
+    rng = np.random.default_rng(2)
+    truth = from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.A, "")
+    made = study(case, STEPS, 1e-3, 0.0, lambda t: 1e-3 * rng.normal(size=(len(t), 2)))
+    entry = Entry(engine="x", profile="chatters", run=made.runs[0], study=made, settings={"dt": STEPS[0]})
+    rows = {row.metric: row for row in judged(case, [entry], truth, "again")}
+    for part in ("model", "step"):
+        row = rows[f"position ({part})"]
+        assert np.isnan(row.value)
+        assert row.verdict is Word.INFO
+        assert row.why.startswith("Not measured. No order between steps of 0.02, 0.01, 0.005 s")
+        assert row.command.startswith("again --engine x:chatters")
+        assert f"largest position ({part})" not in rows
+
+
+def test_what_differs_by_rounding_alone_has_no_order_and_is_converged(case: Case) -> None:
+    truth = from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.A, "")
+    rng = np.random.default_rng(3)
+    made = study(case, STEPS, 1e-4, 0.0, lambda t: 1e-13 * rng.normal(size=(len(t), 2)))
+    found = split(case, truth, made.runs[0], made)
+    assert "rounding" in found.says
+    assert found.largest["step"] < found.known["step"] < 1e-11
+    assert found.largest["model"] == pytest.approx(4e-4, rel=1e-6)
+
+
+def cubic(case: Case, t: Any, made: Any) -> Trajectory:
+    """The truth (cos 3 t, sin 3 t) and an error that is a cubic of t (4, 2), with the rates of both."""
+    powers = np.stack([t**k for k in range(4)], axis=1)
+    rates = np.stack([k * t ** max(k - 1, 0) for k in range(4)], axis=1)
+    exact, turned = np.stack([np.cos(3.0 * t), np.sin(3.0 * t)], axis=1), np.array([-3.0, 3.0])
+    return motion(exact + powers @ made, t, turned * exact[:, ::-1] + rates @ made)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_error_that_is_a_cubic_is_laid_exactly_between_samples(case: Case, seed: int) -> None:
+    """A Hermite cubic of each step is the cubic itself, wherever the samples of either run stand."""
+    rng = np.random.default_rng(seed)
+    own, other = (np.sort([0.0, *rng.uniform(0.0, 2.0, n), 2.0]) for n in (150, 12))
+    made = 1e-3 * rng.normal(size=(4, 2))
+    right = cubic(case, own, 0.0 * made)
+    truth = replace(from_run(right, Tier.A, "made up"), at=lambda t: cubic(case, t, 0.0 * made))
+    whole = Positions(case, truth, right)
+    error = np.stack([whole.t**k for k in range(4)], axis=1) @ made
+    assert whole(cubic(case, other, made)) == pytest.approx(error / whole.scale, abs=1e-12)
+
+
+@pytest.mark.parametrize("stretch", [0.8, 1.25])
+def test_a_run_whose_clock_alone_is_another_has_no_error_between_its_samples(stretch: float) -> None:
+    """Its rates are those of its own clock."""
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    assert ball.closed_form is not None
+    truth = replace(from_run(ball.closed_form(np.linspace(0.0, 1.0, 301)), Tier.A, "exact"), at=ball.closed_form)
+    few = ball.closed_form(np.linspace(0.0, 1.0, 12))
+    last = max(event.t for event in few.events if event.before == Mode.FREE)
+
+    def when(t: Any) -> Any:
+        return stretch * np.minimum(t, last) + np.maximum(t - last, 0.0)
+
+    v = np.where(few.t[:, None] <= last, few.v / stretch, few.v)
+    events = tuple(replace(event, t=float(when(event.t))) for event in few.events)
+    whole = Positions(ball, truth, truth.trajectory)
+    falls = whole.t <= few.t[few.t < np.sqrt(2.0 / 9.81)].max()
+    assert np.abs(whole(replace(few, t=when(few.t), v=v, events=events))[falls]).max() < 1e-9
+
+
+def test_without_the_instant_of_one_event_there_are_no_parts_of_their_errors() -> None:
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    assert ball.closed_form is not None
+    truth = replace(from_run(ball.closed_form(np.linspace(0.0, 1.0, 301)), Tier.A, "exact"), at=ball.closed_form)
+    run = truth.trajectory
+    assert Events(ball, truth, run).whole.size
+    for k in range(len(run.events)):
+        if Mode.FREE in (run.events[k].before, run.events[k].after) and run.events[k].before != Mode.BALLISTIC:
+            lost = (*run.events[:k], replace(run.events[k], t=np.nan), *run.events[k + 1 :])
+            assert not Events(ball, truth, replace(run, events=lost)).whole.size, k
+
+
+def test_turns_are_told_by_their_vectors() -> None:
+    """A body that turns too fast about one axis by its model and about another by its step."""
+    from crossbody.cases.scene import Body, Joint, Scene
+
+    body = Body(name="b", mass=1.0, com=(0.0,) * 3, inertia=(1.0,) * 3 + (0.0,) * 3)
+    scene = Scene(bodies=(body,), joints=(Joint(name="j", body="b", type="ball"),))
+    case = cases.from_scene(scene, t_end=1.0)
+
+    def turning(dt: float, off: float, step: float) -> Trajectory:
+        t = np.linspace(0.0, 1.0, round(1.0 / dt) + 1)
+        w = np.stack([1.0 + 0.0 * t, off * t, step * dt * t], axis=1) * t[:, None]
+        angle = np.linalg.norm(w, axis=1, keepdims=True)
+        axis = w / np.where(angle > 0.0, angle, 1.0)
+        return motion(np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1), t, w)
+
+    truth = from_run(turning(1e-3, 0.0, 0.0), Tier.A, "")
+    runs = tuple(turning(dt, 1e-3, 0.2) for dt in STEPS)
+    found = split(case, truth, runs[0], Study(setting="dt", sizes=tuple(STEPS), runs=runs))
+    sine = 2.0 * np.sin(0.5)  # of a small change across the axis of a turn by 1 rad
+    assert found.largest["model"] == pytest.approx(1e-3 * sine, rel=0.02)
+    assert found.largest["step"] == pytest.approx(0.2 * STEPS[0] * sine, rel=0.02)
+
+
+SOFT = """
+<mujoco><option timestep="0.002"/><worldbody><body name="rod" pos="0 0 1"><joint name="hinge" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass="1" contype="0" conaffinity="0"/>
+<body name="tip" pos=".3 0 0"><joint name="slide" type="slide" axis="0 0 1"/>
+<geom type="sphere" size=".03" mass=".5" contype="0" conaffinity="0"/></body></body></worldbody>
+<equality><joint joint1="slide" solref="{solref}"/></equality></mujoco>
+"""
+
+
+def rows_of(path: str, **settings: Any) -> dict[str, Verdict]:
+    case = cases.load(path, t_end=0.5)
+    result = jobs.run_case(case, jobs.picks(["mujoco:as_is"]), settings=settings)
+    return {row.metric: row for row in judged(case, result.entries, result.truth, "crossbody run")}
+
+
+@pytest.mark.parametrize("solref", [".02 1", ".002 1"])
+def test_softness_is_an_error_of_the_model_at_any_step(tmp_path: Path, solref: str) -> None:
+    """The time constant that MuJoCo raises to two steps is raised to two of the file's, whatever the step."""
+    path = tmp_path / "soft.xml"
+    path.write_text(SOFT.format(solref=solref), encoding="utf-8")
+    one, two = rows_of(str(path)), rows_of(str(path), dt=0.0005)
+    for rows in (one, two):
+        parts = [rows[f"position ({part})"] for part in ("importer", "model", "step")]
+        assert sum(part.value for part in parts) == pytest.approx(rows["position"].value, rel=1e-9)
+        assert abs(parts[0].value) < parts[0].known
+        assert not {Word.OUTSIDE, Word.EXPECTED} & {row.verdict for row in rows.values()}, "softness is told"
+    models = [rows["largest position (model)"] for rows in (one, two)]
+    assert abs(models[0].value - models[1].value) <= models[0].known + models[1].known
+    assert models[0].value > 10.0 * models[0].known
+    steps = [rows["largest position (step)"].value for rows in (one, two)]
+    assert steps[0] / steps[1] == pytest.approx(4.0, rel=0.15)
+
+
+def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A reader that takes one body for heavier than it is: its share does not shrink with the step."""
+    from crossbody.engines.mujoco import scene
+
+    own = scene._from_file
+
+    def wrong(case: Case) -> Any:
+        model = own(case)
+        model.body_mass[2] *= 1.5
+        return model
+
+    path = tmp_path / "soft.xml"
+    path.write_text(SOFT.format(solref="-1e4 -200"), encoding="utf-8")
+    case = cases.load(str(path), t_end=0.5)
+    right = jobs.run_case(case, jobs.picks(["mujoco:as_is"]))
+    monkeypatch.setattr(scene, "_from_file", wrong)
+    run = engines.load("mujoco").prepare(case, "as_is").run()
+    assert right.entries[0].study is not None
+    found = splits(case, right.truth, run, right.entries[0].study)["position"]
+    before = splits(case, right.truth, right.entries[0].run, right.entries[0].study)["position"]
+    assert found.largest["importer"] > 1e-2
+    words = {
+        (row.engine, row.metric): row.verdict
+        for entry in right.entries
+        for row in judged(case, [replace(entry, run=run)], right.truth, "crossbody run")
+    }
+    assert words["mujoco", "largest position (importer)"] == Word.OUTSIDE
+    assert words["mujoco", "position"] == Word.INFO
+    assert before.largest["importer"] < before.known["importer"]
+    for part in ("model", "step"):
+        assert found.largest[part] == pytest.approx(before.largest[part], rel=1e-6)
+
+
+BOUNCING = """
+<mujoco><option timestep="0.001"/><default><geom condim="1"/></default><worldbody>
+<geom type="plane" size="2 2 .1" solref=".01 1"/>
+<body pos="0 0 .5"><freejoint/><geom name="solid" type="sphere" size=".1" mass="1"/></body>
+<body pos=".5 0 .5"><freejoint/><geom type="box" size=".1 .1 .1" euler="20 30 0" mass="1" priority="1"
+solref=".03 .5" solimp=".8 .9 .01"/></body></worldbody></mujoco>
+"""
+
+
+def test_contacts_of_the_scene_are_as_soft_as_those_of_its_file(tmp_path: Path) -> None:
+    """Constants that are mixed, or ruled by priority, reach the model that is built from the scene."""
+    path = tmp_path / "bouncing.xml"
+    path.write_text(BOUNCING, encoding="utf-8")
+    case, engine = cases.load(str(path), t_end=0.6), engines.load("mujoco")
+    own, built = (engine.prepare(case, "as_is", reader=reader).run() for reader in ("file", "scene"))
+    assert len(own.events) == len(built.events) > 0
+    assert np.abs(own.q - built.q).max() < 1e-12
+
+
+def test_a_published_biped_is_soft_by_its_file_and_converges_where_it_is_stiff() -> None:
+    """Its equalities take it 4.6e-3 rad off the rigid motion at every step; stiff, Euler's error is g dt t / 2.
+
+    Started where its keyframe stands, off its own loops, it is 4.2e-2 away at the end (the root of the sum of squares).
+    """
+    if not BIPED.is_file():
+        pytest.skip(f"The robot's file {BIPED} is not here.")
+    case = cases.load(str(BIPED), "home", t_end=0.5, without="friction,contacts", assemble=True)
+    times = np.linspace(0.0, case.t_end, 51)
+    rigid = engines.load("reference").prepare(case, "compiled", rtol=1e-10, samples=times).run()
+
+    def off(dt: float, how: str) -> Any:
+        """Differences to the rigid motion (instants, coordinates)."""
+        scene: Any = engines.load("mujoco").prepare(case, "as_is", dt=dt)
+        model, data = scene.scene.model, scene.scene.data
+        if how == "stiff":
+            model.eq_solimp[:, :2] = MAX_IMPEDANCE
+            without_regularisation(model)
+        scene.scene.start()
+        if how == "keyframe":
+            data.qpos[:] = model.key_qpos[0]
+        model.opt.timestep, found = dt, []
+        for q in rigid.q[1:]:
+            mujoco.mj_step(model, data, nstep=round(0.01 / dt))
+            found.append(data.qpos - q)
+        return np.array(found)
+
+    soft, stiff = ({dt: np.abs(off(dt, how)).max() for dt in (1e-3, 1e-4, 2e-5)} for how in ("soft", "stiff"))
+    start = {dt: np.linalg.norm(off(dt, "keyframe")[-1]) for dt in (1e-3, 1e-4)}
+    print(f"\nsoft {soft}\nstiff {stiff}\nfrom the keyframe {start}")
+    assert soft[1e-4] == pytest.approx(soft[2e-5], rel=0.01)
+    assert soft[2e-5] == pytest.approx(4.6e-3, rel=0.05)
+    assert start[1e-3] == pytest.approx(start[1e-4], rel=0.01)
+    assert start[1e-4] == pytest.approx(4.15e-2, rel=0.02)
+    for dt, error in stiff.items():
+        assert error == pytest.approx(9.81 * dt * case.t_end / 2.0, rel=0.05)
+
+
+def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    rod = Scene(
+        bodies=(Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0)),),
+        joints=(Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0)),),
+    )
+    pick, swing = jobs.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
+    told = [jobs.run_case(swing, [pick], truth=None).entries[0].study]
+    monkeypatch.setattr(jobs, "STUDIES_S", 0.0)
+    told.append(jobs.run_case(swing, [pick], truth=None).entries[0].study)
+    assert [study is not None and len(study.runs) > 1 for study in told] == [True, False]
+    assert told[1] is not None
+    assert "Runs with other dt that tell it would take about" in told[1].why

@@ -1,0 +1,107 @@
+"""Any horizon of a case is judged fairly: what is right at the default one is not outside at another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crossbody import cases, engines
+from crossbody.cases import Tier
+from crossbody.cases.defaults import limits_of
+from crossbody.cases.mechanisms.soft.claims import STEP
+from crossbody.cases.mechanisms.soft.scene import numbers
+from crossbody.engines._soft_contact import fastest
+from crossbody.engines.mujoco import soft_contact as axis
+from crossbody.engines.mujoco import soft_delta as robot
+from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.truth import _tight, truth_of
+from crossbody.reports.judging.verdict import limit_for
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.impulse import with_collisions
+from crossbody.reports.runs import jobs
+
+MAZES = cases.variants("ball_maze")
+FACTORS = (0.1, 0.5, 2.0)
+EVERY = [(name, variant, factor) for name in cases.names() for variant in cases.variants(name) for factor in FACTORS]
+LATE = ("ball_maze", "solve", 2.0)
+"""Two and a half minutes of rest in the centre: nothing new."""
+QUICK = (
+    ("ball_maze", "outside", 0.1, "reference:compiled"), ("red_body", "frozen", 2.0, "reference:compiled"),
+    ("soft_contact", "axis", 0.1, "reference:compiled"), ("delta_tracking", "circle", 0.1, "pinocchio:law"),
+)  # fmt: skip
+"""What was outside once, or rests, and costs little."""
+
+
+def outside(name: str, variant: str, factor: float, engine: str) -> list[tuple[str, str, float, str]]:
+    case = cases.load(name, variant, t_end=factor * cases.load(name, variant).t_end)
+    found = jobs.run_case(case, jobs.picks((engine,)), refine=False)
+    rows = judged(case, found.entries, found.truth, "")
+    return [(row.profile, row.metric, row.value, row.why) for row in rows if row.verdict in ("outside", "crashed")]
+
+
+@pytest.mark.parametrize(("name", "variant", "factor", "engine"), QUICK)
+def test_a_right_motion_is_not_outside_at_another_horizon(name: str, variant: str, factor: float, engine: str) -> None:
+    assert outside(name, variant, factor, engine) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "variant", "factor"), [one for one in EVERY if one != LATE])
+def test_no_integrator_of_ours_is_outside_at_any_horizon(name: str, variant: str, factor: float) -> None:
+    assert outside(name, variant, factor, "reference") == []
+
+
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [("bouncing_ball", "listing"), pytest.param("ball_maze", "solve", marks=pytest.mark.slow)],
+)
+def test_a_truth_has_both_sides_of_every_event_of_one_motion(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    truth, natural = truth_of(case), _tight(case)
+    assert truth.tier is Tier.C, "what it is held against is independent"
+    assert truth.trajectory.events == natural.events
+    events = np.unique([event.t for event in natural.events if 0.0 < event.t < case.t_end])  # rows may switch together
+    sampled = truth.at(np.repeat(events, 2))
+    for i, t in enumerate(events):
+        before, behind = np.searchsorted(natural.t, t, side="left"), np.searchsorted(natural.t, t, side="right") - 1
+        np.testing.assert_array_equal(sampled.lam[2 * i], natural.lam[before])
+        np.testing.assert_array_equal(sampled.lam[2 * i + 1], natural.lam[behind])
+
+
+def test_an_impulse_does_not_depend_on_the_side_of_a_release_on_which_a_sample_stands() -> None:
+    case = cases.load("ball_maze", "outside")
+    truth = truth_of(case)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-9).run()
+    inside, exact = aligned(truth, run, releases=True)
+    theirs = with_collisions(exact, truth.trajectory.events)
+    off = np.abs(with_collisions(run, run.events)[inside] - theirs).max() / np.abs(theirs).max()
+    assert 0.0 < off < 1e-8
+
+
+@pytest.mark.parametrize(("name", "variant"), [("soft_contact", "axis"), ("soft_contact", "delta")])
+def test_the_sizes_that_a_case_names_are_no_larger_than_its_motion(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-6).run()
+    units = np.array([coordinate.unit for coordinate in case.coordinates])
+    assert any(coordinate.size for coordinate in case.coordinates)
+    for coordinate in case.coordinates:
+        like = units == coordinate.unit
+        assert coordinate.size <= 1.1 * np.abs(run.q[:, like]).max()
+        assert coordinate.rate <= 1.1 * np.abs(run.v[:, like]).max()
+
+
+@pytest.mark.parametrize(("variant", "module"), [("axis", axis), ("delta", robot)])
+def test_the_fixed_step_of_the_limits_is_that_of_the_engine(variant: str, module: Any) -> None:
+    case = cases.load("soft_contact", variant)
+    p = numbers(case.parameters)
+    rate = fastest(p, p["flange_mass"] if variant == "axis" else p["m3"])
+    assert pytest.approx(module.default_step(case, "matched") * rate) == STEP
+
+
+def test_a_ball_that_hardly_moves_is_allowed_the_tolerance_of_its_height() -> None:
+    """1e-9 over 1 - cos(1e-3) for a swing of 1e-3 rad; nothing beyond the default where the ball goes far."""
+    given = {v: limit_for(limits_of(cases.load("ball_maze", v)), "energy_drift", "pinocchio", "law") for v in MAZES}
+    allowed = {variant: limit.value for variant, limit in given.items() if limit is not None}
+    assert allowed.pop("inside") == pytest.approx(1e-9 / (1.0 - np.cos(1e-3)), rel=1e-6)
+    assert set(allowed.values()) == {1e-6}

@@ -1,0 +1,179 @@
+"""Every metric on motions whose answer is known beforehand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crossbody.cases import Case, Ledger, Tier, Trajectory, load
+from crossbody.cases.contacts import contacts
+from crossbody.reports import metrics
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring.alignment import clock
+from crossbody.reports.measuring.truth import Truth, from_run, sample_times
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return load("bouncing_ball", "linear")
+
+
+@pytest.fixture(scope="module")
+def truth(case: Case) -> Truth:
+    return truth_of(case)
+
+
+def measure(name: str, truth: Truth, run: Trajectory, case: Case) -> float | None:
+    return metrics.load(name).measure(truth, run, case)
+
+
+ERRORS = [
+    "energy_drift", "energy_integrator", "position", "lam_impulse", "lam_impulse_path", "event_times", "touch_count",
+    "penetration_error", "restitution_error",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_the_truth_has_no_error(name: str, truth: Truth, case: Case) -> None:
+    value = measure(name, truth, truth.trajectory, case)
+    assert value is not None
+    assert abs(value) < 1e-12
+
+
+@pytest.mark.parametrize("name", metrics.names())
+def test_every_metric_says_what_it_is(name: str, truth: Truth, case: Case) -> None:
+    metric = metrics.load(name)
+    assert metrics.summary(name).endswith((".", ")"))
+    assert metric.UNIT in ("1", "s", "m", "N", "J", "N s", "rad", "1/s")
+    value = metric.measure(truth, truth.trajectory, case)
+    assert value is None or np.isfinite(value)
+
+
+def shifted(run: Trajectory, by: float) -> Trajectory:
+    """The same motion, later: what an engine does that finds every impact late."""
+    events = tuple(replace(e, t=e.t + by) for e in run.events)
+    return replace(run, t=np.concatenate([[0.0], run.t[1:] + by]), events=events)
+
+
+def test_a_late_impact_is_an_error_of_time_not_of_position(truth: Truth, case: Case) -> None:
+    late = shifted(truth.trajectory, 2e-3)
+    assert measure("event_times", truth, late, case) == pytest.approx(2e-3, rel=1e-9)
+    raw = np.abs(late.v - truth.at(np.clip(late.t, 0, case.t_end)).v).max()
+    assert raw > 0.5, "a raw difference of velocities would say that all is lost"
+    assert measure("lam_impulse", truth, late, case) < 1e-9
+    # The first arc is stretched from rest, where 2 ms matter little.
+    assert measure("position", truth, late, case) < 2e-2
+
+
+def test_clock_puts_every_touch_on_the_truths(truth: Truth) -> None:
+    late = shifted(truth.trajectory, 2e-3)
+    mapped = clock(truth, late)
+    for mine, theirs in zip(contacts(late), contacts(truth.trajectory), strict=True):
+        assert mapped[late.t == mine.touch] == pytest.approx(theirs.touch, abs=1e-14)
+    assert np.all(np.diff(mapped) >= 0)
+
+
+def test_scaled_force_scales_the_impulse_error(truth: Truth, case: Case) -> None:
+    run = replace(truth.trajectory, lam=1.01 * truth.trajectory.lam)
+    assert measure("lam_impulse", truth, run, case) == pytest.approx(0.01, rel=1e-9)
+    assert measure("lam_impulse_path", truth, run, case) == pytest.approx(0.01, rel=1e-9)
+
+
+def test_impulse_is_the_momentum_that_the_floor_gave(truth: Truth, case: Case) -> None:
+    from crossbody.reports.measuring.impulse import cumulative
+
+    given = cumulative(truth.trajectory)[-1, 0]
+    momentum = truth.trajectory.v[-1, 0] - truth.trajectory.v[0, 0] + 9.81 * case.t_end
+    assert given == pytest.approx(momentum, rel=1e-4)
+
+
+def test_raised_position_is_a_position_error(truth: Truth, case: Case) -> None:
+    run = replace(truth.trajectory, q=truth.trajectory.q + 1e-4)
+    assert measure("position", truth, run, case) == pytest.approx(1e-4, rel=1e-9)
+
+
+def test_unexplained_energy_belongs_to_the_integrator(truth: Truth, case: Case) -> None:
+    energy = truth.trajectory.energy.copy()
+    energy[len(energy) // 2 :, 0] += 0.05
+    run = replace(truth.trajectory, energy=energy)
+    scale = max(truth.trajectory.energy[:, 0].max(), np.ptp(truth.trajectory.energy[:, 1]))
+    assert measure("energy_integrator", truth, run, case) == pytest.approx(0.05 / scale, rel=1e-9)
+    assert measure("energy_drift", truth, run, case) == pytest.approx(0.05 / scale, rel=1e-9)
+
+
+def test_energy_made_by_the_law_is_the_gain_of_every_bounce() -> None:
+    case = load("bouncing_ball", "linear", a0=400.0, a1=0.0)
+    truth = truth_of(case)
+    gain = next(c.expected for c in case.claims if c.metric == "energy_per_bounce")
+    ended = [c for c in contacts(truth.trajectory) if np.isfinite(c.release)]
+    scale = truth.trajectory.energy[:, 0].max()
+    assert measure("energy_law", truth, truth.trajectory, case) == pytest.approx(len(ended) * gain / scale, rel=1e-9)
+    assert measure("energy_per_bounce", truth, truth.trajectory, case) == pytest.approx(gain, rel=1e-10)
+    assert measure("energy_integrator", truth, truth.trajectory, case) < 1e-12
+
+
+def test_without_a_ledger_nothing_is_said_of_it(truth: Truth, case: Case) -> None:
+    run = replace(truth.trajectory, ledger=None)
+    assert np.isnan(measure("energy_law", truth, run, case))
+    assert np.isnan(measure("energy_integrator", truth, run, case))
+
+
+def test_unknown_force_is_no_number(truth: Truth, case: Case) -> None:
+    run = replace(truth.trajectory, lam=np.full_like(truth.trajectory.lam, np.nan))
+    for name in ("lam_impulse", "lam_impulse_path", "complementarity"):
+        assert np.isnan(measure(name, truth, run, case))
+
+
+def test_a_pulling_contact_violates_complementarity(truth: Truth, case: Case) -> None:
+    lam = truth.trajectory.lam.copy()
+    lam[10] = -0.1 * lam.max()
+    assert measure("complementarity", truth, replace(truth.trajectory, lam=lam), case) == pytest.approx(0.1)
+    lam[10] = 0.2 * lam.max()
+    assert truth.trajectory.gap[10, 0] > 0.5
+    assert measure("complementarity", truth, replace(truth.trajectory, lam=lam), case) == pytest.approx(0.2)
+    assert measure("complementarity", truth, truth.trajectory, case) < 1e-12
+
+
+def test_missing_contact_is_counted(truth: Truth, case: Case) -> None:
+    events = truth.trajectory.events
+    kept = tuple(e for e in events if e.t != contacts(truth.trajectory)[-1].touch)
+    assert measure("touch_count", truth, replace(truth.trajectory, events=kept), case) == -1.0
+
+
+def test_one_impact_gives_the_closed_forms() -> None:
+    case = load("bouncing_ball", "linear", gravity=0.0, speed=2.0, a1=60.0)
+    truth = truth_of(case)
+    assert len(case.claims) == 4
+    for claim in case.claims:
+        tolerance = 1e-4 if claim.metric == "penetration" else 1e-12
+        value = measure(claim.metric, truth, truth.trajectory, case)
+        assert value == pytest.approx(claim.expected, rel=tolerance), claim.metric
+
+
+def test_contacts_of_a_measurement_are_read_from_the_sign_of_the_gap(truth: Truth, case: Case) -> None:
+    times = np.linspace(0, 2.0, 20001)
+    run = replace(truth.at(times), events=(), mode=np.full((len(times), 1), -1))
+    found = contacts(run)
+    exact = [c for c in contacts(truth.trajectory) if c.touch < 2.0]
+    assert [c.touch for c in found] == pytest.approx([c.touch for c in exact], abs=1e-6)
+
+
+def test_a_run_can_be_the_truth(truth: Truth, case: Case) -> None:
+    recorded = from_run(truth.trajectory, Tier.D, "itself")
+    times = sample_times(truth.trajectory, case.t_end, grid=777)
+    assert np.abs(recorded.at(times).q - truth.at(times).q).max() < 1e-7
+    assert measure("position", recorded, truth.at(times), case) < 1e-7
+
+
+def test_sample_times_hold_both_sides_of_every_event(truth: Truth, case: Case) -> None:
+    times = sample_times(truth.trajectory, case.t_end)
+    assert np.all(np.diff(times) >= 0)
+    for event in truth.trajectory.events:
+        assert np.count_nonzero(times == event.t) == 2
+
+
+def test_ledger_shape_is_kept(truth: Truth) -> None:
+    assert isinstance(truth.trajectory.ledger, Ledger)
+    assert truth.trajectory.ledger.contact.shape == truth.trajectory.lam.shape

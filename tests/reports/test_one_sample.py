@@ -1,0 +1,206 @@
+"""An error at one place, of a size that is known beforehand, is the number that every metric says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_errors import ERRORS, OFF, account, booked, changed, right, scene
+from known_values import VALUES
+
+from crossbody import cases
+from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
+from crossbody.cases.contacts import contacts
+from crossbody.cases.defaults import limits_of
+from crossbody.cases.mechanisms.delta import pose
+from crossbody.reports import metrics
+from crossbody.reports.measuring.alignment import matched
+from crossbody.reports.measuring.impulse import with_collisions
+from crossbody.reports.measuring.truth import Truth, from_run
+from crossbody.reports.sweep.measure import residual
+
+SEEDS = range(8)
+"""Draws of sample, row, component and sign, and of which event."""
+
+
+def measure(name: str, case: Case, truth: Truth, run: Trajectory) -> float:
+    value = metrics.of(case)[name].measure(truth, run, case)
+    assert value is not None
+    return value
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_an_error_at_one_place_is_what_the_metric_says(name: str) -> None:
+    which, known = ERRORS[name]
+    metric = name.split()[0]
+    case, truth = right(which)
+    floor = abs(measure(metric, case, truth, truth.trajectory))
+    for seed in SEEDS:
+        run, wanted = known(scene(which, seed))
+        assert floor < 0.05 * abs(wanted)
+        assert measure(metric, case, truth, run) == pytest.approx(wanted, rel=1e-6, abs=2.0 * floor), seed
+
+
+COLUMNS = {
+    "position": "q", "velocity": "v", "start_error": "q", "gap_error": "gap", "gap_residual": "gap",
+    "energy_residual": "energy", "contact_work": "contact", "law_residual": "lam", "lam_error": "lam",
+    "lam_impulse": "lam", "lam_impulse_path": "lam", "angle_error": "q",
+}  # fmt: skip
+"""Metrics of several columns, each of which counts by itself, and what they are columns of."""
+
+
+@pytest.mark.parametrize("name", COLUMNS)
+def test_errors_of_two_columns_do_not_cancel(name: str) -> None:
+    """The same error with the other sign in another column leaves the number as large as it was."""
+    (which, known), signal = ERRORS[name], COLUMNS[name]
+    case, truth = right(which)
+    for seed in SEEDS:
+        s = scene(which, seed)
+        run, wanted = known(s)
+        ledger = signal == "contact"
+        off = (run.ledger.contact - s.run.ledger.contact) if ledger else getattr(run, signal) - getattr(s.run, signal)
+        (k,), (column,) = (np.unique(at) for at in np.nonzero(off))
+        other = s.one([i for i in range(off.shape[1]) if i != column])
+        spoil = booked if ledger else changed
+        run = spoil(run, signal, (k, other), -float(off[k, column]))
+        assert measure(name, case, truth, run) >= abs(wanted) * (1.0 - 1e-6), seed
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_a_known_value_is_what_the_metric_says(name: str) -> None:
+    which, known = VALUES[name]
+    for seed in SEEDS:
+        run, wanted = known(scene(which, seed))
+        said = measure(name.split()[0], *right(which), run)
+        assert said == pytest.approx(wanted, rel=1e-6, abs=1e-9), seed
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_collision_in_no_time_is_a_step_between_the_samples_of_its_instant(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.sort(np.repeat(rng.uniform(0.0, 1.0, 20), rng.choice([1, 2], 20)))
+    row, late = rng.integers(2, size=t.size // 2), rng.choice(t[1:], t.size // 2)
+    late += rng.choice([0.0, 1e-3], late.size) * (rng.random(late.size) < 0.5)  # between samples too
+    blank = np.zeros((len(t), 2))
+    events = [
+        Event(t=x, contact=i, before=Mode.FREE, after=Mode.FREE, impulse=j + 1.0)
+        for j, (x, i) in enumerate(zip(late, row, strict=True))
+    ]
+    run = Trajectory(t=t, q=blank, v=blank, gap=blank, lam=blank, energy=blank, mode=blank.astype(np.int8))
+    wanted = np.zeros((len(t), 2))
+    for event in events:
+        same = np.flatnonzero(t == event.t)
+        wanted[same[-1] if len(same) else int((t < event.t).sum()) :, event.contact] += event.impulse
+    assert np.array_equal(with_collisions(run, events), wanted)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_account_that_is_open_is_what_a_stress_run_says(seed: int) -> None:
+    s = scene("block", seed)
+    off = OFF * float(s.run.energy[:, 0].max())
+    run, _ = account(s)
+    assert run.ledger is not None
+    works = (s.run.energy[:, 1], run.ledger.input, run.ledger.dissipated, *run.ledger.contact.T)
+    scale = max(float(s.run.energy[:, 0].max()), *(float(np.ptp(work)) for work in works))
+    assert residual(run) == pytest.approx(off / scale, rel=1e-2, abs=2.0 * residual(s.run))
+
+
+def test_every_metric_that_judges_is_held_against_a_known_error() -> None:
+    judging = set[str]()
+    for name in cases.names():
+        for case in (load(name, variant) for variant in cases.variants(name)):
+            asked = {each.metric.split()[0] for each in (*limits_of(case), *case.claims)}
+            judging |= asked & set(metrics.of(case))
+    assert judging - {"tracking_error"} <= {name.split()[0] for name in (ERRORS | VALUES)}
+
+
+@pytest.fixture(scope="module")
+def ball() -> tuple[Case, Truth]:
+    return right("linear ball")
+
+
+def test_an_event_without_an_instant_is_no_number(ball: tuple[Case, Truth]) -> None:
+    case, truth = ball
+    events = truth.trajectory.events
+    for k in range(len(events)):
+        lost = replace(truth.trajectory, events=(*events[:k], replace(events[k], t=np.nan), *events[k + 1 :]))
+        assert np.isnan(measure("event_times", case, truth, lost))
+
+
+@pytest.mark.parametrize("place", [0.1, 0.5, 0.9])
+def test_every_sample_and_every_event_counts_in_the_residual_of_the_modes(
+    place: float, ball: tuple[Case, Truth]
+) -> None:
+    case, truth = ball
+    run = truth.trajectory
+    mode, events = run.mode.copy(), run.events
+    k, j = int(place * len(run.t)), int(place * len(events))
+    mode[k] = Mode.COLLISION
+    assert measure("mode_residual", case, truth, run) == 0.0
+    assert measure("mode_residual", case, truth, replace(run, mode=mode)) == 1.0
+    assert measure("mode_residual", case, truth, replace(run, events=(*events[:j], *events[j + 1 :]))) >= 1.0
+    assert measure("mode_residual", case, truth, replace(run, events=events[::-1])) >= 1.0
+    other = replace(events[j], before=Mode.COLLISION)
+    assert measure("mode_residual", case, truth, replace(run, events=(*events[:j], other, *events[j + 1 :]))) == 1.0
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0 + 1e-4, 2.0])
+def test_a_factor_on_every_force_is_the_residual_of_the_law(factor: float, ball: tuple[Case, Truth]) -> None:
+    case, truth = ball
+    run = replace(truth.trajectory, lam=factor * truth.trajectory.lam)
+    assert measure("law_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.01, 1.1])
+def test_a_factor_on_every_velocity_is_the_residual_of_the_rates(factor: float, ball: tuple[Case, Truth]) -> None:
+    case, truth = ball
+    run = truth.at(np.linspace(0.0, 0.4, 401))  # the first fall, on which the trapezoidal rule is exact
+    run = replace(run, v=factor * run.v)
+    assert measure("rate_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-9)
+
+
+def test_the_flange_is_held_against_its_path_once_it_has_settled() -> None:
+    from crossbody.reference.delta import scene
+
+    case = load("delta_tracking", "circle")
+    path, t = scene.path_of(case.parameters), np.linspace(0.0, case.t_end, 61)
+    assert path is not None
+    p = {name: float(x) for name, x in case.parameters.items() if not isinstance(x, str)}
+    on = path(t)[0]
+
+    def run(k: int | None) -> Trajectory:
+        way = on.copy()
+        if k is not None:
+            way[k, 2] += OFF
+        q, nothing = np.array([pose.pose(p, z) for z in way]), np.zeros((len(t), 6))
+        energy, mode = np.zeros((len(t), 2)), nothing.astype(np.int8)
+        return Trajectory(t=t, q=q, v=0.0 * q, gap=nothing, lam=nothing, energy=energy, mode=mode)
+
+    truth = from_run(run(None), Tier.D, "the path")
+    found = [measure("tracking_error", case, truth, run(k)) for k in (None, 5, 45, 60)]
+    assert found == pytest.approx([0.0, 0.0, OFF, OFF], abs=1e-9)
+
+
+def test_a_touch_of_another_row_ends_the_matching() -> None:
+    _, truth = right("sliders")
+    first, second = contacts(truth.trajectory)[:2]
+    swapped = {first.row: second.row, second.row: first.row}
+    events = tuple(replace(e, contact=swapped.get(e.contact, e.contact)) for e in truth.trajectory.events)
+    assert isinstance(events[0], Event)
+    assert matched(truth, replace(truth.trajectory, events=events)) == []
+
+
+def test_a_row_that_comes_free_where_a_variable_changes_has_another_gap_behind() -> None:
+    case, truth = right("linear ball")
+    run = truth.trajectory
+    k = next(i for i, e in enumerate(run.events) if e.before is Mode.BALLISTIC)
+    t = run.events[k].t
+    jumped = replace(
+        run,
+        gap=run.gap + np.where(run.t > t, 1.0, 0.0)[:, None],
+        switches=(Switch(t=t, variable=0, before=0, after=1),),
+    )
+    late = replace(run, events=(*run.events[:k], replace(run.events[k], t=t + 1e-7), *run.events[k + 1 :]))
+    assert measure("mode_times", case, replace(truth, trajectory=jumped), late) == 0.0
+    assert measure("mode_times", case, replace(truth, trajectory=replace(jumped, switches=())), late) > 0.0

@@ -1,0 +1,429 @@
+"""The pages: every figure is there with its units, thinning keeps what matters, nothing is fetched from outside."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+import pytest
+from ladder import ladder
+
+from crossbody.cases import OutputError, load
+from crossbody.reports.bench.order import observed_order
+from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
+from crossbody.reports.judging.comparison import Entry, table
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.pages import figures, site
+from crossbody.reports.pages.filled import filled
+from crossbody.reports.pages.html import file_name
+from crossbody.reports.runs import study
+from crossbody.reports.runs.jobs import CaseResult
+from crossbody.reports.runs.output import folder
+from crossbody.reports.runs.thin import keep
+
+HOSTILE = "<script>alert(1)</script>"
+LIMIT = 1.5e6
+"""Largest page of a case beside the shared script, bytes."""
+
+
+def made(path: Path, results: Sequence[CaseResult], rows: pd.DataFrame | None = None) -> Path:
+    commands = {result.case.label: f"crossbody run {result.case.name}" for result in results}
+    told = {"command": f"crossbody run {HOSTILE}", "time": "", "versions": {"crossbody": "0.0.1"}}
+    with folder(path) as out:
+        study.write(out, results, study.judge(results, commands) if rows is None else rows, told)
+        site.write(out)
+    return path
+
+
+@pytest.fixture(scope="module")
+def result() -> CaseResult:
+    case = load("bouncing_ball", "linear")
+    truth = truth_of(case)
+    off = replace(truth.trajectory, q=truth.trajectory.q + 1e-6, wall_s=2e-3)
+    entries = (
+        Entry(engine="fake", profile=HOSTILE, run=off, settings={"dt": 1e-3}),
+        Entry(engine="absent", profile="*", skipped="It is not installed."),
+    )
+    return CaseResult(case=case, truth=truth, entries=entries)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory, result: CaseResult) -> Path:
+    return made(tmp_path_factory.mktemp("page") / "out", [result])
+
+
+CASE = "case-bouncing_ball.linear.html"
+
+
+class Tags(HTMLParser):
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+
+def plots(out: Path) -> dict[str, dict]:
+    text = (out / CASE).read_text()
+    found = re.findall(r'<script type="application/json" data-plot="([^"]+)">(.*?)</script>', text, re.DOTALL)
+    return {name.partition("--plot-")[2]: json.loads(content) for name, content in found}
+
+
+def numbers(coded: dict[str, str]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(coded["bdata"]), dtype=coded["dtype"])
+
+
+def test_every_figure_is_there_and_has_data(out: Path) -> None:
+    found = plots(out)
+    assert set(found) == {*figures.FIGURES, "precision"}
+    for name, figure in found.items():
+        assert figure["data"], name
+
+
+def test_every_axis_has_its_unit(out: Path) -> None:
+    for name, figure in plots(out).items():
+        axes = {k: v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d*", k)}
+        titled = [axis["title"]["text"] for axis in axes.values() if "title" in axis]
+        hidden = [k for k, axis in axes.items() if "title" not in axis and axis.get("showticklabels") is not False]
+        assert titled
+        assert hidden == (["yaxis"] if name == "modes" else []), f"{name}: {hidden} has no title"
+        assert all(re.search(r"\[.+\]", text) for text in titled), titled
+
+
+def test_lines_are_told_apart_by_dashes_too(out: Path) -> None:
+    looks = {(line["line"]["color"], line["line"]["dash"]) for line in plots(out)["motion"]["data"]}
+    assert len({colour for colour, _ in looks}) == len({dash for _, dash in looks}) == 2
+
+
+def every(out: Path) -> list[Path]:
+    return sorted(out.glob("*.html"))
+
+
+def test_nothing_is_fetched_from_outside(out: Path) -> None:
+    for path in every(out):
+        text = path.read_text()
+        for tag, attributes in Tags(text).found:
+            for key in ("src", "href"):
+                value = attributes.get(key) or ""
+                assert not re.match(r"[a-z]+:|//", value.removeprefix("data:,")), (tag, value)
+        assert not re.search(r"https?://", text)
+    assert not re.search(r"@import|url\(", (out / "crossbody.css").read_text())
+    assert not re.search(r"https?://|import\(|fetch\(", (out / "crossbody.js").read_text())
+    assert (out / "plotly.min.js").stat().st_size > 1e6
+
+
+def assert_links_resolve(out: Path) -> None:
+    ids = {path.name: {a.get("id") for _, a in Tags(path.read_text()).found} for path in every(out)}
+    for path in every(out):
+        for _, attributes in Tags(path.read_text()).found:
+            for key in ("src", "href"):
+                value = attributes.get(key) or ""
+                if not value or value.startswith("data:"):
+                    continue
+                name, _, anchor = value.partition("#")
+                assert not name or (out / name).is_file(), value
+                if anchor and (name or path.name) in ids:
+                    assert unquote(anchor.partition("~")[0]) in ids[name or path.name], value
+
+
+def test_links_resolve_and_ids_are_unique(out: Path) -> None:
+    assert_links_resolve(out)
+    for path in every(out):
+        ids = [a["id"] for _, a in Tags(path.read_text()).found if "id" in a]
+        assert len(ids) == len(set(ids))
+
+
+def test_names_are_escaped(out: Path) -> None:
+    for path in every(out):
+        assert "<script>alert" not in path.read_text()
+    assert "&lt;script&gt;alert" in (out / CASE).read_text()
+
+
+def test_a_page_stays_small(out: Path) -> None:
+    assert (out / CASE).stat().st_size < LIMIT
+
+
+def test_the_verdict_table_comes_first_and_is_complete(out: Path) -> None:
+    text = (out / CASE).read_text()
+    assert text.index('class="verdicts"') < text.index('class="player"') < text.index("<figure>")
+    rows = json.loads((out / "verdicts.json").read_text())["rows"]
+    assert text.count("<tr data-verdict=") == len(rows)
+    assert "It is not installed." in text
+    assert all(row["command"].replace("<", "&lt;").replace(">", "&gt;") in text.replace("&#39;", "'") for row in rows)
+
+
+def test_tables_carry_all_digits(out: Path) -> None:
+    shown = {a["data-v"] for _, a in Tags((out / CASE).read_text()).found if "data-v" in a}
+    for row in json.loads((out / "verdicts.json").read_text())["rows"]:
+        if row["value"] is not None:
+            assert str(float(row["value"])) in shown or str(row["value"]) in shown
+
+
+def test_the_index_says_which_engine_is_right(out: Path) -> None:
+    text = (out / "index.html").read_text()
+    cells = [a for tag, a in Tags(text).found if tag == "td" and "cell" in (a.get("class") or "")]
+    assert len(cells) == 3
+    assert "outside" in (cells[0]["class"] or "")
+    assert "skipped" in (cells[1]["class"] or "")
+    assert "within" in (cells[2]["class"] or ""), "the truth"
+    assert "\u2717" in text
+    assert "made by crossbody 0.0.1" in text
+
+
+def test_difference_to_the_truth_is_what_was_put_in(out: Path) -> None:
+    errors = [numbers(line["y"]) for line in plots(out)["motion"]["data"] if line["yaxis"] == "y2"]
+    assert len(errors) == 1
+    assert np.allclose(errors[0], 1e-6, rtol=1e-6)
+
+
+def test_one_file_holds_all_pages(tmp_path: Path, result: CaseResult) -> None:
+    out = made(tmp_path / "out", [result])
+    site.write(out, single_file=True)
+    assert [path.name for path in every(out)] == ["index.html"]
+    text = (out / "index.html").read_text()
+    tags = Tags(text).found
+    assert not [
+        a for tag, a in tags if tag in ("script", "link") and (a.get("src") or "crossbody" in (a.get("href") or ""))
+    ]
+    assert {a["id"] for _, a in tags if "data-page" in a} == {"index", CASE.removesuffix(".html")}
+    assert_links_resolve(out)
+    site.write(out)
+    assert (out / CASE).is_file()
+
+
+def cells(out: Path, section: str) -> list[list[str]]:
+    """Text of every cell of a table of engines, line by line."""
+    text = (out / ("index.html" if section == "matrix" else CASE)).read_text()
+    part = text[text.index(f'--{section}">') :]
+    body = part[part.index("<tbody>") : part.index("</tbody>")]
+    return [re.findall(r'data-v="([^"]*)"', line) for line in body.split("</tr>")[:-1]]
+
+
+def test_a_case_begins_with_every_metric_of_every_engine(out: Path) -> None:
+    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["engine"] == "fake"]
+    judged = [row for row in rows if row["verdict"] in ("within", "outside", "expected-outside")]
+    shown = cells(out, "glance")
+    assert len(shown) == 2 + len(judged) + 1, "the truth has a line of its own"
+    told = sorted(cell[0].split()[0] for cell in shown[2:] if cell[0].strip())
+    assert told == sorted(row["verdict"] for row in judged)
+    text = (out / CASE).read_text()
+    assert text.index("At a glance") < text.index('class="verdicts"')
+
+
+def test_the_index_tells_error_and_cost_of_every_engine(out: Path) -> None:
+    text = (out / "index.html").read_text()
+    part = text[text.index('id="index--engines"') : text.index('id="index--matrix"')]
+    errors = {row["engine"]: row["value"] for row in json.loads((out / "verdicts.json").read_text())["rows"]
+              if row["metric"] == "position"}  # fmt: skip
+    assert f'data-v="{errors["fake"]}"' in part
+    assert "skipped" in part
+
+
+def test_run_time_is_drawn_against_error(out: Path) -> None:
+    (mark,) = plots(out)["precision"]["data"]
+    assert mark["name"] == "fake:&lt;script>alert(1)&lt;/script>"
+    assert mark["x"][0] == pytest.approx(1e-6, rel=0.1)
+
+
+def test_studies_of_other_folders_stand_beside(tmp_path: Path, result: CaseResult) -> None:
+    out, bench = made(tmp_path / "out", [result]), ladder(tmp_path / "bench", "bouncing_ball:linear", HOSTILE)
+    site.write(out, others=[bench])
+    assert "crossbody bench" in (out / "bench.html").read_text()
+    assert 'data-v="42.0"' in (out / "index.html").read_text()
+    drawn = plots(out)["precision"]["data"]
+    assert "lines" in drawn[0]["mode"]
+    assert_links_resolve(out)
+    before = (out / "verdicts.json").read_text()
+    site.write(out)
+    assert (out / "bench.html").is_file()
+    assert (out / "verdicts.json").read_text() == before
+
+
+def test_a_study_of_another_version_is_told(tmp_path: Path, result: CaseResult) -> None:
+    out = made(tmp_path / "out", [result])
+    (out / "gapmap.json").write_text(json.dumps({"provenance": {}, "rows": [{"n": 3}]}))
+    site.write(out)
+    assert "Another version of crossbody wrote these tables" in (out / "gapmap.html").read_text()
+    assert (out / CASE).is_file()
+
+
+@pytest.mark.parametrize(("make", "says"), [(Path.mkdir, "was not written by crossbody"), (None, "holds no study")])
+def test_a_folder_without_a_study_cannot_stand_beside(
+    tmp_path: Path, result: CaseResult, make: Callable[[Path], None] | None, says: str
+) -> None:
+    out, other = made(tmp_path / "out", [result]), tmp_path / "other"
+    if make is None:
+        made(other, [result])
+    else:
+        make(other)
+    with pytest.raises(OutputError, match=says):
+        site.write(out, others=[other])
+
+
+def test_what_changed_is_told(tmp_path: Path, result: CaseResult) -> None:
+    before = made(tmp_path / "before", [result])
+    entry = replace(result.entries[0], run=result.truth.trajectory)
+    now = made(tmp_path / "now", [replace(result, entries=(entry, *result.entries[1:]))])
+    assert "0 of" in changed(now, now)
+    assert "0 of" not in changed(now, before)
+    text = (now / "index.html").read_text()
+    section = text[text.index("Verdicts that changed") :]
+    assert section.index("outside") < section.index("within")
+
+
+def changed(out: Path, base: Path) -> str:
+    site.write(out, against=base)
+    found = re.search(r"Against .*? gone\.", (out / "index.html").read_text())
+    assert found
+    return found.group()
+
+
+def fake_rows(count: int, name: str = "case {}") -> pd.DataFrame:
+    return table(
+        Verdict(
+            case=name.format(i), variant="v", engine="e", profile=f"p{k}", metric="m", value=1.0, unit="1", limit=2.0,
+            tier="A", verdict=Word.WITHIN, command="crossbody run",
+        ) for i in range(count) for k in range(3)
+    )  # fmt: skip
+
+
+def test_a_thousand_cases_are_paged(tmp_path: Path) -> None:
+    out = made(tmp_path / "out", [], fake_rows(1000))
+    assert len(list(out.glob("index*.html"))) == 10
+    assert len(list(out.glob("case-*.html"))) == 1000
+    assert max(path.stat().st_size for path in out.glob("index*.html")) < 300e3
+    first = (out / "index.html").read_text()
+    assert "index-10.html" in first
+    assert "No motion is stored" in next(out.glob("case-*.html")).read_text()
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd", HOSTILE, "a/b", "a b", "A" * 500, "..", "\0", "ü"])
+def test_a_hostile_case_stays_in_its_folder(tmp_path: Path, name: str) -> None:
+    out = made(tmp_path / "deep" / "out", [], fake_rows(1, name))
+    written = sorted(path.name for path in (tmp_path / "deep").rglob("*.html"))
+    assert len(written) == len(every(out)) == 2
+    assert_links_resolve(out)
+    for path in every(out):
+        assert HOSTILE not in path.read_text()
+
+
+def test_labels_have_distinct_files() -> None:
+    labels = ["a-b:c", "a:b-c", "a.b:c", "a:b.c", "a/b:c", "a b:c", "A" * 99, "A" * 98, "a:b:c"]
+    assert len({file_name(label).lower() for label in labels}) == len(labels)
+
+
+@pytest.mark.parametrize("spoil", [Path.unlink, lambda path: path.write_bytes(b"PAR1 broken")], ids=["gone", "broken"])
+def test_a_motion_that_cannot_be_read_is_told(
+    tmp_path: Path, result: CaseResult, spoil: Callable[[Path], object]
+) -> None:
+    out = made(tmp_path / "out", [result])
+    spoil(out / "traces" / "0001.parquet")
+    site.write(out)
+    text = (out / CASE).read_text()
+    assert "No motion is stored for fake:" in text
+    assert 'id="case-bouncing_ball.linear--plot-motion"' in text
+
+
+def test_results_of_another_version_are_told(tmp_path: Path, result: CaseResult) -> None:
+    out = made(tmp_path / "out", [result])
+    rows = json.loads((out / "verdicts.json").read_text())
+    for row in rows["rows"]:
+        del row["tier"]
+    (out / "verdicts.json").write_text(json.dumps(rows))
+    with pytest.raises(OutputError, match=r"written by crossbody 0\.0\.1: its verdicts have no tier"):
+        site.write(out)
+
+
+def test_a_page_needs_no_engine(out: Path) -> None:
+    code = (
+        "import sys; from pathlib import Path; from crossbody.reports.pages import site; "
+        "site.write(Path(sys.argv[1])); "
+        "print(sorted({'mujoco', 'pinocchio', 'sksundae', 'numba'} & set(sys.modules)))"
+    )
+    said = subprocess.run([sys.executable, "-c", code, str(out)], capture_output=True, text=True, check=True).stdout
+    assert said.strip() == "[]"
+
+
+def test_a_page_of_given_sections(out: Path) -> None:
+    rows = [{"a": HOSTILE, "b": 1 / 3}, {"a": "x", "b": float("nan")}]
+    given = Table(title="Numbers", columns=columns(a="A", b=("B [m]", Kind.NUMBER)), rows=rows)
+    figure = go.Figure({"data": [{"y": [1, 2], "name": HOSTILE}], "layout": {"title": {"text": "T"}, "height": 300}})
+    section = Section(name="s", title="S", plots=(Plot(name="p", figure=figure),), tables=(given,))
+    text = site.write_page(out, "replay", "Replay", [section]).read_text()
+    assert "0.3333" in text
+    assert 'data-v="0.3333333333333333"' in text
+    assert HOSTILE not in text
+    assert "\\u003cscript" in text
+    site.write(out)
+    assert not (out / "replay.html").is_file()
+
+
+def test_long_steps_are_drawn_as_cubics(result: CaseResult) -> None:
+    run = result.truth.trajectory
+    t = np.linspace(0.0, 0.4, 5)
+    fall = replace(
+        run, t=t, q=(1.0 - 4.905 * t**2)[:, None], v=(-9.81 * t)[:, None], events=(), ledger=None,
+        **{name: getattr(run, name)[: len(t)] for name in ("gap", "lam", "energy", "mode")},
+    )  # fmt: skip
+    dense, q = filled(fall)
+    assert len(dense) > 300
+    assert np.allclose(q[:, 0], 1.0 - 4.905 * dense**2, atol=1e-14)
+    assert set(t) <= set(dense)
+
+
+def test_a_folder_without_a_study_is_told(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="was not written by crossbody"):
+        site.write(tmp_path)
+
+
+def test_thinning_keeps_spikes_and_all_samples_around_events() -> None:
+    t = np.linspace(0.0, 1.0, 100_001)
+    y = np.sin(7 * t)
+    y[31_415] = 40.0
+    kept = keep(t, y, np.array([0.25]), points=500)
+    assert len(kept) < 600
+    assert 31_415 in kept
+    event = np.searchsorted(t, 0.25)
+    assert set(range(event - 5, event + 6)) <= set(kept)
+    assert kept[0] == 0
+    assert kept[-1] == len(t) - 1
+
+
+def test_thinning_leaves_short_signals_alone() -> None:
+    t = np.linspace(0, 1, 50)
+    assert np.array_equal(keep(t, t, np.zeros(0)), np.arange(50))
+
+
+@pytest.mark.parametrize("order", [1.0, 4.0, 8.0])
+def test_observed_order_is_the_slope(order: float) -> None:
+    steps = np.array([0.4, 0.2, 0.1, 0.05])
+    assert observed_order(steps, 3.0 * steps**order) == pytest.approx(order, rel=1e-9)
+    assert np.isnan(observed_order(steps, [np.inf, np.nan, 1e-3, 1e-4]))
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 20_000])
+def test_steps_of_a_run_begin_where_the_one_before_ended(count: int) -> None:
+    """Each of those that are drawn is from an instant of the run to its next one; of few, all are."""
+    rng = np.random.default_rng(count)
+    t = np.repeat(np.cumsum(rng.uniform(1e-3, 1.0, count)), rng.integers(1, 3, count))
+    case = load("bouncing_ball", "linear")
+    truth = truth_of(case)
+    steps = study._trace(case, Entry(engine="reference", profile="compiled", run=truth.trajectory, stepped=t), truth)
+    starts, lengths = (np.array(part) for part in steps.about["steps"])
+    behind = dict(zip(np.unique(t)[:-1].tolist(), np.diff(np.unique(t)).tolist(), strict=True))
+    assert [behind[start] for start in starts.tolist()] == lengths.tolist()
+    assert len(starts) == count - 1 if count < 10 else 100 < len(starts) < count

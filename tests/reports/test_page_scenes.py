@@ -1,0 +1,305 @@
+"""Pictures: what is drawn touches exactly where the mechanism's own gap says it does, and forces act there."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crossbody import cases
+from crossbody.cases import Case, Event, Mode, Trajectory
+from crossbody.cases.mechanisms.maze.geometry import maze_of
+from crossbody.reports import scenes
+from crossbody.reports.measuring.impulse import with_collisions
+from crossbody.reports.pages.case_page import PLOTTED
+from crossbody.reports.pages.figures import FIGURES, points_for
+from crossbody.reports.pages.playback import chosen, packed, peaks, playback
+from crossbody.reports.runs import study
+from crossbody.reports.runs.store import Trace
+
+CASES = (
+    ("bouncing_ball", "listing"), ("newtons_cradle", "sliders"), ("newtons_cradle", "pendulums"),
+    ("red_body", "resolved"), ("soft_contact", "axis"), ("soft_contact", "delta"), ("ball_maze", "inside"),
+    ("delta_impulse", "light"),
+)  # fmt: skip
+
+
+def states(case: Case, n: int = 5) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return case.q0 + 1e-3 * rng.standard_normal((n, len(case.q0)))
+
+
+def trace_of(case: Case, n: int = 50) -> Trace:
+    q, nc = states(case, n), len(case.contacts)
+    zero = np.zeros((n, nc))
+    run = Trajectory(
+        t=np.linspace(0.0, case.t_end, n), q=q, v=0.0 * q, gap=zero, lam=zero + 1.0, energy=np.zeros((n, 2)),
+        mode=zero.astype(np.int8),
+    )  # fmt: skip
+    about = study._about(case, "truth", "")
+    return Trace(about=about, run=run)
+
+
+def gaps(case: Case, q: np.ndarray) -> np.ndarray:
+    """By the reference's own kernel (n, nc)."""
+    from crossbody.engines import load
+
+    system = load("reference").prepare(case, "compiled").system
+    found = np.zeros((len(q), len(case.contacts)))
+    rate = np.zeros(len(case.contacts))
+    for i, row in enumerate(q):
+        system.gaps(0.0, row, np.zeros(len(row)), np.array(system.p), found[i], rate)
+    return found
+
+
+@pytest.mark.parametrize(("name", "variant"), CASES)
+def test_every_mechanism_has_a_picture(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    scene = scenes.load(case.mechanism)
+    stage, q = scene.stage(case.parameters), states(case)
+    poses = scene.poses(q, case.parameters)
+    arrows = scene.arrows(q, np.ones((len(q), len(case.contacts))), case.parameters)
+    assert poses.shape[0] == arrows.shape[0] == len(q)
+    assert poses.shape[2] == 3
+    assert arrows.shape[2] == 2 * stage.dimensions
+    assert np.isfinite(poses).all()
+    assert np.isfinite(arrows).all()
+    if stage.lines:
+        assert max(max(line) for line in stage.lines) < poses.shape[1]
+    else:
+        assert poses.shape[1] == len(stage.bodies)
+
+
+@pytest.mark.parametrize("variant", ["sliders", "pendulums"])
+def test_balls_are_as_far_apart_as_their_gap(variant: str) -> None:
+    case = cases.load("newtons_cradle", variant, gap=2e-3)
+    q = states(case)
+    centres = scenes.load(case.mechanism).poses(q, case.parameters)[:, :, :2]
+    apart = np.linalg.norm(np.diff(centres, axis=1), axis=2) - 2 * case.number("radius")
+    assert np.allclose(apart, gaps(case, q), atol=1e-13)
+
+
+def test_forces_of_a_pair_are_opposite() -> None:
+    case = cases.load("newtons_cradle", "pendulums")
+    q = states(case)
+    lam = np.random.default_rng(1).random((len(q), len(case.contacts)))
+    arrows = scenes.load(case.mechanism).arrows(q, lam, case.parameters)
+    left, right = np.split(arrows[:, :, 2:], 2, axis=1)
+    assert np.allclose(left, -right)
+    assert np.allclose(np.linalg.norm(right, axis=2), lam)
+
+
+PUSHED = {
+    "bouncing_ball listing": [(0, 0, 0)],
+    "newtons_cradle sliders": [(0, 0, 0), (1, 0, 1)],
+    "newtons_cradle pendulums": [(k, k % 4, k % 4 + k // 4) for k in range(8)],
+    "red_body resolved": [(0, 0, 1), (1, 1, 1), (2, 2, 0), (3, 3, 0), (4, 4, 0)],
+    "soft_contact axis": [(0, 0, 3), (1, 1, 3)],
+    "ball_maze inside": [(3, 3, 1)],
+}
+"""Arrow, row and body; of the maze the wall that the ball rolls on."""
+
+
+def slopes(of: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndarray:
+    """Central differences of a function of the coordinates (n,), the first index that of the coordinate."""
+    ways = 1e-6 * np.eye(len(q))
+    ahead, behind = np.split(of(np.concatenate([q + ways, q - ways])), 2)
+    return (ahead - behind) / 2e-6
+
+
+def from_outline(shapes: Sequence[Mapping[str, Any]], pose: np.ndarray, at: tuple[float, float]) -> float:
+    """Distance of a point, from a body's origin, to what is drawn of the body."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    x = np.array(at) @ [[c, -s], [s, c]]
+    found = [
+        abs(float(np.hypot(*(x - shape["circle"][:2]))) - shape["circle"][2]) for shape in shapes if "circle" in shape
+    ]
+    for shape in shapes:
+        points = np.array(shape.get("points", []))
+        for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
+            share = np.clip((x - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+            found.append(float(np.linalg.norm(a + share * (b - a) - x)))
+    return min(found)
+
+
+@pytest.mark.parametrize("name", PUSHED)
+def test_a_drawn_force_opens_the_gap_of_its_row(name: str) -> None:
+    """On the outline of its body, and where that moves alone the power is lam times the gap's rate."""
+    case = cases.load(*name.split(), **({"n": 2} if name.endswith("sliders") else {}))
+    scene, rng = scenes.load(case.mechanism), np.random.default_rng(4)
+    q = case.q0 + 0.05 * rng.standard_normal(len(case.q0))
+    lam = rng.uniform(1.0, 2.0, len(case.contacts))
+    arrows, pose = (part[0] for part in (scene.arrows(q[None], lam[None], case.parameters),
+                                         scene.poses(q[None], case.parameters)))  # fmt: skip
+    stage = scene.stage(case.parameters)
+    gap, rates = slopes(partial(gaps, case), q), slopes(lambda x: scene.poses(x, case.parameters), q)
+    for arrow, row, body in PUSHED[name]:
+        (x, y), force = arrows[arrow, :2] - pose[body, :2], arrows[arrow, 2:]
+        assert case.mechanism == "maze" or from_outline(stage.bodies[body], pose[body], (x, y)) < 1e-9
+        power = (rates[:, body, :2] + rates[:, body, 2:] * (-y, x)) @ force
+        alone = np.abs(np.delete(rates, body, axis=1)).max(axis=(1, 2), initial=0.0) < 1e-9
+        assert np.abs(power[alone]).max() > 0.1
+        assert np.allclose(power[alone], lam[row] * gap[alone, row], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_drawn_force_of_a_tip_pushes_the_ball_away_from_its_drawn_end(seed: int) -> None:
+    """As hard as its multiplier says, at any angle of the maze, and whichever wall the tip is of."""
+    case, rng = cases.load("ball_maze", "solve"), np.random.default_rng(seed)
+    scene, maze = scenes.load(case.mechanism), maze_of(case.parameters)
+    ring = maze.rings[int(rng.choice([i for i, ring in enumerate(maze.rings) if ring.gaps]))]
+    gap, end = int(rng.integers(ring.gaps)), int(rng.integers(2))
+    theta, lean = rng.uniform(-np.pi, np.pi), rng.uniform(-1.2, 1.2)
+    angle = theta + ring.tips(gap)[end]
+    into = angle + (0.5 - end) * np.pi + lean  # towards the gap
+    ball = ring.middle * np.array([np.cos(angle), np.sin(angle)])
+    ball += (ring.cap + maze.ball) * np.array([np.cos(into), np.sin(into)])
+    q, lam = np.array([theta, *ball, 0.0]), rng.uniform(1.0, 2.0, len(case.contacts))
+    arrows, pose = scene.arrows(q[None], lam[None], case.parameters)[0], scene.poses(q[None], case.parameters)[0]
+    walls = [shape for shape in scene.stage(case.parameters).bodies[0] if "points" in shape]
+    for row in (1, 2, 4, 5):
+        force = arrows[row, 2:]
+        assert np.linalg.norm(force) == pytest.approx(lam[row])
+        away, near = (from_outline(walls, pose[0], tuple(ball + s * 1e-4 * force / lam[row])) for s in (1.0, -1.0))
+        assert (away - near) / 2e-4 == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_drawn_force_of_a_delta_robot_closes_its_loop() -> None:
+    """Drawn at the wrist of another arm is the force on the first: with that arm alone it moves against the gap."""
+    case = cases.load("delta_impulse", "light")
+    scene, q = scenes.load(case.mechanism), states(case, 1)[0]
+    lam = np.random.default_rng(6).normal(size=(1, 6))
+    arrows = scene.arrows(q[None], lam, case.parameters)[0]
+    gap = slopes(partial(gaps, case), q)
+    ends = slopes(lambda x: scene.arrows(x, np.repeat(lam, len(x), axis=0), case.parameters)[:, :, :3], q)
+    points = scene.poses(q[None], case.parameters)[0]
+    for k in range(2):
+        alone, rows = slice(3 * k + 3, 3 * k + 6), slice(3 * k, 3 * k + 3)
+        assert np.abs(points - arrows[k, :3]).sum(axis=1).min() == 0.0
+        assert np.allclose(ends[alone, k] @ arrows[k, 3:], -gap[alone, rows] @ lam[0, rows], atol=1e-6)
+        assert np.abs(gap[alone, rows] @ lam[0, rows]).max() > 0.01
+
+
+def test_every_ball_of_a_cradle_hangs_on_a_thread_of_its_length() -> None:
+    case = cases.load("newtons_cradle", "pendulums")
+    scene, q = scenes.load(case.mechanism), states(case)
+    threads = scene.stage(case.parameters).threads
+    assert [body for *_, body in threads] == list(range(len(case.q0)))
+    poses = scene.poses(q, case.parameters)
+    spans = poses[:, :, :2] - np.array([thread[:2] for thread in threads])
+    assert np.allclose(np.linalg.norm(spans, axis=2), case.number("length"), atol=1e-13)
+    assert np.allclose(np.arctan2(spans[:, :, 0], -spans[:, :, 1]), poses[:, :, 2], atol=1e-13)
+
+
+def test_the_red_body_touches_where_its_gaps_say() -> None:
+    case = cases.load("red_body", "resolved")
+    q = states(case)
+    lam = np.ones((len(q), 5))
+    arrows = scenes.load("red_body").arrows(q, lam, case.parameters)
+    h = gaps(case, q)
+    assert np.allclose(arrows[:, :2, 1], h[:, :2], atol=1e-14)
+    assert np.allclose(case.number("wall") - arrows[:, 4, 0], h[:, 4], atol=1e-14)
+    normal, slab = arrows[:, 2, 2:], q[:, 3:5]
+    for k in (2, 3):
+        above = np.sum(normal * (arrows[:, k, :2] - slab), axis=1) - case.number("slab_half_height")
+        assert np.allclose(above, h[:, k], atol=1e-14)
+
+
+def test_the_arms_of_the_delta_robot_close_where_its_gaps_do() -> None:
+    case = cases.load("delta_impulse", "light")
+    q = states(case)
+    points = scenes.load("delta").poses(q, case.parameters)
+    apart = np.concatenate([_tip(points, 0, case) - _tip(points, i, case) for i in (1, 2)], axis=1)
+    assert np.allclose(apart, gaps(case, q), atol=1e-13)
+
+
+def _tip(points: np.ndarray, i: int, case: Case) -> np.ndarray:
+    """Centre of the flange as arm i has it: its wrist, less the flange's radius along the arm."""
+    hinge = points[:, 3 * i]
+    return points[:, 3 * i + 2] - case.number("r_flange") * hinge / np.linalg.norm(hinge, axis=1, keepdims=True)
+
+
+def test_the_soft_block_is_touched_where_its_gaps_say() -> None:
+    case = cases.load("soft_contact", "axis")
+    q = states(case)
+    arrows = scenes.load("soft_contact").arrows(q, np.ones((len(q), 2)), case.parameters)
+    poses = scenes.load("soft_contact").poses(q, case.parameters)
+    h = gaps(case, q)
+    assert np.allclose(arrows[:, 0, 0] - poses[:, 1, 0], h[:, 0], atol=1e-14)
+    assert np.allclose(poses[:, 2, 0] - arrows[:, 1, 0], h[:, 1], atol=1e-14)
+
+
+def test_peaks_miss_no_blow() -> None:
+    lam = np.zeros((1000, 2))
+    lam[437, 1], lam[10, 0], lam[998, 0] = -50.0, np.nan, 7.0
+    t = np.linspace(0.0, 1.0, 1000)
+    at = chosen(t, np.array([0.25]), 40)
+    assert at[0] == 0
+    assert at[-1] == 999
+    found = peaks(lam, at + 1)
+    assert found[:, 1].min() == -50.0
+    assert found[:, 0].max() == 7.0
+    assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize(("name", "variant"), CASES)
+def test_playback_is_small_and_holds_the_motion(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    trace = trace_of(case)
+    many = [trace] * 10
+    (section,) = playback(many)
+    assert len(section.context["scene"]) < 450e3
+    track = packed(many, scenes.load(case.mechanism))["tracks"][0]
+    t = np.frombuffer(base64.b64decode(track["t"]), "<f4")
+    assert t[0] == 0.0
+    assert t[-1] == pytest.approx(case.t_end, rel=1e-6)
+
+
+def test_collisions_that_take_no_time_are_drawn_as_impulses() -> None:
+    case = cases.load("red_body", "frozen")
+    trace = trace_of(case)
+    events = (
+        Event(t=0.05, contact=2, before=Mode.FREE, after=Mode.COLLISION),
+        Event(t=0.05, contact=2, before=Mode.COLLISION, after=Mode.CONTACT, impulse=3.0),
+    )
+    struck = replace(trace, run=replace(trace.run, events=events, lam=0.0 * trace.run.lam))
+    scene = scenes.load(case.mechanism)
+    found = packed([struck], scene)
+    assert (found["force"], found["impulse"]) == (0.0, 3.0)
+    (track,) = found["tracks"]
+    blows = np.frombuffer(base64.b64decode(track["blows"]), "<f4").reshape(-1, 4)
+    at = np.frombuffer(base64.b64decode(track["struck"]), "<f4")
+    assert at == pytest.approx([0.05], abs=case.t_end / 49)
+    i = int(np.searchsorted(trace.run.t, 0.05))
+    wanted = scene.arrows(trace.run.q[i : i + 1], 3.0 * np.eye(len(case.contacts))[2:3], case.parameters)[0]
+    assert np.allclose(blows, wanted, atol=1e-6)
+    step = with_collisions(struck.run, events)
+    assert np.allclose(step[:, 2], np.where(struck.run.t >= 0.05, 3.0, 0.0))
+
+
+def test_plots_of_many_engines_and_events_stay_in_their_room() -> None:
+    case, n = cases.load("newtons_cradle", "pendulums"), 3000
+    rng, t = np.random.default_rng(5), np.linspace(0.0, case.t_end, n)
+    events = tuple(Event(t=float(at), contact=0, before=Mode.FREE, after=Mode.CONTACT) for at in t[::40])
+    q, wide = rng.standard_normal((n, len(case.q0))), rng.random((n, len(case.contacts)))
+    run = Trajectory(
+        t=t, q=q, v=q, gap=-wide, lam=wide, energy=rng.random((n, 2)), mode=(wide > 0.5).astype(np.int8), events=events
+    )  # fmt: skip
+    many = [Trace(about=study._about(case, "e", str(i)), run=run, truth=run) for i in range(10)]
+    points = points_for(many, PLOTTED)
+    drawn = {name: len(json.dumps(draw(many, points))) for name, (_, draw) in FIGURES.items()}
+    assert sum(size for name, size in drawn.items() if name not in ("modes", "steps")) < 1.1 * PLOTTED
+    assert points > 100
+
+
+def test_an_unknown_mechanism_is_told() -> None:
+    trace = trace_of(cases.load("bouncing_ball", "listing"))
+    (section,) = playback([replace(trace, about=dict(trace.about) | {"mechanism": "../x"})])
+    assert "no picture of the mechanism ../x" in section.text
+    assert section.template == "section.html"
