@@ -9,9 +9,9 @@ import numpy as np
 from crossbody.reference import kernels
 from crossbody.reference.kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
-from crossbody.reference.pairs import slip
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import balls, forces, layout, loops, strings, sweeps, traced
+from crossbody.reference.tree import pair_slip as slip
 from crossbody.reference.tree.pair_rows import gradient, touch
 from crossbody.reference.tree.points import point, pull
 
