@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,3 +76,8 @@ def _place(where: str, i: int, count: int) -> str:
 
 def _shortest(number: Value) -> str:
     return repr(float(number)).removesuffix(".0")
+
+
+def of_numbers(parameters: Mapping[str, Value]) -> dict[str, float]:
+    """Return the parameters that are numbers, by name."""
+    return {name: float(value) for name, value in parameters.items() if not isinstance(value, str)}

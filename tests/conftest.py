@@ -22,3 +22,7 @@ def own_plugins() -> Iterator[None]:
     for module in installed._FILES.values():
         sys.modules.pop(module.__name__, None)
     installed._FILES.clear()
+    if "joblib" in sys.modules:  # processes that tests have left know the plug-ins
+        from joblib.externals.loky import get_reusable_executor
+
+        get_reusable_executor().shutdown(wait=True)

@@ -13,6 +13,7 @@ from crossbody.cases.case import Case, Chaos, Value
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta import scene as delta
 from crossbody.cases.mechanisms.delta.limits import FREE
+from crossbody.cases.parameters import of_numbers
 
 PARAMETERS = {**delta.ROBOT, **delta.position(0.05, 0.02, 0.5), **delta.horizon(2.5)}
 
@@ -37,7 +38,7 @@ FOLDS_ON = Chaos(until=FALLS, why="every time that the robot folds through coinc
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene: closed, at rest, no torque."""
-    p = delta.numbers(parameters)
+    p = of_numbers(parameters)
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
     longer = FOLDS_ON if p["t_end"] > FALLS else None
     return delta.scene(

@@ -15,6 +15,7 @@ from crossbody.cases.errors import InvalidValue
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta import scene as delta
 from crossbody.cases.mechanisms.delta.limits import IMPULSE
+from crossbody.cases.parameters import of_numbers
 
 PARAMETERS = {
     **delta.ROBOT,
@@ -45,7 +46,7 @@ _TITLES = {
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene at rest in the pose of the flange, or just behind the impulse."""
-    p = delta.numbers(parameters)
+    p = of_numbers(parameters)
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
     impulse, length = np.array([p["jx"], p["jy"], p["jz"]]), p["length"]
     if length == 0.0 and p["start"] > 0.0:

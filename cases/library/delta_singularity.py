@@ -15,6 +15,7 @@ from crossbody.cases.case import Case, Claim, Parameter, Tier, Value
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta import scene as delta
 from crossbody.cases.mechanisms.delta.limits import SINGULARITY
+from crossbody.cases.parameters import of_numbers
 
 PARAMETERS = {
     **delta.ROBOT,
@@ -36,7 +37,7 @@ VARIANTS: dict[str, dict[str, Value]] = {
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene; the period of the swing is claimed where the servos end at the pose itself."""
-    p = delta.numbers(parameters)
+    p = of_numbers(parameters)
     end = pose.elbow_angle(p) + p["offset"]
     pose.symmetric_pose(p, end)
     q0 = pose.symmetric_pose(p, p["start_angle"])

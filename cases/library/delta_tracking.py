@@ -15,6 +15,7 @@ from crossbody.cases.case import Case, Claim, Parameter, Tier, Value
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta import scene as delta
 from crossbody.cases.mechanisms.delta.limits import on_the_circle, tracking
+from crossbody.cases.parameters import of_numbers
 
 PARAMETERS = {
     **delta.ROBOT,
@@ -75,12 +76,12 @@ def _claims(variant: str, parameters: Mapping[str, Value]) -> tuple[Claim, ...]:
     if variant == "pd" or not shown or dict(parameters) != preset | {"t_end": parameters["t_end"]}:
         return ()
     source = "the lag of sampling and delay; about 0.1 mm as published"
-    return (Claim(metric="tracking_error", expected=_lag(delta.numbers(parameters)), tier=Tier.A, source=source),)
+    return (Claim(metric="tracking_error", expected=_lag(of_numbers(parameters)), tier=Tier.A, source=source),)
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene: at rest in the middle of the circle."""
-    p, claims = delta.numbers(parameters), _claims(variant, parameters)
+    p, claims = of_numbers(parameters), _claims(variant, parameters)
     settled, grown = p["t_end"] >= SETTLED, min(p["t_end"] / p["fade"], 1.0) ** 3
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
     return delta.scene(

@@ -264,6 +264,8 @@ def _bounces(case: Case, asked: Mapping[str, Any]) -> list[float]:
 
 def _flowing(machine: Callable[[], Machine], case: Case, scene: Scene, used: Mapping[str, Any]) -> Integrate:
     rtol, method, limit = float(used["rtol"]), str(used.get("method", "Adams")), int(used["max_steps"])
+    if method == AUTO and case.control is not None:
+        method = METHODS[0]  # a trial would ask a controller of the user's own at ticks that it has had
 
     def flown(log: Log, method: str, limit: int) -> Flow:
         flow = Flow(machine(), log, rtol, _absolute(scene, rtol), method, limit, scene.world, scene.coordinates)

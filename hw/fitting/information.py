@@ -19,6 +19,8 @@ NULL = 1e-8
 """Singular value of the derivatives, columns of norm 1, over the largest, below which a direction has no effect."""
 BELONGS = 0.3
 """Part of the largest weight of a direction from which on keeping a parameter is a good way to remove it."""
+ROUNDING = 1e-9
+"""Entry of a direction, of 1, that elimination makes of none."""
 WEIGHT = 0.05
 """Part of the largest weight of a direction from which on a parameter belongs to it."""
 
@@ -67,7 +69,7 @@ def unseen_by(information: Information, count: int) -> Floats:
     rank = int(np.sum(np.abs(np.diag(R)) > WEIGHT * abs(R[0, 0])))
     reduced = np.zeros((rank, count))
     reduced[:, order] = np.linalg.solve(R[:rank, :rank], R[:rank])
-    reduced[np.abs(reduced) < 1e-3] = 0.0
+    reduced[np.abs(reduced) < ROUNDING] = 0.0
     return reduced
 
 

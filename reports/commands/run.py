@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -155,7 +155,7 @@ def show_controllers(out: Path) -> None:
             print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")
 
 
-def _summary(rows: pd.DataFrame, times: Mapping[tuple[str, str], tuple[float, float | None]]) -> Any:
+def _summary(rows: pd.DataFrame, times: results.Times) -> Any:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold")

@@ -24,6 +24,8 @@ NUMBER = (int, float, type(None))
 NUMBERS = ("value", "expected", "limit", "compared", "band", "known")
 JUDGED = {name: NUMBER if name in NUMBERS else (str,) for name in COLUMNS}
 AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
+Times = dict[tuple[str, str], tuple[float, float | None]]
+"""(case:variant, engine:profile) -> run time, and what it took in all where that is told, s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,11 +94,11 @@ def read(out: Path, against: Path | None = None) -> Results:
     audited = read_json(out / "audit.json")["rows"]
     check_fields(out / "audit.json", audited, AUDITED)
     audits = _by(audited, "case")
-    cases, walls = _cases(out, verdicts)
+    cases, times = _cases(out, verdicts)
     base = None if against is None else verdicts_of(against)
     return Results(
         out=out, verdicts=verdicts, rows=_by(records(verdicts), "label"), audits=audits, told=told,
-        cases=cases, walls=walls, base=base,
+        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
 
@@ -131,11 +133,11 @@ def verdicts_of(out: Path) -> pd.DataFrame:
     return rows.assign(label=rows["case"] + ":" + rows["variant"], who=rows["engine"] + ":" + rows["profile"])
 
 
-def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], dict[tuple[str, str], float]]:
-    """Every case that has a verdict or a motion, and the run times."""
+def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], Times]:
+    """Every case that has a verdict or a motion, and the run times with what each engine took in all."""
     paths: dict[str, list[Path]] = {}
     abouts: dict[str, Mapping[str, Any]] = {}
-    walls: dict[tuple[str, str], float] = {}
+    times: Times = {}
     broken: list[str] = []
     for path in (out / "traces" / name for name in listed(out, "traces") if name.endswith(".parquet")):
         try:
@@ -149,28 +151,22 @@ def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], di
         label, who = f"{about['case']}:{about['variant']}", f"{about['engine']}:{about['profile']}"
         paths.setdefault(label, []).append(path)
         abouts.setdefault(label, about)
-        walls[label, who] = told["wall_s"]
+        times[label, who] = told["wall_s"], about.get("took_s")
     labels = dict.fromkeys([*verdicts["label"], *paths])
     wanted = _wanted(verdicts)
     found = tuple(
         CaseFiles(
             label=label, page=f"case-{file_name(label)}", about=abouts.get(label, {}),
             paths=tuple(paths.get(label, ())),
-            missing=_missing(label, wanted.get(label, []), walls, broken),
+            missing=_missing(label, wanted.get(label, []), times, broken),
         ) for label in labels
     )  # fmt: skip
-    return found, walls
+    return found, times
 
 
-def times_of(out: Path) -> dict[tuple[str, str], tuple[float, float | None]]:
+def times_of(out: Path) -> Times:
     """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile."""
-    cases, walls = _cases(out, verdicts_of(out))
-    abouts = [peek(path)["about"] for case in cases for path in case.paths]
-    took = {
-        (f"{about['case']}:{about['variant']}", f"{about['engine']}:{about['profile']}"): about.get("took_s")
-        for about in abouts
-    }
-    return {one: (wall, took[one]) for one, wall in walls.items()}
+    return _cases(out, verdicts_of(out))[1]
 
 
 def _wanted(verdicts: pd.DataFrame) -> dict[str, list[str]]:
@@ -179,10 +175,8 @@ def _wanted(verdicts: pd.DataFrame) -> dict[str, list[str]]:
     return {str(label): list(group["who"]) for label, group in ran.groupby("label", sort=False)}
 
 
-def _missing(
-    label: str, engines: list[str], walls: Mapping[tuple[str, str], float], broken: list[str]
-) -> tuple[str, ...]:
-    lost = [who for who in ["truth:", *engines] if (label, who) not in walls]
+def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:
+    lost = [who for who in ["truth:", *engines] if (label, who) not in times]
     if not lost:
         return ()
     names = ", ".join(who.removesuffix(":") for who in lost)

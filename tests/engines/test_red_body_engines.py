@@ -30,6 +30,19 @@ def test_engines_that_follow_the_variant(variant: str, name: str, profile: str, 
 
 
 @pytest.mark.parametrize(("name", "profile"), [("mujoco", "matched"), ("pinocchio", "law")])
+def test_a_collision_without_damping_has_its_own_constants(name: str, profile: str) -> None:
+    """Rows have two sets by their stiffness: b1 may be 0."""
+    pytest.importorskip(name)
+    case = load("red_body", "resolved", zeta4=0.0, t_end=0.5)
+    theirs, ours = engines.load(name).prepare(case, profile).run(), run(case, rtol=1e-12)
+    assert theirs.outcome.ok, theirs.message
+    assert [(e.contact, e.before, e.after) for e in theirs.events] == [
+        (e.contact, e.before, e.after) for e in ours.events
+    ]
+    np.testing.assert_allclose(theirs.q[-1], ours.q[-1], atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "profile"), [("mujoco", "matched"), ("pinocchio", "law")])
 def test_parity_with_every_row_entered(name: str, profile: str) -> None:
     """M, bias, H, lam of an engine that follows the law: the same at states that turn and slide."""
     pytest.importorskip(name)

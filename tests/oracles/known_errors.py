@@ -13,6 +13,7 @@ from crossbody import engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory, load
 from crossbody.cases.contacts import AT_REST, CLOSED, LIGHT
 from crossbody.cases.mechanisms.delta import pose
+from crossbody.cases.parameters import of_numbers
 from crossbody.reports.measuring.truth import Truth, from_run, sample_times
 
 OFF = 1e-3
@@ -335,7 +336,7 @@ def aside(s: Scene) -> tuple[Trajectory, float]:
     """The flange beside its place at one sample."""
     from crossbody.cases.mechanisms.delta.metrics import flange
 
-    p = {name: float(x) for name, x in s.case.parameters.items() if not isinstance(x, str)}
+    p = of_numbers(s.case.parameters)
     k, way = s.sample(), np.zeros(3)
     way[s.one(range(3))] = s.sign() * OFF
     return changed(s.run, "q", k, pose.pose(p, flange(s.run, s.case)[k] + way), whole=True), OFF

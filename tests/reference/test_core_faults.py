@@ -128,7 +128,7 @@ def test_buffers_grow_without_loss():
 def test_interrupt_is_answered_at_once():
     code = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"  # else it may be ignored
-        "sys.path.insert(0, 'tests'); from mechanisms import ball;"
+        "sys.path.insert(0, 'tests/support'); from mechanisms import ball;"
         "from crossbody.reference import simulate; simulate(ball(), [1.0], [0.0], 0.1); print('ready', flush=True);"
         "r = simulate(ball(), [1.0], [0.0], 1e4, max_step=1e-5,"
         " max_steps=10**9, samples=[0.0]); print(r.outcome, flush=True)"
@@ -154,7 +154,7 @@ def test_runs_do_not_remember_each_other():
 
 COUNTED = """
 import sys
-sys.path.insert(0, 'tests')
+sys.path.insert(0, 'tests/support')
 import numba
 from numba.core import compiler
 compile_extra, count = compiler.compile_extra, []

@@ -10,8 +10,8 @@ from crossbody.cases import Mode, Outcome
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.engines import load
 from crossbody.reference import delta
+from crossbody.reference.delta.kernels import robot as arms
 from crossbody.reference.linear import linearise
-from crossbody.reference.systems import delta as arms
 from crossbody.reference.systems import soft_delta as mechanism
 from crossbody.reports import metrics
 

@@ -14,6 +14,7 @@ from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
 from crossbody.cases.contacts import contacts
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.mechanisms.delta import pose
+from crossbody.cases.parameters import of_numbers
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.impulse import with_collisions
@@ -166,7 +167,7 @@ def test_the_flange_is_held_against_its_path_once_it_has_settled() -> None:
     case = load("delta_tracking", "circle")
     path, t = scene.path_of(case.parameters), np.linspace(0.0, case.t_end, 61)
     assert path is not None
-    p = {name: float(x) for name, x in case.parameters.items() if not isinstance(x, str)}
+    p = of_numbers(case.parameters)
     on = path(t)[0]
 
     def run(k: int | None) -> Trajectory:

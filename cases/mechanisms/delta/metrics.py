@@ -10,18 +10,14 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.metric import CaseMetric
+from crossbody.cases.parameters import of_numbers
 from crossbody.cases.swing import period
 from crossbody.cases.trajectory import Trajectory
 
 
-def parameters(case: Case) -> pose.Numbers:
-    """Return the parameters that are numbers."""
-    return {k: float(value) for k, value in case.parameters.items() if not isinstance(value, str)}
-
-
 def flange(run: Trajectory, case: Case) -> Floats:
     """Return the position of the flange (n, 3), m."""
-    return pose.flanges(parameters(case), run.q)
+    return pose.flanges(of_numbers(case.parameters), run.q)
 
 
 def circle(p: pose.Numbers, t: Floats) -> Floats:
@@ -37,7 +33,7 @@ def circle(p: pose.Numbers, t: Floats) -> Floats:
 def _tracking_error(run: Trajectory, case: Case) -> float:
     """Max |r - z| in the last third of the horizon, m."""
     late = run.t > case.t_end * 2.0 / 3.0
-    apart = circle(parameters(case), run.t[late]) - flange(run, case)[late]
+    apart = circle(of_numbers(case.parameters), run.t[late]) - flange(run, case)[late]
     return float(np.max(np.linalg.norm(apart, axis=1), initial=0.0))
 
 

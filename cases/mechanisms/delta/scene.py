@@ -52,11 +52,6 @@ def horizon(t_end: float) -> dict[str, Parameter]:
     return {"t_end": Parameter(default=t_end, unit="s", doc="horizon", low=0.0, open_low=True)}
 
 
-def numbers(parameters: Mapping[str, Value]) -> dict[str, float]:
-    """The parameters that are numbers."""
-    return {k: float(value) for k, value in parameters.items() if not isinstance(value, str)}
-
-
 def scene(
     name: str, variant: str, title: str, table: Mapping[str, Parameter], parameters: Mapping[str, Value],
     q0: Floats, v0: Floats, **more: Any,

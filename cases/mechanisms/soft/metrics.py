@@ -11,8 +11,8 @@ from crossbody.cases.between import multipliers
 from crossbody.cases.case import Case
 from crossbody.cases.contacts import contacts
 from crossbody.cases.mechanisms.delta import pose
-from crossbody.cases.mechanisms.delta.metrics import parameters
 from crossbody.cases.metric import CaseMetric
+from crossbody.cases.parameters import of_numbers
 from crossbody.cases.trajectory import Trajectory
 
 SIDES = ("left", "right")
@@ -45,7 +45,7 @@ def flange(run: Trajectory, case: Case) -> Floats:
     """Return the position of the flange along the fingers (n,), m."""
     if case.variant == "axis":
         return run.q[:, _coordinate(case, "flange")]
-    return pose.flanges(parameters(case), run.q[:, :9])[:, 0]
+    return pose.flanges(of_numbers(case.parameters), run.q[:, :9])[:, 0]
 
 
 def invariant(run: Trajectory, case: Case) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Coordinate, Law, Parameter, Value
 from crossbody.cases.errors import InvalidValue, SceneError
+from crossbody.cases.parameters import of_numbers
 
 FINGERS = {
     "kstar": Parameter(default=20.0, unit="cm/(s N)", doc="gain of the tactile loop: x_ref' = k* (y_R - y_L)", low=0.0),
@@ -63,7 +64,7 @@ def coordinate(p: Mapping[str, float], name: str, unit: str) -> Coordinate:
 
 def numbers(parameters: Mapping[str, Value]) -> dict[str, float]:
     """The parameters as numbers, with k in (m/s)/N beside k* in cm/(s N)."""
-    found = {name: float(value) for name, value in parameters.items() if not isinstance(value, str)}
+    found = of_numbers(parameters)
     return found | {"k": 0.01 * found["kstar"]}
 
 

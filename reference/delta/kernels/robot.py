@@ -177,7 +177,7 @@ def solve(
     lam: Floats,
     hd: Floats,
 ) -> int:
-    """Accelerations and multipliers by blocks, see `_delta_solve`."""
+    """Accelerations and multipliers by blocks, see `crossbody.reference.delta.kernels.solve`."""
     T = trig(q, 0), trig(q, 1), trig(q, 2)
     e = _external(t, q, v, u, p)
     f = _scaled(0, v, p, T[0], e), _scaled(1, v, p, T[1], e), _scaled(2, v, p, T[2], e)
