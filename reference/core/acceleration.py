@@ -170,7 +170,7 @@ def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array
         _rate_and_drive(s, m, w, on, j, v)
         _schur_row(s, m, w, j)
     if s.frictional:
-        return factor(s, m, w)
+        return factor(s, m, w, on > 0.0)
     s.dependent = factor_schur(w.G, na, w.reach, w.idx, w.shares)
     return int(s.dependent < 0)
 

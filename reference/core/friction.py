@@ -148,9 +148,9 @@ def _is_tangent(m: Model, i: int) -> bool:
 
 
 @inlined
-def _directions(s: Any, m: Model, w: Work) -> None:
-    """Leave in w.along the direction in which every sliding contact slides."""
-    small = small_slip(s)
+def _directions(s: Any, m: Model, w: Work, turning: bool) -> None:
+    """Leave in w.along the direction in which every sliding contact slides, or that of reference."""
+    small = small_slip(s) if turning else np.inf
     for j in range(s.na):
         i = w.idx[j]
         if not has_friction(m, i) or not w.slides[i]:
@@ -324,10 +324,11 @@ def solve_complete(
 
 
 @compiled
-def factor(s: Any, m: Model, w: Work) -> int:
+def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
     """Factor A of the rows in contact from G in the lower triangle of w.G; 1 if that is not finite.
 
-    The rates of tangential rows count from here on against what the surface does by itself.
+    The rates of tangential rows count from here on against what the surface does by itself. Directions of slip are
+    those of the present velocities if they are `turning`, else those of reference.
     """
     for j in range(s.na):
         i = w.idx[j]
@@ -340,7 +341,7 @@ def factor(s: Any, m: Model, w: Work) -> int:
             value = w.G[j, c] if c >= w.reach[j] else 0.0
             w.gram[j, c] = value
             w.gram[c, j] = value
-    _directions(s, m, w)
+    _directions(s, m, w, turning)
     factor_set(s, m, w)
     return int(s.rank == 0 and s.unknowns > 0)
 
@@ -484,6 +485,49 @@ def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
         i = w.idx[j]
         if has_friction(m, i) and w.slides[i]:
             out[i] = stiffness(s, m, w, j)
+
+
+@inlined
+def _across(m: Model, w: Work, i: int) -> tuple[float, float]:
+    """Across the direction of slip of contact i: its part along both tangential rows."""
+    first = w.listed[m.tangent[i]]
+    return -w.along[first + 1], w.along[first]
+
+
+@inlined
+def turning_rate(s: Any, m: Model, w: Work) -> float:
+    """Fastest rate, 1/s, at which friction turns a slip into its own direction: mu lam_n / |v_t| over the mass there.
+
+    From the last evaluation and what stands at the step's start. It grows without bound as a slip dies out.
+    """
+    fastest, small = 0.0, small_slip(s)
+    for i in range(s.nc):
+        if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1:
+            size = slip_velocity(m, i, w.rates[0])
+            if size > small:
+                c, (x, y) = w.listed[m.tangent[i]], _across(m, w, i)
+                light = x * x * w.gram[c, c] + 2.0 * x * y * w.gram[c, c + 1] + y * y * w.gram[c + 1, c + 1]
+                fastest = max(fastest, m.friction[i] * w.lam0[i] * light / size)
+    return float(fastest)
+
+
+@inlined
+def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
+    """Fill w.la with what a turn of the slip of contact i by one radian makes of all multipliers; 1/|v_t|, or 0.
+
+    Times the slip velocity across it is the turn. w.lam0 has the multipliers of the present instant.
+    """
+    size = slip_velocity(m, i, w.rates[0])
+    if not w.slides[i] or m.tangents[i] < 2 or size <= small_slip(s):
+        return 0.0
+    c, (x, y) = w.listed[m.tangent[i]], _across(m, w, i)
+    force = -m.friction[i] * w.lam0[i]
+    for j in range(s.na):
+        w.r[j] = -force * (w.gram[j, c] * x + w.gram[j, c + 1] * y)
+    solve(s, m, w, w.r, w.la)
+    w.la[c] += force * x
+    w.la[c + 1] += force * y
+    return float(1.0 / size)
 
 
 @inlined

@@ -122,6 +122,7 @@ STATE = np.dtype(
         ("spoilt", "i8"),  # a row holds what is not finite
         ("events", "i8"),
         ("switches", "i8"),
+        ("turning_rate", "f8"),  # fastest at which friction turns a slip, at a step's start
         ("slip_speed", "f8"),  # largest speed seen at contacts with friction
         ("unknowns", "i8"),  # of the algebra of friction: how many,
         ("normals", "i8"),  # and how many are no sticking rows
