@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.errors import SceneError
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import UNBOUNDED, Joint, Pair, Scene, Shape, Tendon, Vector
 
@@ -107,7 +108,12 @@ def contacts(scene: Scene) -> tuple[Contact, ...]:
 def frictional(scene: Scene) -> str | None:
     """Return why an engine that has no rows with friction cannot run a scene; None if it can."""
     first = next((one for one in contacts(scene) if one.friction > 0.0), None)
-    return None if first is None else f"Pair {first.pair.name!r} has friction, which the reference alone follows."
+    if first is None:
+        return None
+    return (
+        f"Pair {first.pair.name!r} has friction, which the profile 'compiled' of the reference alone follows; "
+        "without=friction leaves that of a file out of every engine."
+    )
 
 
 def inert(scene: Scene) -> tuple[Pair, ...]:
@@ -245,15 +251,42 @@ def _all(scene: Scene) -> Iterator[Contact | Pair]:
         if (one.type, two.type) not in PLACES:
             one, two = two, one
         places = _places(one, two)
-        known = places > 0 and (pair.dimension == 1 or _slides(scene, pair, one, two))
+        known = places > 0 and not _unknown_friction(scene, pair, one, two)
         yield Contact(pair=pair, first=one, second=two, places=places) if known else pair
 
 
-def _slides(scene: Scene, pair: Pair, one: Shape, two: Shape) -> bool:
-    """Whether a pair has the friction that the machine knows: sliding alone, the same in all directions."""
-    if not scene.friction or pair.dimension != 3 or (one.type, two.type) not in ROUND:
-        return False
-    return pair.friction[0] == pair.friction[1]
+def check_pairs(scene: Scene) -> None:
+    """Refuse pairs that have no rows though their shapes may meet.
+
+    Raises:
+        SceneError: naming the first one, what is wrong with it, and what would be valid.
+    """
+    inert_, shapes = inert(scene), {shape.name: shape for shape in scene.shapes}
+    for pair in (found for found in _all(scene) if isinstance(found, Pair) and found not in inert_):
+        one, two = sorted((shapes[pair.first], shapes[pair.second]), key=lambda shape: shape.type != "plane")
+        if (one.type, two.type) not in PLACES:
+            one, two = two, one
+        reason = _unknown_friction(scene, pair, one, two) if _places(one, two) else "their gap is not known"
+        raise SceneError(
+            f"Pair {pair.name!r} of a {one.type} and a {two.type} has no rows: {reason}. Valid are pairs of "
+            f"{', '.join(map(' and '.join, PLACES))}; with friction (dimension=3) of "
+            f"{', '.join(map(' and '.join, ROUND))}."
+        )
+
+
+def _unknown_friction(scene: Scene, pair: Pair, one: Shape, two: Shape) -> str:
+    """Return why the machine does not know the friction of a pair; empty if it has none or slides alike all ways."""
+    if pair.dimension == 1:
+        return ""
+    if not scene.friction:
+        return "it has friction, and Scene.friction is False (without=friction, or dimension=1, leaves it out)"
+    if (one.type, two.type) not in ROUND:
+        return "friction of such shapes is not done"
+    if pair.dimension != 3:
+        return f"friction that spins or rolls (dimension={pair.dimension}) is not done; it may be 3"
+    if pair.friction[0] != pair.friction[1]:
+        return f"friction that differs by direction ({pair.friction[0]} and {pair.friction[1]}) is not done"
+    return ""
 
 
 def _places(one: Shape, two: Shape) -> int:

@@ -21,6 +21,7 @@ from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
+from crossbody.cases.scene_contacts import check_pairs
 from crossbody.cases.scene_rows import law_of, rows_of
 
 REFERENCE_POSE, UNNAMED = "reference", "scene"
@@ -170,6 +171,8 @@ def case_of(
         SceneError: for a scene that no engine here can run, naming what stands against it.
     """
     check_runnable(scene)
+    if not file:  # of a file's the run tells whether they meet
+        check_pairs(scene)
     if rank >= 0 and not scene.loops:
         raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))

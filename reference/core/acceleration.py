@@ -225,7 +225,7 @@ def accelerate(
     on = 0.0 if general == SMOOTH else 1.0
     if s.has_solve and general == OWN:
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
-    if s.n == 1 and na <= 1:
+    if s.n == 1 and na <= 1 and not s.frictional:
         return _scalar(dynamics, rows, s, m.p, w, on, t, q, v)
     if free(dynamics, s, m, w, t, q, v) != 0:
         return 1

@@ -148,20 +148,30 @@ def _is_tangent(m: Model, i: int) -> bool:
 
 
 @inlined
+def _lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
+    """Return the slip velocity (x, y) of contact i, one that is small lengthened along the direction of reference.
+
+    So its direction changes steadily to that of reference where it vanishes: a jump would end every step.
+    """
+    t = m.tangent[i]
+    more = max(small_slip(s) - np.sqrt(x * x + y * y), 0.0)
+    return x + more * w.way[t], y + (more * w.way[t + 1] if m.tangents[i] > 1 else 0.0)
+
+
+@inlined
 def _directions(s: Any, m: Model, w: Work, turning: bool) -> None:
     """Leave in w.along the direction in which every sliding contact slides, or that of reference."""
-    small = small_slip(s) if turning else np.inf
     for j in range(s.na):
         i = w.idx[j]
         if not has_friction(m, i) or not w.slides[i]:
             continue
-        first, size, ahead = w.listed[m.tangent[i]], 0.0, 0.0
-        for c in range(first, first + m.tangents[i]):
-            size += w.hda[c] * w.hda[c]
-            ahead += w.hda[c] * w.way[w.idx[c]]
-        size = np.sqrt(size)
-        for c in range(first, first + m.tangents[i]):
-            w.along[c] = w.hda[c] / size if size > small and ahead > 0.0 else w.way[w.idx[c]]
+        t, c, two = m.tangent[i], w.listed[m.tangent[i]], m.tangents[i] > 1
+        x, y = _lengthened(s, m, w, i, w.hda[c], w.hda[c + 1] if two else 0.0)
+        size, ahead = np.sqrt(x * x + y * y), x * w.way[t] + (y * w.way[t + 1] if two else 0.0)
+        follows = turning and ahead > 0.0
+        w.along[c] = x / size if follows else w.way[t]
+        if two:
+            w.along[c + 1] = y / size if follows else w.way[t + 1]
 
 
 @inlined
@@ -495,18 +505,25 @@ def _across(m: Model, w: Work, i: int) -> tuple[float, float]:
 
 
 @inlined
+def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
+    """Size of the slip velocity at the step's start by which contact i turns."""
+    t = m.tangent[i]
+    x, y = _lengthened(s, m, w, i, w.rates[0, t] - m.drift[t], w.rates[0, t + 1] - m.drift[t + 1])
+    return float(np.sqrt(x * x + y * y))
+
+
+@inlined
 def turning_rate(s: Any, m: Model, w: Work) -> float:
     """Fastest rate, 1/s, at which friction turns a slip into its own direction: mu lam_n / |v_t| over the mass there.
 
     From the last evaluation and what stands at the step's start. It grows without bound as a slip dies out.
     """
-    fastest, small = 0.0, small_slip(s)
+    fastest = 0.0
     for i in range(s.nc):
         if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1:
-            size = slip_velocity(m, i, w.rates[0])
-            if size > small:
-                c, (x, y) = w.listed[m.tangent[i]], _across(m, w, i)
-                light = x * x * w.gram[c, c] + 2.0 * x * y * w.gram[c, c + 1] + y * y * w.gram[c + 1, c + 1]
+            c, (x, y), size = w.listed[m.tangent[i]], _across(m, w, i), _turning_slip(s, m, w, i)
+            light = x * x * w.gram[c, c] + 2.0 * x * y * w.gram[c, c + 1] + y * y * w.gram[c + 1, c + 1]
+            if size > 0.0:
                 fastest = max(fastest, m.friction[i] * w.lam0[i] * light / size)
     return float(fastest)
 
@@ -517,8 +534,8 @@ def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
 
     Times the slip velocity across it is the turn. w.lam0 has the multipliers of the present instant.
     """
-    size = slip_velocity(m, i, w.rates[0])
-    if not w.slides[i] or m.tangents[i] < 2 or size <= small_slip(s):
+    size = _turning_slip(s, m, w, i) if w.slides[i] and m.tangents[i] > 1 else 0.0
+    if not size > 0.0:
         return 0.0
     c, (x, y) = w.listed[m.tangent[i]], _across(m, w, i)
     force = -m.friction[i] * w.lam0[i]

@@ -10,15 +10,15 @@ from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.friction import margin, slip_along, stiffness, stopped_slip, without_pull
+from crossbody.reference.core.friction import has_friction, margin, slip_along, stiffness, stopped_slip, without_pull
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
-from crossbody.reference.core.machine import multiplier_if_active, slow
+from crossbody.reference.core.machine import multiplier_if_active, off_law, slow
 from crossbody.reference.kinds import Array, Bytes
 
 # Guards: each fires where all of its functions are below zero.
 NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH, CONE, STOP, JAM = np.arange(12)
 FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1, 1, 1, 1])
-ON_BOUND = 1e-9  # part of the bound of a contact's friction, below which one that sticks has only begun to
+ON_BOUND = 1e-9  # part of the bound of a contact's friction below which one that sticks has only begun to
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 
 
@@ -74,8 +74,10 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
         w.bands[0] = slow(s)
     elif kind == STOP:
         w.bands[0] = stopped_slip(s)  # a slip that grazes zero goes on
-    elif kind == CONE and w.cones[0, i] <= ON_BOUND * m.friction[i] * abs(w.lams[0, i]):
-        w.bands[0] = ON_BOUND * m.friction[i] * abs(w.lams[0, i])
+    elif kind == CONE:
+        begun = max(ON_BOUND * m.friction[i] * abs(w.lams[0, i]), w.tolerated[i])
+        if w.cones[0, i] <= begun:
+            w.bands[0] = 2.0 * begun
 
 
 @inlined
@@ -131,8 +133,11 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
             w.parts[0], w.parts[1] = h - s.touch, rate
         else:
             w.parts[0] = rate
-            lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
-            w.parts[1] = -lam if lam > -np.inf else REDUNDANT
+            if s.frictional and has_friction(m, i):  # its multiplier is infinite where it would jam
+                w.parts[1] = off_law(K, s, m, w, i, t, q, v)
+            else:
+                lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+                w.parts[1] = -lam if lam > -np.inf else REDUNDANT
     for j in range(FUNCTIONS[kind]):
         w.parts[j] += w.bands[j]
 

@@ -33,7 +33,7 @@ SETS = 64  # of modes that are remembered while those of friction are decided
 OF_FRICTION = (
     "way", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state", "wants",
     "begins", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight", "found", "beside",
-    "left", "press",
+    "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -311,6 +311,16 @@ class Work:
     beside: Floats
     left: Floats
     press: Floats
+    full: Floats  # (nc,) right-hand sides with what pulls back those that are tried to stick,
+    load: Floats  # and their multipliers
+    chosen: Floats  # excess of the set that was found first
+    tolerated: Floats  # by how much a force may be beyond its bound where modes are decided
+    turns: (
+        Floats2  # how accelerations across contacts that begin to slide change with their directions, and its factors
+    )
+    turn_by: Floats  # by how much each turns
+    turning: Index  # their places
+    turned: Index  # pivots
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)
@@ -340,7 +350,7 @@ def workspace(
         **dict.fromkeys(("guard", "guard_hit"), (ng,)),
         "guards": (NODES, ng), "discrete": (nd,), "sets": (SETS * frictional, nc), "cones": (NODES * frictional, nc),
         **dict.fromkeys(OF_FRICTION, (sliding,)),
-        **dict.fromkeys(("matrix", "first", "second", "held", "square"), (sliding, sliding)),
+        **dict.fromkeys(("matrix", "first", "second", "held", "square", "turns"), (sliding, sliding)),
     }  # fmt: skip
     types = {"Index": np.int64, "Bytes": np.int8}
     return {

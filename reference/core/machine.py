@@ -230,6 +230,15 @@ def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float
     return float(-off + band if open_for > LIFTED else -off - band)
 
 
+@inlined
+def off_law(K: Any, s: Any, m: Model, w: Work, i: int, t: float, q: Any, v: Any) -> float:
+    """By how much row i, not active, moves faster than its law, the others following theirs; NaN if ill posed."""
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) != 0:
+        return np.nan
+    _alone(K, m, w, s.na, i, t, q, v)
+    return _off_law(m, w, s.na, i, 1.0, v, w.vd)[0]
+
+
 @compiled
 def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """Square of what row i's joining or leaving the active rows changes v' by, in the norm of M: lam^2 / (G^-1)_ii."""

@@ -19,6 +19,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate
+from crossbody.reference.core.algebra import factor_lu, solve_lu
 from crossbody.reference.core.friction import (
     factor_set,
     has_friction,
@@ -46,8 +47,9 @@ from crossbody.reference.kinds import Array
 TOLERATED = 1e-9  # part of the largest acceleration by which a set may be off
 SWEEPS = 60
 CLEAR = 1e-6  # part of its bound by which a force must stay below it to count as that of a contact that sticks
-TURNS = 100  # of directions of slip towards those of acceleration
-TURNED = 1e-13
+TURNS = 40  # of directions of slip towards those of acceleration
+TURNED = 1e-12
+MOST_TURN = 0.5  # rad, of one of them
 AROUND, HALVINGS = 24, 50  # directions that are looked at where that leads nowhere, and halvings between two
 MOST_SETS = 256
 FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
@@ -103,13 +105,38 @@ def _put(m: Model, w: Work, i: int, state: int) -> None:
 
 @inlined
 def _evaluate(s: Any, m: Model, w: Work) -> None:
-    """Multipliers of the set as it stands in w.la, and in w.excess by how much faster than its law each row moves."""
+    """Multipliers of the set as it stands in w.la, and in w.excess by how much faster than its law each row moves.
+
+    What pulls sticking rows back counts for the excess of normal rows and for w.load, their multipliers, by which they
+    press or not: the rows move with it.
+    """
     factor_set(s, m, w)
-    solve(s, m, w, w.bare, w.la)
+    pulled = False
     for j in range(s.na):
-        total = -w.bare[j]
+        n, w.full[j] = m.follows[w.idx[j]], w.bare[j]
+        if n >= 0 and has_friction(m, n) and w.state[n] == STICK:
+            w.full[j] -= m.alpha[w.idx[j], 1] * w.hda[j]
+            pulled = True
+    if pulled:
+        solve(s, m, w, w.full, w.load)
+        _exceed(s, w, w.full, w.load)
+        w.kept_excess[: s.na] = w.excess[: s.na]
+    solve(s, m, w, w.bare, w.la)
+    _exceed(s, w, w.bare, w.la)
+    for j in range(s.na):
+        if not pulled:
+            w.load[j] = w.la[j]
+        elif not (m.follows[w.idx[j]] >= 0 and has_friction(m, m.follows[w.idx[j]])):
+            w.excess[j] = w.kept_excess[j]
+
+
+@inlined
+def _exceed(s: Any, w: Work, r: Array, la: Array) -> None:
+    """Leave in w.excess by how much faster than r rows move under the multipliers la."""
+    for j in range(s.na):
+        total = -r[j]
         for c in range(s.na):
-            total += w.gram[j, c] * w.la[c]
+            total += w.gram[j, c] * la[c]
         w.excess[j] = total
 
 
@@ -132,19 +159,74 @@ def _ahead(m: Model, w: Work, i: int) -> float:
 
 
 @inlined
-def _turn(s: Any, m: Model, w: Work) -> float:
-    """Turn the directions of contacts that begin to slide towards their accelerations; by how much at most."""
-    most = 0.0
+def _aside(m: Model, w: Work, i: int) -> float:
+    """Tangential acceleration of contact i across its direction; 0 of one that has a single tangential row."""
+    if m.tangents[i] < 2:
+        return 0.0
+    c = _first(m, w, i)
+    return float(w.along[c] * w.excess[c + 1] - w.along[c + 1] * w.excess[c])
+
+
+@inlined
+def _turned_force(s: Any, m: Model, w: Work, j: int) -> None:
+    """Fill w.trial with what a turn by one radian of the slip at the normal row in place j makes of all multipliers."""
+    i = w.idx[j]
+    c, force = _first(m, w, i), -m.friction[i] * w.la[j]
+    x, y = -w.along[c + 1], w.along[c]
+    for a in range(s.na):
+        w.r[a] = -force * (w.gram[a, c] * x + w.gram[a, c + 1] * y)
+    solve(s, m, w, w.r, w.trial)
+    w.trial[c] += force * x
+    w.trial[c + 1] += force * y
+
+
+@inlined
+def _fill_turns(s: Any, m: Model, w: Work) -> int:
+    """How the accelerations across contacts that begin to slide change with their directions, in w.turns; how many."""
+    count = 0
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i) and w.stands[i] and w.state[i] == SLIP and m.tangents[i] > 1:
-            size = _size(m, w, i, w.excess)
-            if _ahead(m, w, i) > TOLERATED * s.push_scale:
-                for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
-                    most = max(most, abs(w.excess[c] / size - w.along[c]))
-                    w.along[c] = w.excess[c] / size
-                    w.way[w.idx[c]] = w.along[c]
-    return most
+        if has_friction(m, i) and w.stands[i] and w.state[i] == SLIP and m.tangents[i] > 1 and w.la[j] > 0.0:
+            w.turning[count] = j
+            count += 1
+    for b in range(count):
+        _turned_force(s, m, w, w.turning[b])
+        for a in range(count):
+            i = w.idx[w.turning[a]]
+            c, total = _first(m, w, i), 0.0
+            for k in range(s.na):
+                total += (w.along[c] * w.gram[c + 1, k] - w.along[c + 1] * w.gram[c, k]) * w.trial[k]
+            w.turns[a, b] = total
+        i = w.idx[w.turning[b]]
+        w.turn_by[b] = -_aside(m, w, i)
+        w.turns[b, b] -= max(_ahead(m, w, i), 0.0) + TOLERATED * s.push_scale  # definite where loads are shared
+    return count
+
+
+@compiled
+def _turn(s: Any, m: Model, w: Work) -> float:
+    """Turn the directions of contacts that begin to slide towards their accelerations, by Newton; by how much at most.
+
+    Directions taken from accelerations alone run away where these are small beside what friction does.
+    """
+    count = _fill_turns(s, m, w)
+    if factor_lu(w.turns, count, w.turned) != 0:
+        return 0.0
+    solve_lu(w.turns, count, w.turned, w.turn_by)
+    most = 0.0
+    for a in range(count):
+        most = max(most, abs(w.turn_by[a]))
+    for a in range(count):
+        c = _first(m, w, w.idx[w.turning[a]])
+        by = w.turn_by[a] * min(1.0, MOST_TURN / most) if most > 0.0 else 0.0
+        x, y = (
+            w.along[c] * np.cos(by) - w.along[c + 1] * np.sin(by),
+            w.along[c + 1] * np.cos(by) + w.along[c] * np.sin(by),
+        )
+        size = np.sqrt(x * x + y * y)
+        w.along[c], w.along[c + 1] = x / size, y / size
+        w.way[w.idx[c]], w.way[w.idx[c + 1]] = x / size, y / size
+    return float(most)
 
 
 @inlined
@@ -159,12 +241,12 @@ def _worst(s: Any, m: Model, w: Work) -> int:
         if w.state[i] == FREE:
             missing, becomes = -w.excess[j], STICK if w.stands[i] else SLIP
         else:
-            missing, becomes = -w.la[j] * w.gram[j, j], FREE
+            missing, becomes = -w.load[j] * w.gram[j, j], FREE
             other, then = -1.0, STICK
             if w.state[i] == STICK:
                 other, then = (_size(m, w, i, w.la) - m.friction[i] * max(w.la[j], 0.0)) * w.gram[j, j], SLIP
             elif w.stands[i]:
-                other = -_ahead(m, w, i)
+                other = max(-_ahead(m, w, i), abs(_aside(m, w, i)))
             if other > missing:
                 missing, becomes = other, then
         if missing > TOLERATED * s.push_scale:
@@ -202,34 +284,31 @@ def _seen(s: Any, m: Model, w: Work) -> bool:
 
 
 @inlined
-def _face(s: Any, m: Model, w: Work, i: int, angle: float) -> tuple[float, float]:
-    """Let contact i begin to slide at an angle; its acceleration along that and across it."""
+def _face(s: Any, m: Model, w: Work, i: int, angle: float) -> float:
+    """Let contact i begin to slide at an angle; its acceleration across that."""
     first = _first(m, w, i)
     w.way[w.idx[first]], w.way[w.idx[first + 1]] = np.cos(angle), np.sin(angle)
     w.along[first], w.along[first + 1] = np.cos(angle), np.sin(angle)
     _evaluate(s, m, w)
-    x, y = w.excess[first], w.excess[first + 1]
-    return x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    return _aside(m, w, i)
 
 
 @compiled
 def _look_around(s: Any, m: Model, w: Work, i: int) -> None:
     """Search all directions for one in which contact i, once it slides, is accelerated."""
-    low = 0.0
-    ahead, aside = _face(s, m, w, i, 0.0)
+    start, aside = 0.0, _face(s, m, w, i, 0.0)
     for k in range(1, AROUND + 1):
-        high = 2.0 * np.pi * k / AROUND
-        next_ahead, next_aside = _face(s, m, w, i, high)
-        if min(ahead, next_ahead) > 0.0 and (aside > 0.0) != (next_aside > 0.0):
+        low, high = start, 2.0 * np.pi * k / AROUND
+        start, before, aside = high, aside, _face(s, m, w, i, high)
+        if (aside > 0.0) != (before > 0.0):
             for _ in range(HALVINGS):
                 middle = 0.5 * (low + high)
-                _, across = _face(s, m, w, i, middle)
-                if (across > 0.0) == (aside > 0.0):
+                if (_face(s, m, w, i, middle) > 0.0) == (before > 0.0):
                     low = middle
                 else:
                     high = middle
-            return
-        low, ahead, aside = high, next_ahead, next_aside
+            if _ahead(m, w, i) >= 0.0:
+                return
 
 
 @inlined
@@ -415,7 +494,7 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
         w.sets[0, i], w.kept_way[i] = w.state[i], w.way[i]
     _evaluate(s, m, w)
     for j in range(s.na):
-        w.kept_excess[j] = w.excess[j]
+        w.chosen[j] = w.excess[j]
     for j in range(s.na):
         if has_friction(m, w.idx[j]) and w.stands[w.idx[j]] and w.state[w.idx[j]] != SLIP:
             _aim(m, w, w.idx[j])
@@ -428,7 +507,7 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
         _vary(s, m, w, number)
         if _judge(s, m, w) < 0 and _jammed(s, m, w) < 0:
             for j in range(s.na):
-                found = found or abs(w.excess[j] - w.kept_excess[j]) > DIFFERENT * s.push_scale
+                found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
     s.not_unique += found
     for j in range(s.na):
         i = w.idx[j]
@@ -456,6 +535,7 @@ def decide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
+            w.tolerated[i] = TOLERATED * s.push_scale / w.gram[j, j]
             after = w.state[i] if w.state[i] != FREE else (FREE if w.gap[i] > 0.0 else BALLISTIC)
             if after != b.mode[i]:
                 change(s, b, i, after)
@@ -472,7 +552,7 @@ def _mark(s: Any, m: Model, w: Work, b: Buffers) -> int:
         i = w.idx[j]
         if has_friction(m, i):
             _put(m, w, i, STICK if w.stands[i] else SLIP)
-    factor_set(s, m, w)
+    _evaluate(s, m, w)
     marks, jammed = b.history[len(b.history) - 1], _jammed(s, m, w)
     marks[:] = 0
     for j in range(s.na):
@@ -483,9 +563,13 @@ def _mark(s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 @compiled
 def _jammed(s: Any, m: Model, w: Work) -> int:
-    """The contact that slides and that its own force does not press, as the set stands; -1 if there is none."""
+    """The contact that slides and that its own force does not press, as the set stands; -1 if there is none.
+
+    One that no forces bring onto its law is at the very edge of that.
+    """
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i) and w.state[i] == SLIP and not stiffness(s, m, w, j) > 0.0:
+        off = abs(w.excess[j]) > DIFFERENT * s.push_scale
+        if has_friction(m, i) and w.state[i] == SLIP and (off or not stiffness(s, m, w, j) > 0.0):
             return int(i)
     return -1

@@ -190,12 +190,3 @@ def test_collisions_and_linear_models_with_friction_are_refused() -> None:
         simulate(wall([np.inf, 0.5], b0=[1e6, 0.0]), [0, 0], [0, 0], 0.1)
     with pytest.raises(SceneError, match="friction"):
         linearise(point(0.5, 0.1), [0.0, 0.0])
-
-
-@pytest.mark.parametrize("change", [{"friction": (0.5, 0.4, 0, 0, 0)}, {"dimension": 4}, {"dimension": 6}])
-def test_friction_of_another_kind_has_no_rows(change: dict) -> None:
-    from dataclasses import replace
-
-    scene = box_on_floor(0.5)
-    scene = scene.replace(pairs=tuple(replace(one, **change) for one in scene.pairs))
-    assert not case_of(scene).contacts
