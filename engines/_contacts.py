@@ -56,7 +56,7 @@ class _Group:
     Attributes:
         kinds: of the first and the second shapes.
         which: places of the contacts in `Contacts.all`.
-        one, two: numbers of their shapes.
+        one, two: places of their shapes in the choice.
         sizes: of both (m, 3), or of hulls (m, places, 3).
         margin, sine (m,): of the pairs; the sine of the angle up to which they lie along each other.
         taken: contact and place in this group of every row that is asked for.
@@ -72,6 +72,23 @@ class _Group:
     sine: Floats
     taken: tuple[Indices, Indices]
     rows: Indices
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """What some rows need of the scene.
+
+    Attributes:
+        groups: of their contacts.
+        shapes: numbers of the shapes.
+        bodies: numbers in `Contacts.bodies` of those that carry them.
+        carrier (ns,): place in `bodies` of what carries each shape.
+    """
+
+    groups: tuple[_Group, ...]
+    shapes: Indices
+    bodies: Indices
+    carrier: Indices
 
 
 class Contacts:
@@ -93,7 +110,7 @@ class Contacts:
         self._turned = matrices(np.array([shape.orientation for shape in shapes.values()]).reshape(-1, 4))
         self._position = np.array([shape.position for shape in shapes.values()]).reshape(-1, 3)
         self._extents = [shape.extents for shape in shapes.values()]
-        self._groups: dict[tuple[int, ...], tuple[_Group, ...]] = {}
+        self._choices: dict[tuple[int, ...], _Choice] = {}
         self.turning = [k for k, contact in enumerate(self.all) if contact.parallel > 0.0]
 
     @property
@@ -112,11 +129,12 @@ class Contacts:
             along: of contacts in `turning`, whether the shapes lie along each other, at all instants or at each (...);
                 as they do, if not given.
         """
-        groups, (R, p) = self._groups_of(rows), self._placed(poses)
+        choice = self._choice_of(rows)
+        R, p = self._placed(poses, choice)
         lead, count = p.shape[:-2], self.count if rows is None else len(rows)
         gap, normal, point = (np.empty((*lead, count, *size)) for size in ((), (3,), (3,)))
         first, second = np.empty((2, count), dtype=np.intp)
-        for group in groups:
+        for group in choice.groups:
             at, by = ((R[..., shapes, :, :], p[..., shapes, :]) for shapes in (group.one, group.two))
             gaps, normals, points = meet(group.kinds, group.sizes, at, by, self._lying(group, at, by, along or {}))
             contact, place = group.taken
@@ -124,7 +142,8 @@ class Contacts:
             gap[..., group.rows] = np.where(np.isinf(h), FAR, h)
             normal[..., group.rows, :] = normals[..., contact, place, :]
             point[..., group.rows, :] = points[..., contact, place, :]
-            first[group.rows], second[group.rows] = (self._body[one[contact]] for one in (group.one, group.two))
+            for bodies, shapes in ((first, group.one), (second, group.two)):
+                bodies[group.rows] = choice.bodies[choice.carrier[shapes[contact]]]
         return Touches(gap, normal, point, first, second)
 
     def lying(self, poses: Poses, rows: Sequence[int]) -> tuple[dict[int, bool], float]:
@@ -134,8 +153,9 @@ class Contacts:
         of a cap round it in one of its tilt.
         """
         found: dict[int, bool] = {}
-        least, groups = 1.0, [group for group in self._groups_of(rows) if group.sine.any()]
-        R, p = self._placed(poses) if groups else (np.zeros(0), np.zeros(0))
+        least, choice = 1.0, self._choice_of(rows)
+        groups = [group for group in choice.groups if group.sine.any()]
+        R, p = self._placed(poses, choice) if groups else (np.zeros(0), np.zeros(0))
         for group in groups:
             at, by = ((R[shapes], p[shapes]) for shapes in (group.one, group.two))
             along = lying(group.kinds, group.sizes, at, by, group.sine)
@@ -158,12 +178,9 @@ class Contacts:
             before: how the shapes of the contacts in `turning` lay last, which is brought up to date.
         """
         along: dict[int, NDArray[np.bool_]] = {}
-        R, p = self._placed(poses)
         for k in self.turning:
             pair = self.all[k]
-            at, by = (
-                (R[..., j, :, :], p[..., j, :]) for j in (self.number[pair.first.name], self.number[pair.second.name])
-            )
+            at, by = self._ends(poses, pair)
             kinds, sizes = (pair.first.type, pair.second.type), _sizes(pair)
             found = lying(kinds, sizes, at, by, np.array(pair.parallel))
             last = np.maximum.accumulate(np.where(_within_reach(pair, at, by), np.arange(len(found)), -1))
@@ -171,16 +188,15 @@ class Contacts:
             before[k] = bool(along[k][-1])
         return self.touches(poses, None, along).gap
 
-    def parted(self, poses: Poses) -> tuple[Floats, Floats]:
-        """Return by how much the shapes of the pairs in `turning` do not lie along each other, and to which side (n,).
+    def parted(self, poses: Poses, which: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return by how much the shapes of some pairs in `turning` do not lie along each other, and to which side (n,).
 
         The first is below 0 if they do, in units of the sine, or of the first capsule's half length, at which that
         changes. The second, 1 of a cylinder, changes its sign where capsules turn through each other's direction.
         """
-        R, p = self._placed(poses)
-        found, ways = np.zeros(len(self.turning)), np.ones(len(self.turning))
-        for i, pair in enumerate(self.all[k] for k in self.turning):
-            at, by = ((R[j], p[j]) for j in (self.number[pair.first.name], self.number[pair.second.name]))
+        found, ways = np.zeros(len(which)), np.ones(len(which))
+        for i, pair in enumerate(self.all[k] for k in which):
+            at, by = self._ends(poses, pair)
             if pair.first.type == "plane":
                 found[i] = tilt(at, by) / pair.parallel - 1.0
                 continue
@@ -190,39 +206,59 @@ class Contacts:
             ways[i] = np.cross(at[0][:, 2], by[0][:, 2]) @ (by[1] - at[1])
         return found, ways
 
-    def _placed(self, poses: Poses) -> Pose:
-        """Return the poses of all shapes (..., ns, 3, 3) and (..., ns, 3)."""
-        if not self.bodies:
+    def _ends(self, poses: Poses, contact: Contact) -> tuple[Pose, Pose]:
+        """Return the poses of both shapes of a contact (..., 3, 3) and (..., 3)."""
+        one, two = (self._place(poses, self.number[shape.name]) for shape in (contact.first, contact.second))
+        return one, two
+
+    def _place(self, poses: Poses, shape: int) -> Pose:
+        R, p = poses(self.bodies[self._body[shape]])
+        return R @ self._turned[shape], p + R @ self._position[shape]
+
+    def _placed(self, poses: Poses, choice: _Choice) -> Pose:
+        """Return the poses of the shapes of a choice (..., ns, 3, 3) and (..., ns, 3)."""
+        if not len(choice.bodies):
             return np.zeros((0, 3, 3)), np.zeros((0, 3))
-        found = [poses(body) for body in self.bodies]
-        R = np.stack([pose[0] for pose in found], axis=-3)[..., self._body, :, :]
-        p = np.stack([pose[1] for pose in found], axis=-2)[..., self._body, :]
-        return R @ self._turned, p + np.einsum("...ij,...j->...i", R, self._position)
+        found = [poses(self.bodies[body]) for body in choice.bodies]
+        R = np.stack([pose[0] for pose in found], axis=-3)[..., choice.carrier, :, :]
+        p = np.stack([pose[1] for pose in found], axis=-2)[..., choice.carrier, :]
+        return R @ self._turned[choice.shapes], p + np.einsum("...ij,...j->...i", R, self._position[choice.shapes])
 
-    def _groups_of(self, rows: Sequence[int] | None) -> tuple[_Group, ...]:
-        """Return the groups of some rows, or of all; found once for each choice."""
+    def carriers(self, rows: Sequence[int] | None = None) -> Indices:
+        """Return the numbers of the bodies whose poses are asked for where some rows are, or all."""
+        return self._choice_of(rows).bodies
+
+    def _choice_of(self, rows: Sequence[int] | None) -> _Choice:
+        """Return what some rows need, or all; found once for each choice."""
         wanted = tuple(range(self.count) if rows is None else rows)
-        if wanted not in self._groups:
-            self._groups[wanted] = self._grouped(wanted)
-        return self._groups[wanted]
+        if wanted not in self._choices:
+            self._choices[wanted] = self._chosen(wanted)
+        return self._choices[wanted]
 
-    def _grouped(self, wanted: Sequence[int]) -> tuple[_Group, ...]:
+    def _chosen(self, wanted: Sequence[int]) -> _Choice:
+        pairs = [self.all[k] for k in dict.fromkeys(self.rows[row][0] for row in wanted)]
+        shapes = np.unique([self.number[one.name] for pair in pairs for one in (pair.first, pair.second)]).astype(int)
+        bodies, carrier = np.unique(self._body[shapes], return_inverse=True)
+        return _Choice(groups=self._grouped(wanted, shapes), shapes=shapes, bodies=bodies, carrier=carrier)
+
+    def _grouped(self, wanted: Sequence[int], shapes: Indices) -> tuple[_Group, ...]:
         kinds: dict[tuple[str, str], list[int]] = {}
         for k in dict.fromkeys(self.rows[row][0] for row in wanted):
             kinds.setdefault((self.all[k].first.type, self.all[k].second.type), []).append(k)
-        return tuple(self._group(kind, which, wanted) for kind, which in kinds.items())
+        return tuple(self._group(kind, which, wanted, shapes) for kind, which in kinds.items())
 
-    def _group(self, kinds: tuple[str, str], which: Sequence[int], wanted: Sequence[int]) -> _Group:
+    def _group(self, kinds: tuple[str, str], which: Sequence[int], wanted: Sequence[int], shapes: Indices) -> _Group:
         pairs = [self.all[k] for k in which]
         one, two = (
-            np.array([self.number[shape.name] for shape in shapes], dtype=np.intp)
-            for shapes in ([pair.first for pair in pairs], [pair.second for pair in pairs])
+            np.array([self.number[shape.name] for shape in ends], dtype=np.intp)
+            for ends in ([pair.first for pair in pairs], [pair.second for pair in pairs])
         )
         at, stands = self.rows, {k: j for j, k in enumerate(which)}
         mine = [(stands[at[row][0]], at[row][1], i) for i, row in enumerate(wanted) if at[row][0] in stands]
         contact, place, rows = np.array(mine, dtype=np.intp).T
         return _Group(
-            kinds=kinds, which=which, one=one, two=two, sizes=(self._sizes(one), self._sizes(two)),
+            kinds=kinds, which=which, one=np.searchsorted(shapes, one), two=np.searchsorted(shapes, two),
+            sizes=(self._sizes(one), self._sizes(two)),
             margin=np.array([pair.pair.margin for pair in pairs]), sine=np.array([pair.parallel for pair in pairs]),
             taken=(contact, place), rows=rows,
         )  # fmt: skip

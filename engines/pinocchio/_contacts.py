@@ -47,9 +47,9 @@ class ContactRows:
             gaps.append(self.contacts.recorded(self._stacked(found), ways))
         return np.concatenate(gaps) if self.count else np.zeros((len(q), 0))
 
-    def parted(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return by how much the shapes that may lie along each other do not, and to which side (`Contacts.parted`)."""
-        return self.contacts.parted(self._now(q))
+    def parted(self, q: Floats, which: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return by how much shapes that may lie along each other do not, and to which side (`Contacts.parted`)."""
+        return self.contacts.parted(self._now(q), which)
 
     def gradients(self, q: Floats, rows: Sequence[int] | None = None) -> tuple[Floats, Floats]:
         """Return h (n,) and H (n, nv) of some rows, or of all."""
@@ -57,10 +57,11 @@ class ContactRows:
             return np.zeros(0), np.zeros((0, self.model.nv))
         met = self.contacts.touches(self._now(q), rows, self.along)
         pin.computeJointJacobians(self.model, self.data, q)
-        J, origins = np.zeros((len(self.carriers), 6, self.model.nv)), self._origins(self.data)
-        for i, carrier in enumerate(self.carriers):
-            if carrier:
+        J, origins = np.zeros((len(self.carriers), 6, self.model.nv)), np.zeros((len(self.carriers), 3))
+        for i in self.contacts.carriers(rows):
+            if carrier := self.carriers[i]:
                 J[i] = pin.getJointJacobian(self.model, self.data, carrier, WORLD).reshape(6, -1)
+                origins[i] = self.data.oMi[carrier].translation
         H = np.zeros((len(met.gap), self.model.nv))
         for bodies, sign in ((met.second, 1.0), (met.first, -1.0)):
             about = cross(met.point - origins[bodies], met.normal)
@@ -71,18 +72,19 @@ class ContactRows:
         """Return H' v of some rows."""
         if not len(rows):
             return np.zeros(0)
-        data = self._moved
+        data, needed = self._moved, self.contacts.carriers(rows).tolist()
         along, turn = self.contacts.lying(self._now(q), rows)
         along |= self.along
 
         def rates(times: Floats) -> Floats:
-            placed, twists, origins = [], [], []
-            for t in times:
+            R, p, moving, at = (np.zeros((len(times), len(self.carriers), *n)) for n in ((3, 3), (3,), (6,), (3,)))
+            for k, t in enumerate(times):
                 pin.forwardKinematics(self.model, data, pin.integrate(self.model, q, t * v), v)
-                placed.append([self._pose(body, data) for body in self.contacts.bodies])
-                twists.append([pin.getVelocity(self.model, data, joint, WORLD).vector for joint in self.carriers])
-                origins.append(self._origins(data))
-            poses, moving, at = self._stacked(placed), np.array(twists), np.array(origins)
+                for i in needed:
+                    R[k, i], p[k, i] = self._pose(self.contacts.bodies[i], data)
+                    moving[k, i] = pin.getVelocity(self.model, data, self.carriers[i], WORLD).vector
+                    at[k, i] = data.oMi[self.carriers[i]].translation
+            poses = {self.contacts.bodies[i]: (R[:, i], p[:, i]) for i in needed}.__getitem__
 
             def carried(bodies: Indices, points: Floats) -> Floats:
                 twist = moving[:, bodies]
@@ -107,10 +109,6 @@ class ContactRows:
         carrier, pose = self.placed[body]
         world = data.oMi[carrier] * pose
         return world.rotation, world.translation
-
-    def _origins(self, data: Any) -> Floats:
-        """Return where the joints are that carry the bodies (nb, 3)."""
-        return np.array([data.oMi[joint].translation for joint in self.carriers]).reshape(-1, 3)
 
 
 class Points:

@@ -6,7 +6,7 @@ where the shapes come to lie the other way is an event, at which what touched go
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class Ways:
             del along[k]
         new = [k for k in wanted if k not in along]
         if new:
-            parted, sides = self._parted(q)
+            parted, sides = self._parted(q, new)
             along.update({k: parted[k] <= 0.0 for k in new})
             self.sides.update({k: sides[k] for k in new})
         if new or len(along) != before:
@@ -66,7 +66,7 @@ class Ways:
         along = self.touching.along
         if not along:
             return
-        parted, sides = self._parted(q)
+        parted, sides = self._parted(q, list(along))
         for i, k in enumerate(self.turning):
             if k in along:
                 out[2 * i] = BACK - parted[k] if along[k] else BACK + parted[k]
@@ -76,9 +76,9 @@ class Ways:
         """Whether a step went through a way in which a pair lay on neither side of it."""
         return any(which % 2 for which in fired)
 
-    def _parted(self, q: Floats) -> tuple[dict[int, float], dict[int, float]]:
-        """Return of every pair by how much it does not lie along, and to which side."""
-        one, two = (dict(zip(self.turning, part.tolist(), strict=True)) for part in self.touching.parted(q))
+    def _parted(self, q: Floats, which: Sequence[int]) -> tuple[dict[int, float], dict[int, float]]:
+        """Return of some pairs by how much they do not lie along, and to which side."""
+        one, two = (dict(zip(which, part.tolist(), strict=True)) for part in self.touching.parted(q, which))
         return one, two
 
     def turn(self, q: Floats, modes: Modes, fired: frozenset[int]) -> Modes:
@@ -87,7 +87,7 @@ class Ways:
         for i in {which // 2 for which in fired}:
             k, rows = self.turning[i], self.rows[i]
             self.touching.along[k] = not self.touching.along[k]
-            self.sides[k] = self._parted(q)[1][k]
+            self.sides[k] = self._parted(q, [k])[1][k]
             self.forget()
             carried = next((modes[row] for row in rows if modes[row] in ACTIVE), int(Mode.FREE))
             gaps = self.touching.heights(q)[np.subtract(rows, self.first)]

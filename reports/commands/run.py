@@ -66,7 +66,9 @@ def run(
         def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
             result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit)
             with parts.put(key(i, cases[i])) as made:
-                study.write_case(made, result, repeat(cases[i], names, pairs, rtol, settings))
+                rows = study.write_case(made, result, repeat(cases[i], names, pairs, rtol, settings))
+            if len(cases) > 1:
+                voice.note(f"{cases[i].label}: {counted(rows)}")
             return 0
 
         lost = _beside(cases, parts, do, at_once)
@@ -119,6 +121,12 @@ def repeat(
     return shlex.join(words + installed.options())
 
 
+def counted(rows: pd.DataFrame) -> str:
+    """Return how many rows have each verdict."""
+    counts = rows["verdict"].value_counts()
+    return ", ".join(f"{counts[word]} {word}" for word in counts.index)
+
+
 def show(rows: pd.DataFrame, out: Path) -> None:
     """One line a run with its worst errors and verdicts, every row that is outside, and where the report is."""
     from rich.console import Console
@@ -126,8 +134,7 @@ def show(rows: pd.DataFrame, out: Path) -> None:
     console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
     if not voice.quiet():
         console.print(_summary(rows, results.times_of(out)))
-        counts = rows["verdict"].value_counts()
-        console.print(", ".join(f"{counts[word]} {word}" for word in counts.index))
+        console.print(counted(rows))
     told = rows[rows["verdict"].isin(WRONG if voice.quiet() else [Word.SKIPPED, *WRONG])]
     for row in told.to_dict(orient="records"):
         run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"

@@ -51,6 +51,10 @@ class Truth:
     joined: bool = False
 
 
+MOST, FEWEST = 4000, 21
+"""Points inside all short intervals between events together, unless each has but the fewest."""
+
+
 def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
     """Times that show a motion: a grid, more of them from each event to the next if that is short, events twice.
 
@@ -58,12 +62,14 @@ def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 
         run: whose events.
         t_end: horizon, s.
         grid: points on the horizon.
-        inside: points on each interval between events that is shorter than a tenth of the horizon.
+        inside: most points on each interval between events that is shorter than a tenth of the horizon.
     """
     events = np.array([e.t for e in run.events if e.t <= t_end])
     parts = [np.linspace(0.0, t_end, grid)]
     edges = np.unique(np.concatenate([[0.0], events, [t_end]]))
-    parts += [np.linspace(a, b, inside)[1:-1] for a, b in pairwise(edges) if b - a < 0.1 * t_end]
+    short = [(a, b) for a, b in pairwise(edges) if b - a < 0.1 * t_end]
+    each = min(inside, max(FEWEST, MOST // max(len(short), 1)))
+    parts += [np.linspace(a, b, each)[1:-1] for a, b in short]
     times: Floats = np.sort(np.concatenate([np.unique(np.concatenate([*parts, events])), events]))
     return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
 

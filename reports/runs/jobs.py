@@ -40,6 +40,8 @@ itself is studied at twice and four times its step."""
 _EXAMPLES = {"--set": "a1=0", "--setting": "dt=1e-4"}
 TRUTHS = 3.0
 """A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
+ENOUGH = 2000
+"""Steps of a run that is drawn as it is."""
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
 STUDIES_S, DEARER = 10.0, 3.0
@@ -285,8 +287,11 @@ def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:
 
 
 def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Mapping[str, Value]) -> Trajectory:
-    """The run; where the engine can be asked for samples, again with enough of them to be drawn."""
-    if "samples" not in prepared.settings or not natural.outcome.ok:
+    """The run; where the engine can be asked for samples, again with enough of them to be drawn.
+
+    A run whose own steps are as many shows itself.
+    """
+    if "samples" not in prepared.settings or not natural.outcome.ok or natural.steps >= ENOUGH:
         return natural
     asked = {key: prepared.settings[key] for key in ("rtol", *given) if key in prepared.settings}
     times = sample_times(natural, case.t_end)

@@ -47,12 +47,13 @@ def write(out: Path, results: Sequence[CaseResult], rows: pd.DataFrame, provenan
     _save_traces(out, [trace for result in results for trace in _traces(result)])
 
 
-def write_case(made: Path, result: CaseResult, command: str) -> None:
-    """Write the verdicts, audit and motions of one case into a folder of their own, to be assembled later."""
+def write_case(made: Path, result: CaseResult, command: str) -> pd.DataFrame:
+    """Write the verdicts, audit and motions of one case into a folder of their own; the verdicts."""
     judged = judge([result], {result.case.label: command})
     told = {"verdicts": judged.to_dict(orient="records"), "audit": _audit([result]).to_dict(orient="records")}
     (made / CASE).write_text(json.dumps(told, default=_plain), encoding="utf-8")
     _save_traces(made, _traces(result))
+    return judged
 
 
 def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) -> pd.DataFrame:
