@@ -16,7 +16,7 @@ from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
 from crossbody.reference.core.friction import enter, factor
 from crossbody.reference.core.friction import solve as solve_rows
-from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, SLIP, STICK, Model, Work
+from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 from crossbody.reference.core.shares import solve_dependent
 from crossbody.reference.kinds import Array, Bytes, Floats
 
@@ -27,7 +27,7 @@ OWN, GENERAL, SMOOTH = np.arange(3)
 @inlined
 def is_active(mode: int) -> bool:
     """Rows that are in contact, however, or always on carry a multiplier."""
-    return bool(mode in (CONTACT, COLLISION, BILATERAL, STICK, SLIP))
+    return bool(mode in (CONTACT, COLLISION) or mode >= BILATERAL)  # STICK and SLIP stand behind it
 
 
 @inlined

@@ -160,6 +160,8 @@ def _move(s: Any, w: Work, t: float) -> None:
 def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Apply the transitions that fired at the step's end and settle what follows from them."""
     nq = s.nq
+    if s.frictional:
+        _follow_turns(K, s, m, w)
     if s.natural:
         if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
             return ILL_POSED
@@ -193,6 +195,19 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if code == 0:
         record.here(K, s, m, w, b.mode, b.out, b.modes, s.audited)
     return int(code)
+
+
+@inlined
+def _follow_turns(K: Any, s: Any, m: Model, w: Work) -> None:
+    """Renew directions of slips that have turned by a right angle, and do not stop."""
+    K.gaps(s.t, w.y[: s.nq], w.y[s.nq :], m.p, w.gap, w.rate)
+    for i in range(s.nc):
+        if (
+            w.hit[i] <= s.theta
+            and w.kind[i] == guards.STOP
+            and (friction.slip_velocity(m, i, w.rate) > friction.stopped_slip(s))
+        ):
+            friction.face(m, w, i, w.rate)
 
 
 @inlined

@@ -26,6 +26,7 @@ from crossbody.reference.kinds import Array, Bytes, Floats, Index
 SMALL_SLIP = 1e-9  # of the largest speed: a slip velocity below has no direction of its own,
 SMALL_SLIP_STEPS = 10.0  # or below so many times the relative tolerance
 STOPPED = 10.0  # times as much, below which a contact stands
+CLEAR = 10.0  # times that, from which on it is forgotten with what velocity a slip began that counted as none
 RANK = 1e-10  # part of a contact's own size below which a pivot is that of a row which depends on others
 LIGHT = 1e-12  # part of the largest load at a contact, below which it counts as that
 OPEN = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
@@ -61,11 +62,19 @@ def slip_velocity(m: Model, i: int, rate: Array) -> float:
 
 @inlined
 def slip_along(m: Model, w: Work, i: int, rate: Array) -> float:
-    """Slip velocity of contact i along its direction of reference."""
+    """Slip velocity of contact i along its direction of reference, against that with which it began."""
     total = 0.0
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-        total += (rate[t] - m.drift[t]) * w.way[t]
+        total += (rate[t] - m.drift[t] - w.rest[t]) * w.way[t]
     return float(total)
+
+
+@inlined
+def face(m: Model, w: Work, i: int, rate: Array) -> None:
+    """Take the direction of the present slip velocity of contact i for that of reference."""
+    size = slip_velocity(m, i, rate)
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        w.way[t], w.rest[t] = (rate[t] - m.drift[t]) / size, 0.0
 
 
 @inlined
@@ -82,10 +91,14 @@ def renew(s: Any, m: Model, w: Work, mode: Bytes, rate: Array) -> None:
     note_speed(s, m, rate)
     for i in range(s.nc):
         if has_friction(m, i) and mode[i] == SLIP:
-            size = slip_velocity(m, i, rate)
-            if size > small_slip(s) and slip_along(m, w, i, rate) > 0.0:  # behind zero a stop is about to be found
-                for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-                    w.way[t] = (rate[t] - m.drift[t]) / size
+            size, begun = slip_velocity(m, i, rate), 0.0
+            for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+                begun += w.rest[t] * w.rest[t]
+            if begun > 0.0 and size < CLEAR * stopped_slip(s):
+                continue
+            # Behind zero a stop is about to be found, if it is small; else it has turned by a right angle.
+            if size > stopped_slip(s) or (size > small_slip(s) and slip_along(m, w, i, rate) > 0.0):
+                face(m, w, i, rate)
     if s.na > 0 and s.dependent_rows > 0:
         s.redundant = max(s.redundant, s.dependent_rows)
         if not s.indeterminate:
@@ -166,7 +179,7 @@ def _directions(s: Any, m: Model, w: Work, turning: bool) -> None:
         if not has_friction(m, i) or not w.slides[i]:
             continue
         t, c, two = m.tangent[i], w.listed[m.tangent[i]], m.tangents[i] > 1
-        x, y = _lengthened(s, m, w, i, w.hda[c], w.hda[c + 1] if two else 0.0)
+        x, y = _lengthened(s, m, w, i, w.hda[c] - w.rest[t], w.hda[c + 1] - w.rest[t + 1] if two else 0.0)
         size, ahead = np.sqrt(x * x + y * y), x * w.way[t] + (y * w.way[t + 1] if two else 0.0)
         follows = turning and ahead > 0.0
         w.along[c] = x / size if follows else w.way[t]
@@ -508,7 +521,8 @@ def _across(m: Model, w: Work, i: int) -> tuple[float, float]:
 def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
     """Size of the slip velocity at the step's start by which contact i turns."""
     t = m.tangent[i]
-    x, y = _lengthened(s, m, w, i, w.rates[0, t] - m.drift[t], w.rates[0, t + 1] - m.drift[t + 1])
+    x, y = w.rates[0, t] - m.drift[t] - w.rest[t], w.rates[0, t + 1] - m.drift[t + 1] - w.rest[t + 1]
+    x, y = _lengthened(s, m, w, i, x, y)
     return float(np.sqrt(x * x + y * y))
 
 

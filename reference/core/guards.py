@@ -10,7 +10,7 @@ from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.friction import has_friction, margin, slip_along, stiffness, stopped_slip, without_pull
+from crossbody.reference.core.friction import has_friction, margin, slip_along, small_slip, stiffness, without_pull
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, off_law, slow
 from crossbody.reference.kinds import Array, Bytes
@@ -18,6 +18,7 @@ from crossbody.reference.kinds import Array, Bytes
 # Guards: each fires where all of its functions are below zero.
 NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH, CONE, STOP, JAM = np.arange(12)
 FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1, 1, 1, 1])
+GRAZE = 0.1  # part of the slip velocity without a direction of its own, by which one may pass zero
 ON_BOUND = 1e-9  # part of the bound of a contact's friction below which one that sticks has only begun to
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 
@@ -73,7 +74,8 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
     elif kind == CATCH and abs(w.rates[0, i]) <= slow(s):
         w.bands[0] = slow(s)
     elif kind == STOP:
-        w.bands[0] = stopped_slip(s)  # a slip that grazes zero goes on
+        # A slip that grazes zero goes on, and one that begins does not stop.
+        w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + GRAZE * small_slip(s)
     elif kind == CONE:
         begun = max(ON_BOUND * m.friction[i] * abs(w.lams[0, i]), w.tolerated[i])
         if w.cones[0, i] <= begun:

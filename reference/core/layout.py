@@ -31,9 +31,9 @@ FUNCTIONS_MOST = 4  # that make up one guard
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
 SETS = 64  # of modes that are remembered while those of friction are decided
 OF_FRICTION = (
-    "way", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state", "wants",
-    "begins", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight", "found", "beside",
-    "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
+    "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
+    "wants", "begins", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight", "found",
+    "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -280,6 +280,7 @@ class Work:
     slip: Floats  # (n,) scratch
     # Where contacts have friction, and empty elsewhere:
     way: Floats  # (nc,) by tangential row: direction of slip of reference
+    rest: Floats  # (nc,) slip velocity with which one began that counted as none
     kept_way: Floats
     kept_other: Floats
     kept_excess: Floats

@@ -535,6 +535,8 @@ def decide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
+            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
+                w.rest[w.idx[c]] = w.hda[c] if w.stands[i] and w.state[i] == SLIP else 0.0
             w.tolerated[i] = TOLERATED * s.push_scale / w.gram[j, j]
             after = w.state[i] if w.state[i] != FREE else (FREE if w.gap[i] > 0.0 else BALLISTIC)
             if after != b.mode[i]:

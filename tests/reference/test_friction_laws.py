@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,27 +13,29 @@ from friction_oracle import STICK, Body
 from friction_scenes import HALF, G, account, box_body, box_on_floor, linear, pair, point, rod_on_floor, run
 
 from crossbody import cases, engines
-from crossbody.cases import InvalidValue, Mode, Outcome, SceneError
+from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Joint, RowLaw, Scene, Shape
 from crossbody.reference import System, simulate
 from crossbody.reference.linear import linearise
 from crossbody.reference.tree.system import system
 
-SIZES = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
+ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
+EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
 HEAVIEST = 2.0  # kg
-STILL = 1e-5  # part of the largest speed: below, at this tolerance, a contact stands
+STILL = 1e3  # times rtol, of the largest speed: below, a contact stands
 
 
-def tossed(seed: int) -> tuple[Scene, np.ndarray, np.ndarray, float]:
-    """Return round bodies tossed onto a floor, two spheres among them that may meet, their start and mu."""
+def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int = 3) -> Any:
+    """Return bodies tossed onto a floor, two spheres among them that may meet, their start and mu."""
+    sizes = ROUND | first
     rng = np.random.default_rng(seed)
     mu, law = float(rng.uniform(0.0, 1.0)), RowLaw(a0=float(10 ** rng.uniform(3, 4.5)), a1=float(rng.uniform(5, 200)))
-    kinds = [str(rng.choice(list(SIZES))), "sphere", "sphere"][: int(rng.integers(1, 4))]
+    kinds = [str(rng.choice(list(first))), "sphere", "sphere"][: int(rng.integers(1, 1 + most))]
     bodies, shapes, q, v = [], [Shape(name="floor", type="plane")], [], []
     for i, kind in enumerate(kinds):
         bodies.append(box_body(f"b{i}", HALF, float(rng.uniform(0.5, HEAVIEST))))
-        shapes.append(Shape(name=f"s{i}", body=f"b{i}", type=kind, size=SIZES[kind]))
+        shapes.append(Shape(name=f"s{i}", body=f"b{i}", type=kind, size=sizes[kind]))
         turn = rng.normal(size=4)
         q += [0.15 * i, 0.0, 0.3 + 0.25 * i, *(turn / np.linalg.norm(turn))]
         v += [*rng.normal(size=2), -1.0, *(4.0 * rng.normal(size=3))]
@@ -46,7 +50,20 @@ def tossed(seed: int) -> tuple[Scene, np.ndarray, np.ndarray, float]:
 def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
     scene, q0, v0, mu = tossed(seed)
     run_ = run(scene, q0, v0, 0.5, rtol=1e-8)
-    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE, Outcome.NO_CONSISTENT_MODES), run_.message
+    assert run_.outcome is Outcome.FINISHED, run_.message
+    obeys(scene, run_, mu, 1e-8)
+
+
+@pytest.mark.parametrize("seed", [*range(60), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(60, 600))])
+def test_cones_power_and_energy_of_bodies_with_edges(seed: int) -> None:
+    scene, q0, v0, mu = tossed(seed, EDGED, 1)
+    run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=20_000)
+    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), run_.message
+    obeys(scene, run_, mu, 1e-6)
+
+
+def obeys(scene: Scene, run_: Trajectory, mu: float, rtol: float) -> None:
+    """Check cones and the power of friction at every row of a motion, and its account."""
     made = system(scene, case_of(scene).law)
     follows, law, count = np.asarray(made.follows), np.asarray(made.a1), 0
     for q, v, lam, mode in zip(run_.q, run_.v, run_.lam, run_.mode, strict=True):
@@ -60,10 +77,10 @@ def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
                 HEAVIEST * law[i] * size if mode[i] == Mode.STICK else 0.0
             )  # what holds the drift down is no friction
             assert np.linalg.norm(force) <= mu * max(lam[i], 0.0) * (1.0 + 1e-9) + 1e-9 + pull
-            if mode[i] == Mode.SLIP and size > STILL * np.abs(run_.v).max():
+            if mode[i] == Mode.SLIP and size > STILL * rtol * np.abs(run_.v).max():
                 assert force @ slip == pytest.approx(-mu * lam[i] * size, rel=1e-9, abs=1e-12)
                 count += 1
-    assert account(run_) < 1e-5
+    assert account(run_) < 1e3 * rtol
     assert count > 0 or mu == 0.0 or not run_.events
 
 
