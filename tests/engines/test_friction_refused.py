@@ -165,10 +165,10 @@ def test_a_file_whose_friction_is_not_known_ends_where_it_would_act(tmp_path: Pa
 def test_an_ensemble_slides_as_single_runs_do_and_a_motion_is_rechecked() -> None:
     scene = box_on_floor(0.3)
     made, q0 = system(scene, case_of(scene).law), np.array([0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0])
-    starts = np.array([[*q0, speed, 0.0, 0.0, 0.0, 0.0, 0.0] for speed in (0.5, 1.0)])
-    many = ensemble(made, starts, 0.5, rtol=1e-8)
-    for k, start in enumerate(starts):
-        one = simulate(made, start[:7], start[7:], 0.5, rtol=1e-8)
+    starts = np.array([[speed, 0.0, 0.0, 0.0, 0.0, 0.0] for speed in (0.5, 1.0)])
+    many = ensemble(made, np.array([q0, q0]), starts, 0.5, rtol=1e-8)
+    for k, v0 in enumerate(starts):
+        one = simulate(made, q0, v0, 0.5, rtol=1e-8)
         assert np.array_equal(many.q[k], one.q[-1])
         assert recheck(made, one, rtol=1e-8) == ()
 
