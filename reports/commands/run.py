@@ -93,8 +93,11 @@ def _missing(cases: Sequence[Case], parts: Parts) -> list[int]:
 
 
 def _beside(cases: Sequence[Case], parts: Parts, do: Callable[[int], int], at_once: int) -> int:
-    """Run the missing cases in processes beside this one; 1 if a run in one of them had to be ended, else 0."""
-    missing = _missing(cases, parts)
+    """Run the missing cases in processes beside this one; 1 if a run in one of them had to be ended, else 0.
+
+    The largest come first, so that no process is left alone with one at the end.
+    """
+    missing = sorted(_missing(cases, parts), key=lambda i: -len(cases[i].q0) - len(cases[i].contacts))
     if min(at_once, len(missing)) < 2:
         return 0
     with progress(len(missing)) as tell:

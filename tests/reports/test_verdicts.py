@@ -176,6 +176,14 @@ def test_difference_is_relative_to_the_larger_numbers() -> None:
     assert difference([1.0], [1.0, 2.0]) == math.inf
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1e-3, 1.0, 1e6])
+def test_a_difference_of_the_audit_does_not_depend_on_the_unit(unit: float) -> None:
+    """Inertias of small bodies are numbers far below 1."""
+    mine, theirs = np.array([1.0, 2.0, 3.1]), np.array([1.0, 2.0, 3.0])
+    assert difference(unit * mine, unit * theirs) == pytest.approx(0.1 / 3.0)
+    assert difference(unit * mine, np.zeros(3)) == pytest.approx(3.1 * unit)
+
+
 @pytest.mark.parametrize(
     ("off", "word"), [(0.4, Word.OUTSIDE), (0.6, Word.EXPECTED), (1.9, Word.EXPECTED), (2.1, Word.OUTSIDE)]
 )
