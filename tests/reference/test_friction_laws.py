@@ -23,7 +23,7 @@ from crossbody.reference.tree.system import system
 ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
 EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
 HEAVIEST = 2.0  # kg
-STILL = 1e3  # times rtol, of the largest speed: below, a contact stands
+STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
 
 
 def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int = 3) -> Any:
