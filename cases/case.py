@@ -263,6 +263,7 @@ class Case:
         quaternions: index in q of the first of the four entries of every quaternion, w first.
         t_end: horizon, s.
         law: constants of every row.
+        real_time: those of an engine that integrates collisions which take no time in the case; None for `law`.
         fsm: machine that switches the rows: "level", "edge" or "memoryless".
         collisions: rule for several contacts: "sequential", "simultaneous" or "resolved".
         closed_form: the exact motion at given times, where one exists (tier A).
@@ -294,6 +295,7 @@ class Case:
     v0: Floats
     t_end: float
     law: Law
+    real_time: Law | None = None
     fsm: str = "level"
     collisions: str = "sequential"
     closed_form: Callable[[Floats], Trajectory] | None = None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import Scene, Shape
 from crossbody.cases.scene_contacts import Contact, contacts
-from crossbody.engines.nearest import Pose, crossing, lying, meet, overlap, tilt
+from crossbody.engines.nearest import ROUND, Pose, corners, crossing, lying, meet, overlap, tilt
 
 FAR = 1.0
 """m: the gap of a row that is none as its shapes lie."""
@@ -26,6 +27,17 @@ SHARP = 30.0
 """Times the tilt of a cap, or the squared sine at which capsules cross: part of TURN that H is differenced over."""
 TOGETHER = 64
 """Recorded states whose gaps are computed at once: some hundred pairs are as many arrays as memory's cache holds."""
+KEPT = 256
+"""Sets of rows whose numbers are kept."""
+MOVES = np.array([
+    [0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0],
+    [0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0],
+    [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1],
+    [0, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0],
+    [0, 0, 1, 0, 0, 0, 0, 0, -1, 0, 0, 0],
+    [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0],
+], dtype=float)  # fmt: skip
+"""Of a twist at the origin, its turning last, the rows of T but the last, which is 0."""
 Poses = Callable[[str], Pose]
 """Body -> its pose, or its poses at some instants (..., 3, 3) and (..., 3)."""
 Indices = NDArray[np.intp]
@@ -281,6 +293,79 @@ class Contacts:
             if k in along:
                 found[..., j] = along[k]
         return found
+
+
+def flat(met: Sequence[Contact]) -> bool:
+    """Return whether there are contacts, and all are of points of bodies, with a radius, over planes."""
+    return bool(met) and all(one.first.type == "plane" and one.second.type in ("sphere", *ROUND) for one in met)
+
+
+class Flat:
+    """Rows of points of bodies over planes, whose H' v is written out.
+
+    A body moves its point at x (1 behind its coordinates) at T x, and accelerates it at (T' + T T) x. Seen from the
+    plane, with the normal n and T1, a point that moves at T2 accelerates, where no coordinate does, as
+
+        h'' = n.(T2' + T2 T2 - T1' - T1 T1 - 2 T1 (T2 - T1)) x
+
+    Args:
+        contacts: all of which are `flat`.
+        frames: rotations and origins of `Contacts.bodies` in the frames whose poses are given, of all rows in them.
+
+    Attributes:
+        one, two (n,): numbers of the bodies of the plane and of the point.
+    """
+
+    def __init__(self, contacts: Contacts, frames: Sequence[Pose]) -> None:
+        rows = []
+        for k, place in contacts.rows:
+            contact = contacts.all[k]
+            (one, R, o), (two, S, p) = (_in_frame(contacts, frames, shape) for shape in (contact.first, contact.second))
+            solid, extents = contact.second.type, contact.second.extents
+            at = p + S @ corners(solid, extents)[place] if solid in ROUND else p
+            radius = extents[0] if solid in ("sphere", "capsule") else 0.0
+            rows.append((one, two, R[:, 2, None], at[:, None], R[:, 2] @ o + radius + contact.pair.margin))
+        self._parts = tuple(np.array(part) for part in zip(*rows, strict=True))
+        self.one, self.two, *_ = self._parts
+        self._of = lru_cache(KEPT)(lambda chosen: tuple(part[list(chosen)] for part in self._parts))
+
+    def met(self, poses: Pose, rows: Sequence[int] | None = None) -> tuple[Floats, Floats, Floats]:
+        """Return gaps (n,) less the margins, normals and points (n, 3) of some rows, or of all.
+
+        Args:
+            poses: rotations (nb, 3, 3) and origins (nb, 3) of the bodies' frames.
+            rows: which.
+        """
+        one, two, normal, at, off = self._parts if rows is None else self._of(tuple(rows))
+        R, o = poses
+        n = (R.take(one, 0) @ normal)[:, :, 0]
+        x = (R.take(two, 0) @ at)[:, :, 0] + o.take(two, 0)
+        return (n * (x - o.take(one, 0))).sum(axis=1) - off, n, x
+
+    def drift(self, poses: Pose, twist: Floats, change: Floats, rows: Sequence[int]) -> Floats:
+        """Return H' v of some rows (n,).
+
+        Args:
+            poses: as of `met`.
+            twist: velocities (nb, 6) of the bodies at the world's origin, their turning last.
+            change: the rates of these at v' = 0.
+            rows: which.
+        """
+        one, two, *_ = self._of(tuple(rows))
+        _, n, x = self.met(poses, rows)
+        T, accelerates = (twist @ MOVES).reshape(-1, 3, 4), (change @ MOVES).reshape(-1, 3, 4)
+        accelerates = accelerates + T[:, :, :3] @ T
+        below, of = T.take(one, 0), T.take(two, 0)
+        seen = accelerates.take(two, 0) - accelerates.take(one, 0) - 2.0 * below[:, :, :3] @ (of - below)
+        total: Floats = (n * ((seen[:, :, :3] @ x[:, :, None])[:, :, 0] + seen[:, :, 3])).sum(axis=1)
+        return total
+
+
+def _in_frame(contacts: Contacts, frames: Sequence[Pose], shape: Shape) -> tuple[int, Floats, Floats]:
+    """Return the number of a shape's body, and the shape's pose in its frame."""
+    k = contacts.bodies.index(shape.body)
+    R, o = frames[k]
+    return k, R @ matrices(np.array(shape.orientation)), o + R @ np.array(shape.position)
 
 
 def _sizes(contact: Contact) -> tuple[Floats, Floats]:

@@ -18,9 +18,17 @@ def one_set(law: Law) -> Law:
     )  # fmt: skip
 
 
-def in_real_time(case: Case, fsm: str = "level") -> Case:
-    """Return the scene with every contact integrated in real time, all together, under the machine `fsm`."""
-    return replace(case, law=one_set(case.law), fsm=fsm, collisions="resolved", closed_form=None, claims=())
+def in_real_time(case: Case, fsm: str = "level", *, two_sets: bool = False) -> Case:
+    """Return the scene with every contact integrated in real time, all together, under the machine `fsm`.
+
+    Args:
+        case: the scene.
+        fsm: the machine.
+        two_sets: whether a row that is captured is handed over to constants of its own.
+    """
+    law = case.law if case.real_time is None else case.real_time
+    law = law if two_sets else one_set(law)
+    return replace(case, law=law, fsm=fsm, collisions="resolved", closed_form=None, claims=())
 
 
 def followed(case: Case, *, two_sets: bool = False) -> Case | None:
@@ -32,4 +40,4 @@ def followed(case: Case, *, two_sets: bool = False) -> Case | None:
     """
     quick = bool((case.law.b0 > 0.0).any())
     same = case.fsm == "level" and (not quick or (two_sets and case.collisions == "resolved"))
-    return None if same else in_real_time(case)
+    return None if same else in_real_time(case, two_sets=two_sets)

@@ -24,6 +24,8 @@ SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in r
 """Of the corners of a box, in the order of their rows."""
 ROUND = ("box", "capsule", "hull")
 """Shapes whose places over a plane are points of theirs: corners, or the ends of an axis."""
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""Of each axis in a vector product."""
 UP = np.array([0.0, 0.0, 1.0])
 ENDS = np.array([-1.0, 1.0])[:, None] * UP
 RIM = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -258,9 +260,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Return vector products (..., 3); NumPy's own costs more than all else here for few vectors."""
-    x, y, z, u, v, w = (part[..., i] for part in (a, b) for i in range(3))
-    found: Floats = np.empty((*np.broadcast_shapes(x.shape, u.shape), 3))
-    found[..., 0], found[..., 1], found[..., 2] = y * w - z * v, z * u - x * w, x * v - y * u
+    found: Floats = a.take(NEXT, -1) * b.take(LAST, -1) - a.take(LAST, -1) * b.take(NEXT, -1)
     return found
 
 

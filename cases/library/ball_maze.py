@@ -123,7 +123,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         ),
         claims=claimed,
         metrics=METRICS,
-        limits=limits(variant, claimed, fallen(p, maze)),
+        limits=limits(claimed, fallen(p, maze)),
         discrete=DISCRETE,
         tight=TIGHT,
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},

@@ -114,6 +114,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         v0=v0,
         t_end=float(t_end),
         law=law_of(made),
+        real_time=law_of(scene(parameters, mechanism, law(balls, "resolved"))),
         scene=made,
         collisions=rule,
         closed_form=motion if sliders and rule in FROZEN else None,

@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Case, Claim, Coordinate, Law, Parameter, Tier, Value
+from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
 from crossbody.cases.errors import SceneError
 from crossbody.cases.mechanisms.red_body.limits import limits
 from crossbody.cases.mechanisms.red_body.metrics import METRICS
 from crossbody.cases.mechanisms.red_body.order import STAGES, Fall, inequalities
+from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
+from crossbody.cases.scene_rows import law_of
 
 _LONGER = 1.1
 """Part by which gravity may make the blow of the right corner longer than its closed form."""
@@ -64,6 +67,8 @@ COORDINATES = tuple(
         ("x", "m"), ("y", "m"), ("angle", "rad"), ("slab x", "m"), ("slab y", "m"), ("slab angle", "rad"),
     )
 )  # fmt: skip
+WAYS = (("x", "slide", (1.0, 0.0, 0.0)), ("y", "slide", (0.0, 0.0, 1.0)), ("angle", "hinge", (0.0, -1.0, 0.0)))
+"""Joints of either body, which turns from x towards z."""
 CONTACTS = ("left foot", "right foot", "left corner", "right corner", "wall")
 
 
@@ -99,17 +104,46 @@ def _check_corner(p: Mapping[str, float], q: Floats, name: str, side: float) -> 
         )
 
 
-def law(p: Mapping[str, float]) -> Law:
+def laws(p: Mapping[str, float]) -> list[RowLaw]:
     """Slow constants for all five rows; fast ones for corners and wall, none for the feet, which stay on the floor."""
-    w = math.sqrt(p["b0"])
-    return Law(
-        a0=np.full(5, p["a0"]),
-        a1=np.full(5, p["a1"]),
-        a2=np.zeros(5),
-        unilateral=np.ones(5, dtype=np.bool_),
-        b0=np.array([0.0, 0.0, p["b0"], p["b0"], p["b0"]]),
-        b1=np.array([0.0, 0.0, *(2.0 * p[zeta] * w for zeta in ("zeta3", "zeta4", "zeta5"))]),
-    )
+    slow, w = RowLaw(a0=p["a0"], a1=p["a1"]), math.sqrt(p["b0"])
+    quick = [replace(slow, b0=p["b0"], b1=2.0 * p[zeta] * w) for zeta in ("zeta3", "zeta4", "zeta5")]
+    return [slow, slow, *quick]
+
+
+def scene(p: Mapping[str, float]) -> Scene:
+    """Return two uniform boxes that move in the plane of x and z, each on two slides and a hinge.
+
+    Feet and corners are points over planes: the floor, the slab's upper face, a wall across x.
+    """
+    a, b, d, foot = (p[name] for name in ("half_width", "half_height", "slab_half_height", "foot"))
+    sizes = {"box": (p["mass"], a, b), "slab": (p["slab_mass"], p["slab_half_length"], d)}
+    points = (("slab", -foot, -d), ("slab", foot, -d), ("box", -a, -b), ("box", a, -b), ("box", a, b))
+    under = ("floor", "floor", "upper face", "upper face", "wall face")
+    return Scene(
+        bodies=tuple(_body(name, *size) for name, size in sizes.items()),
+        joints=tuple(
+            Joint(name=f"{body} {name}", body=body, type=kind, axis=axis) for body in sizes for name, kind, axis in WAYS
+        ),
+        shapes=(
+            Shape(name="floor", type="plane"),
+            Shape(name="upper face", body="slab", type="plane", position=(0.0, 0.0, d)),
+            Shape(name="wall face", type="plane", position=(p["wall"], 0.0, 0.0), orientation=(1.0, 0.0, -1.0, 0.0)),
+            *(Shape(name=name, body=body, position=(x, 0.0, z))
+              for name, (body, x, z) in zip(CONTACTS, points, strict=True)),
+        ),
+        pairs=tuple(
+            Pair(name=name, first=surface, second=name, law=law)
+            for name, surface, law in zip(CONTACTS, under, laws(p), strict=True)
+        ),
+        gravity=(0.0, 0.0, -p["gravity"]),
+    )  # fmt: skip
+
+
+def _body(name: str, mass: float, half: float, half_height: float) -> Body:
+    """Return a uniform box; only its moment of inertia about y ever acts."""
+    turning = mass * (half**2 + half_height**2) / 3.0
+    return Body(name=name, mass=mass, inertia=(turning, turning, turning, 0.0, 0.0, 0.0))
 
 
 def _still(p: Mapping[str, float]) -> bool:
@@ -152,7 +186,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene, with the order of modes claimed where the inequalities behind it hold."""
     p = {k: float(value) for k, value in parameters.items()}
     q0, v0 = start(p)
-    frozen, still = variant == "frozen", _still(p)
+    frozen, still, made = variant == "frozen", _still(p), scene(p)
     broken = inequalities(p, frozen) if still else ()
     claims = (*_still_claims(p), *(() if broken else _order_claims(p, frozen))) if still else ()
     note = f" (the order is not claimed: {'; '.join(broken)})" if broken else ""
@@ -167,7 +201,8 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         q0=q0,
         v0=v0,
         t_end=p["t_end"],
-        law=law(p),
+        law=law_of(made),
+        scene=made,
         collisions=_RULES[variant],
         claims=claims,
         metrics=METRICS,

@@ -11,10 +11,14 @@ import numpy as np
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Actuator, Body, Joint, Loop, RowLaw, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import Contact, contacts
-from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE
+from crossbody.engines.mujoco._direct import IMPEDANCE, solref_of
 
 POINT = 1e-15
 """Radius of a corner, m: below the rounding of any place, and above 0, which no ball has."""
+
+FAR = 100.0
+"""Half sides of the box whose face stands for a plane that moves, m: MuJoCo's planes stand still. It rounds gaps to
+1e-14 m, and has no other face within reach."""
 
 LEAST = 2e-15
 """The smallest moment of inertia that MuJoCo admits, kg m^2 (twice mjMINVAL): it has no point masses."""
@@ -90,13 +94,22 @@ def _add_inertia(added: Any, body: Body) -> None:
         added.inertia = (LEAST if body.mass > 0.0 else 0.0,) * 3
 
 
+def moves(body: Any) -> bool:
+    """Return whether a body or one above it has a joint."""
+    while body.name != "world":
+        if body.joints:
+            return True
+        body = body.parent
+    return False
+
+
 def _bounds(bounds: tuple[float, ...]) -> tuple[bool, tuple[float, ...]]:
     """Return whether there is a bound, and both of them; one that is not there is far away."""
     return bool(np.isfinite(bounds).any()), tuple(np.clip(bounds, -1e10, 1e10))
 
 
 def _solref(law: RowLaw) -> tuple[float, float]:
-    return -MAX_IMPEDANCE * law.a0, -MAX_IMPEDANCE * law.a1
+    return solref_of(law.a0, law.a1)
 
 
 def _add_joint(body: Any, joint: Joint) -> None:
@@ -164,11 +177,17 @@ def _add_shape(spec: Any, bodies: Mapping[str, Any], shape: Shape) -> None:
     """Add a shape that touches nothing by itself, if it is not there."""
     if spec.geom(shape.name) is not None:
         return
-    kind = "mesh" if shape.type == "hull" else shape.type
-    size = shape.size if kind != "plane" else (0.0, 0.0, 1.0)  # without end, and a grid to be drawn
+    kind, size, position = "mesh" if shape.type == "hull" else shape.type, shape.size, np.array(shape.position)
+    if kind == "plane":
+        size = (0.0, 0.0, 1.0)  # without end, and a grid to be drawn
+    if kind == "plane" and moves(bodies[shape.body]):
+        kind, size = "box", (FAR, FAR, FAR)
+        position -= FAR * matrices(np.array(shape.orientation))[:, 2]
+    if kind == "sphere":
+        size = (max(size[0], POINT), 0.0, 0.0)
     added = bodies[shape.body].add_geom(
         name=shape.name, type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}"), size=size,
-        pos=shape.position, quat=shape.orientation, contype=0, conaffinity=0,
+        pos=position, quat=shape.orientation, contype=0, conaffinity=0,
     )  # fmt: skip
     if kind == "mesh":
         added.meshname = spec.add_mesh(name=shape.name, uservert=np.ravel(shape.corners)).name

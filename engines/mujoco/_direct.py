@@ -17,9 +17,14 @@ REMAINING = 1e-7
 """Factor on R. With PGS on one row the error of lam falls with it: 2e-8, 2e-11, 6e-13 at 1e-4, 1e-7, 1e-9."""
 
 
+def solref_of(a0: float, a1: float) -> tuple[float, float]:
+    """Return the solref that gives aref = -a1 h' - a0 h; both negative or zero, or MuJoCo replaces them."""
+    return -MAX_IMPEDANCE * a0, -MAX_IMPEDANCE * a1
+
+
 def direct_solref(law: Law, row: int) -> tuple[float, float]:
-    """The pair solref that gives aref = -a1 h' - a0 h; both negative or zero, or MuJoCo replaces them."""
-    return -MAX_IMPEDANCE * float(law.a0[row]), -MAX_IMPEDANCE * float(law.a1[row])
+    """Return that of a row of a law."""
+    return solref_of(float(law.a0[row]), float(law.a1[row]))
 
 
 def law_of(solref: Any) -> tuple[float, float]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Joint, Scene, Tendon
-from crossbody.engines._contacts import TURN, Contacts, Indices, closing, drift
+from crossbody.engines._contacts import TURN, Contacts, Flat, Indices, closing, drift, flat
 from crossbody.engines._scene import angle_of, places
 from crossbody.engines.mujoco._observe import numbers, pose_of
 from crossbody.engines.nearest import Pose, cross
@@ -36,10 +36,24 @@ class Drift:
         self.pose = pose_of(self.data, self.numbers)
         self.carriers = np.array([self.numbers[body] for body in contacts.bodies], dtype=np.intp)
         self.bounded, self.at, self.place = scene.bounded, *places(scene)
+        self.roots = model.body_rootid[self.carriers]
+        self.moving = np.array([carried(model, body) for body in self.carriers]).reshape(-1, model.nv)
+        none = [(np.eye(3), np.zeros(3))] * len(contacts.bodies)
+        self.flat = Flat(contacts, none) if flat(contacts.all) else None
         self.row = np.repeat(np.arange(model.ntendon), model.ten_J_rownnz)  # of each entry of the tendons' Jacobian
 
-    def __call__(self, q: Floats, v: Floats, parts: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
-        """Return that of some of what may have bounds, 0 of a sum of joints, and of some rows of the contacts."""
+    def __call__(self, now: Any, parts: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return that of some of what may have bounds, 0 of a sum of joints, and of some rows of the contacts.
+
+        Args:
+            now: MjData of a state that is evaluated up to its forces.
+            parts: of `Scene.bounded`.
+            rows: of the contacts.
+        """
+        if self.flat is not None and len(rows):
+            lengths = self(now, parts, ())[0] if len(parts) else np.zeros(0)
+            return lengths, self._over_planes(self.flat, now, rows)
+        q, v = now.qpos, now.qvel.copy()
         self.data.qvel[:], self.data.qpos[:] = v, q
         along: dict[int, bool] = {}
         turn = TURN
@@ -63,6 +77,15 @@ class Drift:
 
         lengths, touches = np.split(drift(rates, v, turn), [len(parts)])
         return lengths, touches
+
+    def _over_planes(self, flat: Flat, data: Any, rows: Sequence[int]) -> Floats:
+        """Return that of points over planes at a state that MuJoCo has evaluated up to its forces."""
+        k = self.carriers
+        both = np.array([data.cvel.take(k, 0), (self.moving * data.qvel) @ data.cdof_dot])
+        turns = both[:, :, :3]  # first, and both are about the centres of mass of the bodies' trees
+        moves = both[:, :, 3:] + cross(data.subtree_com.take(self.roots, 0), turns)
+        twist, change = np.concatenate([moves, turns], axis=2)
+        return flat.drift((data.xmat.take(k, 0).reshape(-1, 3, 3), data.xpos.take(k, 0)), twist, change, rows)
 
     def _state(self) -> tuple[Floats, ...]:
         """Return poses and twists of all bodies, and about which points these are: their trees' centres of mass."""
@@ -98,3 +121,12 @@ class Drift:
             return 0.0
         first, turn = self.place[joint.name], angle_of(self.data.qpos[self.at[joint.name] :][:4])
         return float(turn @ v[first : first + 3] / np.linalg.norm(turn))
+
+
+def carried(model: Any, body: int) -> Floats:
+    """Return which coordinates (nv,) move a body, as 1 and 0."""
+    found = np.zeros(model.nv)
+    while body:
+        found[model.body_dofadr[body] :][: model.body_dofnum[body]] = 1.0
+        body = model.body_parentid[body]
+    return found

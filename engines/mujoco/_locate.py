@@ -24,7 +24,7 @@ WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
 }
 
 
-OUTLIVING = WATCHED | {CONTACT: ((1, 1.0),)}
+OUTLIVING = WATCHED | dict.fromkeys((CONTACT, COLLISION), ((1, 1.0),))
 """Of rows that push above their surface too until their multiplier is zero, as the law has it."""
 
 
@@ -43,19 +43,17 @@ class Locator:
     def __init__(self, scene: Scene, advance: Callable[[], None], rewind: Callable[[], None]) -> None:
         assert scene.margins is not None
         self.model, self.data, self.margins = scene.model, scene.data, scene.margins
-        self.advance, self.rewind, self.outlives = advance, rewind, scene.outlives
+        self.advance, self.rewind, self.outlives, self.entered = advance, rewind, scene.outlives, scene.entered
         self.watched = OUTLIVING if scene.outlives else WATCHED
 
     def beyond(self, modes: Modes) -> Modes:
-        """The modes just behind the event: those rows that crossed are taken by their gap and multiplier.
-
-        What pushes is in CONTACT here: only the scene knows of COLLISION.
-        """
-        return tuple(
-            mode if mode not in WATCHED or (self.outlives and mode == CONTACT and lam > 0.0)
+        """The modes just behind the event: those rows that crossed are taken by their gap and multiplier."""
+        found = [
+            mode if mode not in WATCHED or (self.outlives and mode in (CONTACT, COLLISION) and lam > 0.0)
             else FREE if h > 0.0 else CONTACT if lam > 0.0 else BALLISTIC
             for mode, (h, lam) in zip(modes, self.margins(), strict=True)
-        )  # fmt: skip
+        ]  # fmt: skip
+        return self.entered(found)
 
     def land(self, modes: Modes) -> int:
         """Redo the step so that it ends just behind its first event; returns the trials that it took.

@@ -32,8 +32,6 @@ class MazeSteps:
         outcome, message: how it ended.
     """
 
-    trials = 0
-
     def __init__(
         self, maze: BallMaze, model: Any, data: Any, rings: Sequence[int], log: MazeLog, dt: float, limit: int
     ) -> None:

@@ -74,16 +74,24 @@ class Obvious(Rows):
 
 
 def obvious(scene: Scene) -> Any:
-    """Return the model of a scene: MuJoCo's contacts, solids in the place of point masses, its own law of rows."""
-    scene = by_shapes(scene)
+    """Return the model of a scene: MuJoCo's contacts, solids in the place of point masses, its own law of rows.
+
+    What is a bound in the scene is a shape among all others; pairs that the scene states are the only ones.
+    """
+    given, scene = scene, by_shapes(scene)
     solids = _solids(scene)
     spec = spec_of(scene, solids=solids)
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-    elastic = _elastic(scene)
-    for geom in spec.geoms:
-        geom.contype = geom.conaffinity = 1
-        geom.solref = elastic.get(geom.name, geom.solref)
+    stated, elastic = {pair.name for pair in given.pairs}, _elastic(scene)
     for pair in list(spec.pairs):
+        if pair.name in stated:
+            plain = spec.geom(pair.geomname2)
+            pair.solref, pair.solimp = plain.solref, plain.solimp
+            continue
+        for name in (pair.geomname1, pair.geomname2):
+            geom = spec.geom(name)
+            geom.contype = geom.conaffinity = 1
+            geom.solref = elastic.get(name, geom.solref)
         spec.delete(pair)
     for name, mass in solids.items():
         spec.body(name).geoms[0].mass = mass

@@ -1,8 +1,8 @@
 """Many contacts in MuJoCo, each a pair of geoms: one row a pair, without friction the case's law exactly.
 
-MuJoCo's row is J v' = -a1 h' - a0 (h - margin): the margin is taken out again, and H' v, which it leaves out for
-contacts, is added, in `hook`. A row must outlive its gap by a step, or the stages of the step that leaves it see
-different equations: `reach` is how far above its gap it still exists.
+MuJoCo's row is J v' = -a1 h' - a0 (h - margin): the margin is taken out again, in `hook`; H' v is 0. A row must outlive
+its gap by a step, or the stages of the step that leaves it see different equations: `reach` is how far above its gap it
+still exists.
 
 A gap and a multiplier count as zero below `small`: what rounding makes of balls that touch at rest is no event.
 """
@@ -17,9 +17,13 @@ import numpy as np
 from crossbody.cases import Law, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
-from crossbody.engines.mujoco._direct import IMPEDANCE, direct_solref
+from crossbody.engines.mujoco._direct import IMPEDANCE, MAX_IMPEDANCE, direct_solref
+from crossbody.engines.mujoco._globals import Hook
+from crossbody.engines.mujoco._observe import mass_matrix
 
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
+CLOSED = -1.0
+"""Gap that is told of a closed row, m: it is let go by its multiplier alone."""
 FAR = 1e10
 """Margin that no gap falls below: the pair is never a contact, m."""
 
@@ -34,7 +38,6 @@ class Pairs:
         law: constants of every row, linear.
         small: gap, m, and multiplier, N, that count as zero.
         gaps: -> gap of every row (nc,), m, at the present state.
-        drift: -> H' v of every row (nc,), m/s^2, at the present state; None where it is 0.
     """
 
     def __init__(
@@ -45,9 +48,8 @@ class Pairs:
         law: Law,
         small: tuple[float, float],
         gaps: Callable[[], Floats],
-        drift: Callable[[], Floats] | None = None,
     ) -> None:
-        self.model, self.data, self.small, self.gaps, self.drift = model, data, small, gaps, drift
+        self.model, self.data, self.small, self.gaps = model, data, small, gaps
         self.nc, self.a0 = len(geoms), np.array(law.a0)
         self.margin: Floats = model.pair_margin
         # The compiler sorts pairs by the bodies that they join.
@@ -102,12 +104,79 @@ class Pairs:
         return list(zip(h.tolist(), push.tolist(), strict=True))
 
     def hook(self, _model: Any, d: Any) -> None:
-        """Correct the reference accelerations: positions are counted from the margin, and H' v is missing."""
+        """Correct the reference accelerations: positions are counted from the margin."""
         if d.nefc:
             rows, at = self._there()
             d.efc_aref[at] -= self.a0[rows] * self.margin[self.order[rows]]
-            if self.drift is not None:
-                d.efc_aref[at] -= self.drift()[rows]
+
+
+class LastingPairs(Pairs):
+    """Pairs that follow the level machine: a closed row exists until its multiplier vanishes, also above its surface.
+
+    MuJoCo's own rule drops a contact at h = 0.
+    """
+
+    def __init__(
+        self, model: Any, data: Any, geoms: Sequence[tuple[str, str]], law: Law, small: tuple[float, float],
+        gaps: Callable[[], Floats],
+    ) -> None:  # fmt: skip
+        super().__init__(model, data, geoms, law, small, gaps)
+        self.closed = np.zeros(self.nc, dtype=bool)
+
+    def after(self, restart: Callable[[], None]) -> Callable[[], None]:
+        """Return the start of a scene with every row open."""
+
+        def start() -> None:
+            restart()
+            self.closed[:] = False
+
+        return start
+
+    def beside(self, forces: Hook) -> Hook:
+        """Return forces of every stage, and then the rows' own `hook`."""
+
+        def hook(model: Any, data: Any) -> None:
+            forces(model, data)
+            self.hook(model, data)
+
+        return hook
+
+    def constants(self) -> dict[str, Floats]:
+        """Return those of every row, read back from the model."""
+        a0, a1 = (-self.model.pair_solref[self.order] / MAX_IMPEDANCE).T
+        return {"a0": a0, "a1": a1, "a2": np.zeros(self.nc)}
+
+    def entries(self) -> tuple[Floats, Floats]:
+        """Return H (nc, nv) of all rows as MuJoCo has them, and their multipliers (nc,) without the bound lam >= 0."""
+        d, nv = self.data, self.model.nv
+        rows, at = self._there()
+        where = np.array(at)[np.argsort(rows)]
+        H, M = np.array(d.efc_J).reshape(-1, nv)[where], mass_matrix(self.model, d)
+        lam: Floats = np.linalg.solve(H @ np.linalg.solve(M, H.T), d.efc_aref[where] - H @ d.qacc_smooth)
+        return H, lam
+
+    def modes(self) -> Modes:
+        """Return the mode of every row, by the multiplier of one that is closed, by the gap of every other."""
+        rows = zip(self.closed.tolist(), self.gaps().tolist(), self.lam().tolist(), strict=True)
+        return tuple(
+            CONTACT if closed and push > self.small[1] else FREE if h > self.small[0] else BALLISTIC
+            for closed, h, push in rows
+        )
+
+    def arm(self, reach: float) -> Callable[[Modes], None]:
+        """See `Pairs`; what is closed is kept."""
+        put = super().arm(reach)
+
+        def arm(modes: Modes) -> None:
+            self.closed[:] = [mode != FREE for mode in modes]
+            put(modes)
+
+        return arm
+
+    def margins(self) -> list[tuple[float, float]]:
+        """See `Pairs`; a row that pushes is closed whatever its gap."""
+        rows = zip(self.closed.tolist(), self.lam().tolist(), super().margins(), strict=True)
+        return [(CLOSED if closed and lam > 0.0 else h, push) for closed, lam, (h, push) in rows]
 
 
 def add_pairs(spec: Any, geoms: Sequence[tuple[str, str]], law: Law | None) -> None:

@@ -34,6 +34,7 @@ class Rows:
 
     Attributes:
         always: number of rows that are always on; they stand first in both.
+        steady: whether what MuJoCo has rows for says which these are: no bound has two ends, no pair two places.
         frictional: whether edges of friction pyramids, whose sum is the normal force, are rows of contacts too.
     """
 
@@ -65,6 +66,10 @@ class Rows:
             else:
                 self.touches[frozenset((first, self.geoms[contact.second.name]))] = (contact, rows)
             row += contact.places
+        rubs = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
+        one_each = len(self.sole) == len(self.places) and all(len(rows) == 1 for _, rows in self.touches.values())
+        self.steady, self.only = one_each and not (rubs and self.nc == 1), ((0, 0),)
+        self._known: dict[tuple[bytes, ...], tuple[Present, ...]] = {}
 
     def by_corners(self, contact: Contact) -> bool:
         """Return whether the model has a shape for each place of a contact, and a pair for each row."""
@@ -91,12 +96,24 @@ class Rows:
             return {"solref": pairs}
         return dict(zip(("a0", "a1", "a2"), (*(-pairs.T / MAX_IMPEDANCE), self.cubic), strict=True))
 
-    def present(self) -> Iterator[Present]:
-        """Yield what MuJoCo has a row for now, of those that may open."""
+    def present(self) -> tuple[Present, ...]:
+        """Return what MuJoCo has a row for now, of those that may open."""
         data = self.data
         first, last = data.ne, data.nefc
         if first == last:
-            return
+            return ()
+        if not self.steady:
+            return tuple(self._present(first, last))
+        if self.nc == 1:
+            return self.only
+        there = data.efc_type[first:last].tobytes(), data.efc_id[first:last].tobytes(), data.contact.geom.tobytes()
+        known = self._known.get(there)
+        if known is None:
+            known = self._known[there] = tuple(self._present(first, last))
+        return known
+
+    def _present(self, first: int, last: int) -> Iterator[Present]:
+        data = self.data
         rows = zip(data.efc_type[first:last].tolist(), data.efc_id[first:last].tolist(), strict=True)
         for j, (kind, part) in enumerate(rows, first):
             if (row := self.sole.get((kind, part))) is not None:

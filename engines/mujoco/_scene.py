@@ -38,6 +38,7 @@ class Scene:
         arm: opens and closes rows to suit their modes (matched profile only).
         margins: -> for every row its gap, m, and the sign of the multiplier that it would have without the bound
             lam >= 0 (matched profile only).
+        entered: modes of rows that push or not -> those of rows with two sets of constants, which collide first.
         outlives: whether a row that pushes stays on above its surface until it no longer does, as the law has it.
         machine: which state machine the rows follow.
         audit: the physics read back from the compiled model.
@@ -59,6 +60,7 @@ class Scene:
     always: bool = False
     arm: Callable[[Modes], None] | None = None
     margins: Callable[[], list[tuple[float, float]]] | None = None
+    entered: Callable[[Sequence[int]], Modes] = tuple
     outlives: bool = False
     machine: str = "memoryless"
     audit: Mapping[str, Any] = field(default_factory=dict)

@@ -6,7 +6,7 @@ law, one that is off never pushes: the end of a trial is then a smooth function 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -16,7 +16,11 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
+from crossbody.cases.scene_rows import rows_of
+from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes
+from crossbody.engines._machines import elastic_part
+from crossbody.engines.mujoco._direct import solref_of
 from crossbody.engines.mujoco._drift import Drift
 from crossbody.engines.mujoco._globals import Hook
 from crossbody.engines.mujoco._rows import LIMITS, Present, Rows
@@ -33,42 +37,76 @@ OFF = -1e12
 LAYOUTS = 256
 """Sets of rows and modes whose places are kept: a run has a few of them."""
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
+BILATERAL, COLLISION, SEPARATED = int(Mode.BILATERAL), int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 
 
 class Switched(Rows):
     """Rows that open and close by their modes.
 
+    A row with two sets of constants collides with the fast ones and is handed over to the slow ones at the end of the
+    step in which the elastic part of its multiplier is spent.
+
     Attributes:
         armed: the modes that are in force. on (nc,): which rows have their law, those in contact.
         part: of every row that may open the array of margins and its place there.
+        sets: of every row with two sets of constants its array of them and its place there, the slow and the fast ones.
         surface (nc,): margin at which its law has it at zero, m or rad.
         wanted (nc,): reference acceleration by the law, m/s^2 or rad/s^2.
         quiet: whether all rows that open are bounds, whose gaps are known without a row: free ones have none.
         converged: where Newton's method may end while no row that opens is there; with one it goes on while it can.
         last (nc,): multipliers at the end of the last step. J v' = a - R f, where MuJoCo keeps a softness R; with
-            a + R f of the last step in the place of a, what is left of it is R times the change of f in a step.
+            a + R f of the last step in the place of a, what is left of it is R times the change of f in a step. It is 0
+            of contacts, whose R is 1e-11 of what moves them: less than what solving anew for another f makes of it.
     """
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
         super().__init__(scene, model, data)
         margins = {int(LIMITS[0]): model.jnt_margin, int(LIMITS[1]): model.tendon_margin}
-        self.part = [(margins[kind], i) for kind, i, _ in self.places]
-        self.part += [(model.pair_margin, i) for i in self.pair_ids()]
+        solrefs = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
+        pairs, laws = self.pair_ids(), rows_of(scene)[1]
+        self.part = [(margins[kind], i) for kind, i, _ in self.places] + [(model.pair_margin, i) for i in pairs]
+        solref = [(solrefs[kind], i) for kind, i, _ in self.places] + [(model.pair_solref, i) for i in pairs]
+        self.sets = {
+            row: (*part, solref_of(law.a0, law.a1), solref_of(law.b0, law.b1))
+            for row, (law, part) in enumerate(zip(laws[self.always :], solref, strict=True), self.always)
+            if law.b0 > 0.0
+        }
+        self.fast = np.array([(law.b0, law.b1) for law in laws]).reshape(-1, 2).T
         self.surface, self.wanted, self.last = np.zeros((3, self.nc))
         self.converged = float(model.opt.tolerance)
         self.surface[self.always :] = [margin[i] for margin, i in self.part]
         self.quiet = not self.touching.count
-        self.free: Modes = (int(Mode.BILATERAL),) * self.always + (FREE,) * (self.nc - self.always)
+        self.contact = np.arange(self.nc) >= self.nc - self.touching.count
+        self.free: Modes = (BILATERAL,) * self.always + (FREE,) * (self.nc - self.always)
+        self.armed = self.free
         self.arm(self.free)
 
     def arm(self, modes: Modes) -> None:
         """Put the law of the rows in contact in force and that of the others out of it."""
-        self.armed, self.on = modes, np.array(modes) == CONTACT
+        for row, (solref, i, slow, fast) in self.sets.items():
+            solref[i] = slow if modes[row] == CONTACT else fast
+        self.armed, self.on = modes, np.isin(modes, (CONTACT, COLLISION))
         for row, (margin, i) in enumerate(self.part, self.always):
             margin[i] = -FAR if self.quiet else self.surface[row] + REACH
         for row, mode in enumerate(modes):
-            if mode in (CONTACT, BALLISTIC):
+            if mode not in (FREE, BILATERAL):
                 self._widen(row)  # behind all others: both bounds of a joint have one margin
+
+    def entered(self, modes: Sequence[int], spent: Collection[int] = ()) -> Modes:
+        """Return modes in which rows with two sets collide until they are spent, and are let go from where they were.
+
+        Args:
+            modes: CONTACT of what pushes, and BALLISTIC of what does not.
+            spent: rows that have nothing left of their collision.
+        """
+        found = list(modes)
+        for row in self.sets:
+            before = self.armed[row]
+            if modes[row] == CONTACT and before != CONTACT and row not in spent:
+                found[row] = COLLISION
+            elif modes[row] == BALLISTIC and before in (COLLISION, SEPARATED):
+                found[row] = SEPARATED
+        return tuple(found)
 
     def _widen(self, row: int) -> None:
         margin, i = self.part[row - self.always]
@@ -79,8 +117,9 @@ class Switched(Rows):
 
     def lam(self) -> Floats:
         """Return the multiplier of every row (nc,), and keep it: what is recorded is behind a step that is taken."""
-        self.last = super().lam()
-        return self.last
+        found = super().lam()
+        self.last = found if self.quiet else np.where(self.contact, 0.0, found)
+        return found
 
     @property
     def wakeful(self) -> bool:
@@ -96,20 +135,32 @@ class Switched(Rows):
         """Return the mode of every row by its gap and multiplier; a free one that has closed is taken for a contact."""
         if self.nc == self.always:
             return self.free
-        found = list(self.free)
+        found, present = list(self.free), self.present()
         if self.quiet:
             gaps = self._gaps()
             if self.armed == self.free and min(gaps, default=1.0) > 0.0:
                 return self.free
             for row, gap in enumerate(gaps, self.always):
                 found[row] = CONTACT if gap <= 0.0 and self.armed[row] == FREE else FREE
-        for j, row in self.present():
+        for j, row in present:
             gap, push = self._gap(j, row), self._push(j, row)
             if push > 0.0 and (self.on[row] or gap <= 0.0):
                 found[row] = CONTACT
             elif gap <= 0.0:
                 found[row] = BALLISTIC
-        return tuple(found)
+        colliding = any(self.armed[row] == COLLISION for row in self.sets)
+        return self.entered(found, self._spent(present) if colliding else ())
+
+    def _spent(self, present: tuple[Present, ...]) -> set[int]:
+        """Return which rows have spent the elastic part of their multiplier: 1 % of lam_i / (G_A^-1)_ii is left."""
+        data = self.data
+        pushing = [(j, row) for j, row in present if self.on[row] and data.efc_force[j] > 0.0]
+        at = [j for j, _ in pushing]
+        stiff = np.diag(np.linalg.inv(self._delassus(at)[1]))[self.always :]
+        rows = np.array([row for _, row in pushing], dtype=int)
+        elastic = elastic_part(self.fast[:, rows], data.efc_pos[at] - self.surface[rows], data.efc_vel[at])
+        spent = elastic <= EPS * data.efc_force[at] / stiff
+        return {row for row, done in zip(rows.tolist(), spent, strict=True) if done and self.armed[row] == COLLISION}
 
     def margins(self) -> list[tuple[float, float]]:
         """Return the gap of every row, m or rad, and what is positive where it pushes or would be caught."""
@@ -143,6 +194,22 @@ class Switched(Rows):
         mujoco.mj_solveM(self.model, data, moved, J[None])
         return float((self.wanted[row] - J @ data.qacc) / (J @ moved[0]))
 
+    def _delassus(self, present: list[int]) -> tuple[Floats, Floats]:
+        """Return H (n, nv) of the rows that are always on and of those at some places, and H M^-1 H'."""
+        J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[[*range(self.always), *present]]
+        moved = np.empty_like(J)
+        mujoco.mj_solveM(self.model, self.data, moved, J)
+        return J, J @ moved.T
+
+    def asked(self) -> Floats:
+        """Return the multipliers (nc,) with which all rows that are there follow their law, as if they could pull."""
+        at, rows = np.array(self.present()).T
+        J, G = self._delassus(at.tolist())
+        lam = np.zeros(self.nc)
+        wanted = [*self.data.efc_aref[: self.always], *self.wanted[rows]]
+        lam[[*range(self.always), *rows]] = np.linalg.solve(G, wanted - J @ self.data.qacc_smooth)
+        return lam
+
     def approach(self) -> tuple[Floats, Floats, Floats]:
         """Return gap, rate and acceleration (nc,) that every row has at the state of the data with no row acting."""
         for margin, i in self.part:
@@ -167,7 +234,7 @@ class Switched(Rows):
         laid = lru_cache(LAYOUTS)(lambda present, armed: self._laid(present, armed, bent))
         loops, all_straight = slice(self.always), not self.cubic[self.always :].any()
         surface, cubic = self.surface.tolist(), self.cubic.tolist()
-        bends = bool(curved.any())
+        bends, alone = bool(curved.any()), self.nc == 1 and not bent and not self.touching.count
 
         def one(data: Any, j: int, row: int) -> None:
             pos, gains = float(data.efc_pos[j]) - surface[row], data.efc_KBIP[j].tolist()
@@ -182,11 +249,11 @@ class Switched(Rows):
                 return one(data, 0, 0)
             if bends:
                 aref[loops] += data.efc_R[loops] * self.last[loops] - curved * data.efc_pos[loops] ** 3
-            present = tuple(self.present())
+            present = self.present()
             model.opt.tolerance = 0.0 if present else self.converged
             if not present:
                 return None
-            if self.nc == 1 and not bent:  # NumPy costs ten times as much
+            if alone:  # NumPy costs ten times as much
                 return one(data, *present[0])
             at, rows, off, bending = laid(present, self.armed)
             gains = data.efc_KBIP[at]  # a0 is the first times the third
@@ -196,7 +263,7 @@ class Switched(Rows):
                 own -= self.cubic[rows] * (data.efc_pos[at] - self.surface[rows]) ** 3
             if bending is not None:
                 places, sign, parts, touched = bending
-                lengths, touches = drift(data.qpos, data.qvel, parts, touched)
+                lengths, touches = drift(data, parts, touched)
                 own[places] -= sign * np.concatenate([lengths, touches])
             self.wanted[rows] = own
             own[off] = OFF

@@ -107,7 +107,7 @@ def default_step(case: Case, profile: str) -> float:
 
 def followed(case: Case, profile: str) -> Case | None:
     """Return the case whose equations the profile integrates, if not its own; None too for constants of MuJoCo's."""
-    return real_time(case) if profile == "matched" else None
+    return real_time(case, two_sets=True) if profile == "matched" else None
 
 
 def _reach(case: Case, rows: Switched) -> tuple[float, float]:
@@ -193,6 +193,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     )  # fmt: skip
     if switched is not None and switched.nc > switched.always:
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
+        prepared.entered = switched.entered
     prepared.audit = _audit(case, profile, scene, model, rows)
     return prepared
 
@@ -266,6 +267,7 @@ def _start(case: Case, data: Any, rows: Rows, acting: Acting, driver: Forces | N
         mujoco.mj_resetData(model, data)
         if isinstance(rows, Switched):
             rows.last = np.zeros(rows.nc)  # not in place: multipliers that are recorded are these arrays
+            rows.arm(rows.free)
         data.qpos[:], data.qvel[:] = case.q0, case.v0
         if driver is not None:
             driver.begin(case.act0)
@@ -321,7 +323,9 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
 
     def look(q: Floats, v: Floats) -> None:
         if isinstance(rows, Switched) and entered:
-            rows.arm((int(Mode.BILATERAL),) * rows.always + (int(Mode.CONTACT),) * (rows.nc - rows.always))
+            rows.arm(rows.free)
+            closed = (int(Mode.BILATERAL),) * rows.always + (int(Mode.CONTACT),) * (rows.nc - rows.always)
+            rows.arm(rows.entered(closed))
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = q, v
         with hooked(hook):
@@ -343,7 +347,11 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
         for _ in range(SOLVES if entered else 1):  # what softness leaves of it is R times the change since the last
             look(q, v)
             found = rows.lam()
-        return found
+        if not (entered and isinstance(rows, Switched)):
+            return found
+        pushes = found[rows.always :] > 0.0
+        # MuJoCo's rows never pull: where one would, the others bear something else.
+        return rows.asked() if pushes.any() and not pushes.all() else found
 
     weightless = bool(model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
     found: dict[str, Any] = {

@@ -24,9 +24,8 @@ from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._observe import mass_matrix
-from crossbody.engines.mujoco._pairs import add_pairs
+from crossbody.engines.mujoco._pairs import LastingPairs, add_pairs
 from crossbody.engines.mujoco._scene import Scene
-from crossbody.engines.mujoco._two_sets import TwoSets
 
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 PADS = NAMES[1:3]
@@ -151,13 +150,12 @@ def _slides(own: SoftContact, carried: tuple[str, ...] = ()) -> Any:
     return spec
 
 
-def _rows(own: SoftContact, case: Case, model: Any, data: Any) -> TwoSets:
-    """The two rows, which follow the level machine with their one set of constants."""
+def _rows(own: SoftContact, case: Case, model: Any, data: Any) -> LastingPairs:
+    """The two rows, which follow the level machine."""
     q = data.qpos
     reach, force = own.sizes[0][0], own.p["kp"] * (own.p["jaw"] + own.p["squeeze"])
-    return TwoSets(
-        model, data, GEOMS, case.law, (SMALL * reach, SMALL * force), gaps=lambda: own.heights(q),
-        drift=None, jacobian=lambda: own.H, weights=own.masses,
+    return LastingPairs(
+        model, data, GEOMS, case.law, (SMALL * reach, SMALL * force), gaps=lambda: own.heights(q)
     )  # fmt: skip
 
 
@@ -252,7 +250,7 @@ def _listed(scene: Scene, own: SoftContact, case: Case, tree: Floats) -> dict[st
     }  # fmt: skip
 
 
-def _listed_rows(scene: Scene, pairs: TwoSets) -> dict[str, Any]:
+def _listed_rows(scene: Scene, pairs: LastingPairs) -> dict[str, Any]:
     """Rows read back by name: their law, H, and lam without the bound lam >= 0."""
     look = _looker(scene, np.eye(len(NAMES)))
 
@@ -264,5 +262,4 @@ def _listed_rows(scene: Scene, pairs: TwoSets) -> dict[str, Any]:
         look(q, v)
         return pairs.entries()[1]
 
-    pairs.reset()
     return {"H": H, "lam": lam, "constants": pairs.constants()}

@@ -37,9 +37,8 @@ from crossbody.engines.mujoco._direct import law_of, without_regularisation
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._linear import Stand
 from crossbody.engines.mujoco._observe import mass_matrix
-from crossbody.engines.mujoco._pairs import Pairs, add_pairs
+from crossbody.engines.mujoco._pairs import LastingPairs, Pairs, add_pairs
 from crossbody.engines.mujoco._scene import Scene
-from crossbody.engines.mujoco._two_sets import TwoSets
 from crossbody.engines.mujoco.soft_contact import ITERATIONS, SMALL
 from crossbody.engines.mujoco.soft_contact import why_not as why_not
 
@@ -91,11 +90,8 @@ def _matched(own: SoftDelta, case: Case) -> Scene:
     without_regularisation(model)
     data = mujoco.MjData(model)
     q, reach = data.qpos, own.p["jaw"] + own.p["squeeze"]
-    weights, small = np.append(np.ones(HINGES), own.masses), (SMALL * reach, SMALL * own.p["kp"] * reach)
-    pairs = TwoSets(
-        model, data, GEOMS, own.law, small, gaps=lambda: own.heights(q), drift=None, jacobian=lambda: own.H,
-        weights=weights,
-    )  # fmt: skip
+    small = SMALL * reach, SMALL * own.p["kp"] * reach
+    pairs = LastingPairs(model, data, GEOMS, own.law, small, gaps=lambda: own.heights(q))
     scene, arm = _scene(own, case, model, data, pairs), pairs.arm(reach)
     scene.start, scene.hook, scene.machine = pairs.after(scene.start), pairs.beside(_forces(own, data)), "level"
     scene.arm = lambda modes: arm(modes[LOOPS:])
@@ -200,7 +196,7 @@ def _listed(scene: Scene, own: SoftDelta, case: Case) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _listed_rows(scene: Scene, own: SoftDelta, case: Case, pairs: TwoSets) -> dict[str, Any]:
+def _listed_rows(scene: Scene, own: SoftDelta, case: Case, pairs: LastingPairs) -> dict[str, Any]:
     """Rows read back by name: their law, H, and lam without the bound lam >= 0."""
     data = scene.data
 
@@ -212,7 +208,6 @@ def _listed_rows(scene: Scene, own: SoftDelta, case: Case, pairs: TwoSets) -> di
         _look(scene, q, v)
         return np.append(data.efc_force[:LOOPS], pairs.entries()[1])
 
-    pairs.reset()
     loops = np.repeat([law_of(row) for row in scene.model.eq_solref], 3, axis=0).T
     own_rows = pairs.constants()
     constants = {name: np.append(loops[i], own_rows[name]) for i, name in enumerate(("a0", "a1"))}

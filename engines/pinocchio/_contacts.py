@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
-from crossbody.cases.scene_contacts import by_shapes
-from crossbody.engines._contacts import TOGETHER, Contacts, Indices, Poses, closing, drift
+from crossbody.cases.scene_contacts import by_shapes, contacts
+from crossbody.engines._contacts import TOGETHER, Contacts, Flat, Indices, Poses, closing, drift, flat
 from crossbody.engines.nearest import Pose, cross
 
 WORLD = pin.LOCAL_WORLD_ALIGNED
@@ -109,6 +109,56 @@ class ContactRows:
         carrier, pose = self.placed[body]
         world = data.oMi[carrier] * pose
         return world.rotation, world.translation
+
+
+class OverPlanes(ContactRows):
+    """Rows of points of bodies over planes, whose H' v is written out."""
+
+    def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
+        super().__init__(scene, model, placed)
+        frames = [placed[body][1] for body in self.contacts.bodies]
+        self.flat = Flat(self.contacts, [(frame.rotation, frame.translation) for frame in frames])
+        self.moving = np.array([carried(model, joint) for joint in self.carriers])
+        self.apart = self.moving[self.flat.two] - self.moving[self.flat.one]
+
+    def heights(self, q: Floats, rows: Sequence[int] | None = None) -> Floats:
+        """See `ContactRows`."""
+        pin.forwardKinematics(self.model, self.data, q)
+        return self.flat.met(poses_of(self.data, self.carriers), rows)[0]
+
+    def gradients(self, q: Floats, rows: Sequence[int] | None = None) -> tuple[Floats, Floats]:
+        """See `ContactRows`."""
+        pin.computeJointJacobians(self.model, self.data, q)
+        gap, n, x = self.flat.met(poses_of(self.data, self.carriers), rows)
+        J, apart = self.data.J.reshape(6, -1), self.apart if rows is None else self.apart[rows]
+        return gap, apart * (n @ J[:3] + cross(x, n) @ J[3:])
+
+    def drift(self, q: Floats, v: Floats, rows: Sequence[int]) -> Floats:
+        """See `ContactRows`."""
+        pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
+        own = self.moving * v
+        twist, change = (own @ part.reshape(6, -1).T for part in (self.data.J, self.data.dJ))
+        return self.flat.drift(poses_of(self.data, self.carriers), twist, change, rows)
+
+
+def poses_of(data: Any, joints: Sequence[int]) -> Pose:
+    """Return rotations (n, 3, 3) and origins (n, 3) of joints, of data that have them."""
+    placed = data.oMi
+    found = np.array([placed[joint].homogeneous for joint in joints])
+    return found[:, :3, :3], found[:, :3, 3]
+
+
+def carried(model: Any, joint: int) -> Floats:
+    """Return which coordinates (nv,) move what a joint carries, as 1 and 0."""
+    found = np.zeros(model.nv)
+    for above in list(model.supports[joint])[1:]:
+        found[model.joints[above].idx_v :][: model.joints[above].nv] = 1.0
+    return found
+
+
+def contact_rows(scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> ContactRows:
+    """Return the rows of a scene's contacts."""
+    return (OverPlanes if flat(contacts(scene)) else ContactRows)(scene, model, placed)
 
 
 class Points:

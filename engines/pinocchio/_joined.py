@@ -22,6 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
 from crossbody.engines.nearest import cross as crossed
+from crossbody.engines.pinocchio._contacts import carried, poses_of
 from crossbody.engines.pinocchio._rows import ROUNDING, Solve, pose
 
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
@@ -156,21 +157,20 @@ class Spans:
         which = [[known.index(point) for point in pair] for pair in points]
         self.one, self.two = np.array(which, dtype=int).reshape(-1, 2).T
         self.joints, self.arms = [joint for joint, _ in ends], np.array([at.translation for _, at in ends])
-        self.moving = np.zeros((len(ends), model.nv))  # 1 where a coordinate moves an end
-        for row, carrier in zip(self.moving, self.joints, strict=True):
-            for joint in list(model.supports[carrier])[1:]:
-                row[model.joints[joint].idx_v :][: model.joints[joint].nv] = 1.0
+        self.moving = np.array([carried(model, joint) for joint in self.joints])
 
     def _apart(self) -> tuple[Floats, Floats, Floats]:
         """Return the points of the ends (ne, 3), distances (nt,), and directions from first to second (nt, 3)."""
-        poses = [self.data.oMi[joint] for joint in self.joints]
-        turned = np.array([pose.rotation for pose in poses]) @ self.arms[:, :, None]
-        origins, arms = np.array([pose.translation for pose in poses]), turned[:, :, 0]
-        points = origins + arms
+        turned, origins = poses_of(self.data, self.joints)
+        arms = (turned @ self.arms[:, :, None])[:, :, 0]
         # What moves alike stays as far apart to the last bit: bodies that hang side by side touch, or do not.
-        way = (origins[self.two] - origins[self.one]) + (arms[self.two] - arms[self.one])
-        d = np.sqrt(np.einsum("ij,ij->i", way, way))
-        return points, d, way / d[:, None]
+        way = self._between(origins) + self._between(arms)
+        d = np.sqrt((way * way).sum(axis=1))
+        return origins + arms, d, way / d[:, None]
+
+    def _between(self, points: Floats) -> Floats:
+        """Return the ways (nt, 3) from the first to the second ends."""
+        return points.take(self.two, 0) - points.take(self.one, 0)
 
     def lengths(self, q: Floats) -> Floats:
         """Return l (nt,)."""
@@ -183,8 +183,10 @@ class Spans:
         points, d, n = self._apart()
         J = self.data.J.reshape(6, -1)  # of one column it is a vector
 
+        linear = n @ J[:3]
+
         def along(ends: Any) -> Floats:
-            found: Floats = self.moving[ends] * (n @ J[:3] + crossed(points[ends], n) @ J[3:])
+            found: Floats = self.moving.take(ends, 0) * (linear + crossed(points.take(ends, 0), n) @ J[3:])
             return found
 
         return d, along(self.two) - along(self.one)
@@ -197,9 +199,9 @@ class Spans:
         twist, change = (carried @ part.reshape(6, -1).T for part in (self.data.J, self.data.dJ))
         rate = twist[:, :3] + crossed(twist[:, 3:], points)
         own = change[:, :3] + crossed(change[:, 3:], points) + crossed(twist[:, 3:], rate)
-        W, a = (part[self.two] - part[self.one] for part in (rate, own))
-        across = W - np.einsum("ij,ij->i", n, W)[:, None] * n
-        total: Floats = np.einsum("ij,ij->i", n, a) + np.einsum("ij,ij->i", across, across) / d
+        W, a = self._between(rate), self._between(own)
+        across = W - (n * W).sum(axis=1)[:, None] * n
+        total: Floats = (n * a).sum(axis=1) + (across * across).sum(axis=1) / d
         return total
 
 

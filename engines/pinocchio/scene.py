@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scale import depths
-from crossbody.engines.pinocchio._contacts import ContactRows, Points
+from crossbody.engines.pinocchio._contacts import Points, contact_rows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
@@ -25,9 +26,13 @@ from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 from crossbody.engines.pinocchio._ways import Ways
 
+RULES_FOLLOWED = {"impulse": "sequential", "impulse_simultaneous": "simultaneous"}
+"""Profiles with impacts in no time, and the rule that each has for several of them."""
 SMALL = 1e-4
 """Size of coordinates and rates, SI, below which they are known to the absolute tolerance alone:
 a pendulum that is let go upright moves by less for a while, and by all of it later."""
+RESTS = 1e-12
+"""Gap and rate, SI, at which a row rests at the start."""
 DIPS = 0.02
 """m: shapes further apart are not looked at for dips that begin and end in one step; a robot has hundreds of pairs,
 every one of which would have steps end where it is nearest."""
@@ -48,8 +53,12 @@ def why_not(case: Case, profile: str) -> str | None:
 
 
 def followed(case: Case, profile: str) -> Case | None:
-    """Return the case whose equations the profile integrates, if not its own; None for the other profiles."""
-    return real_time(case, two_sets=True) if profile == "law" else None
+    """Return the case whose equations the profile integrates, if not its own; None for time stepping."""
+    if profile == "law":
+        return real_time(case, two_sets=True)
+    rule = RULES_FOLLOWED.get(profile)
+    other = rule is not None and rule != case.collisions and (case.law.b0 > 0.0).any()
+    return replace(case, collisions=rule, closed_form=None, claims=()) if other and rule is not None else None
 
 
 def build(case: Case, algebra: str) -> Prepared:
@@ -103,8 +112,13 @@ def build(case: Case, algebra: str) -> Prepared:
 
 
 def _sizes(rows: PinRows, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Return how far coordinates move while a row is closed (nq,), and how fast (nv,), by what the start drives."""
-    (h, H), free = rows.gradient_of(q, slice(None)), rows.accelerate(q, v, (int(Mode.FREE),) * rows.nc)[0]
+    """Return how far coordinates move while a row is closed (nq,), and how fast (nv,), by what the start drives.
+
+    Rows that rest on their surfaces hold what stands on them: a body that falls does so over one that does not.
+    """
+    h, H = rows.gradient_of(q, slice(None))
+    rests = (np.abs(h) <= RESTS) & (np.abs(H @ v) <= RESTS)
+    free = rows.accelerate(q, v, tuple(int(Mode.CONTACT if one else Mode.FREE) for one in rests))[0]
     deep, fast = depths(rows.entered, h, H @ v, H @ free + rows.drift(q, v), rows.unilateral)
     depth, speed = float(deep.max(initial=0.0)), float(fast.max(initial=0.0))
     across = float(np.abs(H).max(initial=0.0)) or 1.0
@@ -128,7 +142,7 @@ class Gaps:
         self.in_space: list[Joined | Strings] = [
             *([Joined(*tree, loops)] if loops else []), *([Strings(*tree, strings)] if strings else []),
         ]  # fmt: skip
-        self.touching, self.order = ContactRows(scene, *tree), _order(scene)
+        self.touching, self.order = contact_rows(scene, *tree), _order(scene)
         self.own = len(self.order)
         self.steady = to.same and not (self.rows.bends or self.in_space or self.touching.count)
         self.gradients, self._own = LastAsked(self._gradients), LastAsked(self._all_own)
@@ -136,6 +150,8 @@ class Gaps:
 
     def heights(self, q: Floats) -> Floats:
         """Return h (nc,)."""
+        if not self.own:
+            return self.touching.heights(q)
         own = self._heights(q)
         return np.concatenate([own, self.touching.heights(q)]) if self.touching.count else own
 
@@ -165,8 +181,8 @@ class Gaps:
         return np.concatenate(h)[self.order], np.concatenate(H)[self.order]
 
     def _gradients(self, q: Floats) -> Gradients:
-        if not self.touching.count:
-            return self._own(q)
+        if not self.own or not self.touching.count:
+            return self._own(q) if self.own else self.touching.gradients(q)
         (h, H), (gaps, N) = self._own(q), self.touching.gradients(q)
         return np.concatenate([h, gaps]), np.concatenate([H, N])
 
@@ -176,6 +192,8 @@ class Gaps:
             return self.rows.heights(q)[chosen], self.rows.straight[chosen]
         if isinstance(chosen, slice):
             return self.gradients(q)
+        if not self.own:
+            return self.touching.gradients(q, chosen)
         wanted = np.array(chosen)
         before = wanted < self.own
         if before.all():
@@ -193,6 +211,8 @@ class Gaps:
             return self.still[chosen]
         if not self.touching.count:
             return self._own_drift(q, v)[chosen]
+        if not self.own:
+            return self.touching.drift(q, v, range(self.touching.count) if isinstance(chosen, slice) else chosen)
         wanted = np.arange(self.own + self.touching.count)[chosen]
         before = wanted < self.own
         total: Floats = np.empty(len(wanted))
@@ -419,5 +439,5 @@ def _audit(
 
 
 def rows_on(rows: PinRows) -> tuple[int, ...]:
-    """Every row active."""
-    return tuple(int(Mode.CONTACT) for _ in range(rows.nc))
+    """Return the modes of rows that have all just been entered."""
+    return tuple(int(Mode.COLLISION if fast else Mode.CONTACT) for fast in rows.fast)

@@ -8,15 +8,19 @@ A metric is a module with a docstring whose first line says what it measures, an
                                     the run does not show what it needs
 
 and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name. What the runs of
-one mechanism alone show is data of its cases (`crossbody.cases.metric`).
+one mechanism alone show is data of its cases (`crossbody.cases.metric`); what any case may claim of a run alone stands
+together in `_of_run`.
 """
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
-from crossbody.cases import InvalidValue
+from crossbody.cases import InvalidValue, UnknownName
 from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
@@ -40,12 +44,20 @@ _REGISTRY = Registry("metric", __name__)
 
 def names() -> tuple[str, ...]:
     """Names of all metrics; imports none of them."""
-    return _REGISTRY.names()
+    return tuple(sorted({*_REGISTRY.names(), *_of_runs()}))
 
 
 def summary(name: str) -> str:
     """What a metric measures, in one line; imports nothing."""
-    return _REGISTRY.summary(name)
+    return _of_runs().get(name) or _REGISTRY.summary(name)
+
+
+@cache
+def _of_runs() -> Mapping[str, str]:
+    """Return the functions of `_of_run` with what they measure."""
+    text = Path(__file__).with_name("_of_run.py").read_text(encoding="utf-8")
+    functions = [node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)]
+    return {node.name: (ast.get_docstring(node) or "").partition("\n")[0] for node in functions}
 
 
 def load(name: str) -> Metric:
@@ -54,7 +66,21 @@ def load(name: str) -> Metric:
     Raises:
         UnknownName: if there is no such metric; the message lists the names.
     """
-    return cast("Metric", _REGISTRY.load(name))
+    if isinstance(name, str) and name in _of_runs():
+        return _by_claim(name)
+    try:
+        return cast("Metric", _REGISTRY.load(name))
+    except UnknownName:
+        raise UnknownName("metric", name, names()) from None
+
+
+@cache
+def _by_claim(name: str) -> Metric:
+    from crossbody.cases.metric import CaseMetric  # numpy, without which names are listed
+    from crossbody.reports.metrics import _of_run as own
+    from crossbody.reports.metrics._of_case import OfCase
+
+    return OfCase(CaseMetric(doc=summary(name), unit=own.UNITS.get(name, "1"), number=getattr(own, name)))
 
 
 def of(case: Case) -> Mapping[str, Metric]:
@@ -63,7 +89,7 @@ def of(case: Case) -> Mapping[str, Metric]:
     Raises:
         InvalidValue: if one of its own has the name of another.
     """
-    from crossbody.reports.metrics._of_case import OfCase  # numpy, without which names are listed
+    from crossbody.reports.metrics._of_case import OfCase
 
     if twice := sorted(set(names()) & set(case.metrics)):
         raise InvalidValue(f"{case.label}: metrics {', '.join(twice)} have the names of metrics that every case has.")

@@ -9,6 +9,7 @@ from random_scenes import random_scene, random_state, with_own_laws
 
 from crossbody.cases import Mode
 from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load
 from crossbody.engines.equations import system_of
@@ -19,10 +20,8 @@ SAME = 1e-5
 """MuJoCo's rows keep 1e-7 of their softness."""
 
 
-@pytest.mark.parametrize("seed", range(9))
-def test_a_row_that_pushes_follows_the_law(seed: int) -> None:
-    """H v' + H'v + a1 h' + a0 h = 0 at MuJoCo's v', by the reference's rows, with all terms of their curvature."""
-    scene = with_own_laws(random_scene(seed).replace(loops=()), seed)
+def pushing(scene: Scene, seed: int) -> int:
+    """Check the law of the rows that push at random states; returns how many did."""
     # Of a deep corner MuJoCo tells a point halfway to the surface, which may be another corner's.
     several = {row for contact in contacts(scene) if contact.places > 1 for row in contact.rows}
     case = case_of(scene)
@@ -42,7 +41,25 @@ def test_a_row_that_pushes_follows_the_law(seed: int) -> None:
             terms = np.array([H @ prepared.data.qacc, Hdv, a1 * (H @ v), a0 * h])
             assert (np.abs(terms.sum(axis=0)) <= SAME * np.abs(terms).sum(axis=0)).all()
             pushed += int(on.sum())
-    assert pushed
+    return pushed
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_a_row_that_pushes_follows_the_law(seed: int) -> None:
+    """H v' + H'v + a1 h' + a0 h = 0 at MuJoCo's v', by the reference's rows, with all terms of their curvature."""
+    assert pushing(with_own_laws(random_scene(seed).replace(loops=()), seed), seed)
+
+
+def test_a_contact_that_is_alone_follows_the_law() -> None:
+    """One row takes another way than several: of a rod that turns over the floor it has H' v too."""
+    rod = Body(name="rod", mass=2.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+    turning = Joint(name="turns", body="rod", type="hinge", axis=(0.0, -1.0, 0.0))
+    scene = Scene(
+        bodies=(rod,), joints=(Joint(name="height", body="rod", type="slide"), turning),
+        shapes=(Shape(name="floor", type="plane"), Shape(name="end", body="rod", position=(0.4, 0.0, -2.0))),
+        pairs=(Pair(name="touch", first="floor", second="end", law=RowLaw(a0=100.0, a1=5.0)),),
+    )  # fmt: skip
+    assert pushing(scene, 3)
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -14,7 +14,8 @@ from crossbody.engines.equations import builder
 from crossbody.reference import System, simulate
 from crossbody.reference.tree.system import system
 
-KNOWN = [(name, variant) for name in ("bouncing_ball", "newtons_cradle") for variant in cases.variants(name)]
+CASES = ("bouncing_ball", "newtons_cradle", "red_body")
+KNOWN = [(name, variant) for name in CASES for variant in cases.variants(name)]
 ROUNDING = 1e-12
 """Of sums of products, over the largest of their terms."""
 each_variant = pytest.mark.parametrize(("name", "variant"), KNOWN)

@@ -10,10 +10,6 @@ OBVIOUS = (
     "The obvious model builds rings of segments and has MuJoCo's own contact constants and friction, not the case's "
     "law: it rolls over facets, sinks in and slips."
 )
-TENDON = (
-    "MuJoCo's rolling condition is a tendon, linear in the joints: while a landing ball sinks in by h it acts at the "
-    "face's own radius, off by h/rho, a thousandth."
-)
 _TOLERANCE = "a thousand times the default tolerance of 1e-9"
 _LOG = "read between the samples of a run"
 _SMALL = "a tolerance of 1e-9 in the height, over that through which the ball moves, a part of its circle's radius"
@@ -34,15 +30,13 @@ _MULTISTEP = (
     "to 20,000 of them in stiff contact"
 )
 
-_LANDS = ("outside", "solve")
 """Variants in which a ball lands on a face."""
 
 
-def limits(variant: str, claims: Iterable[Claim], fallen: float) -> tuple[Limit, ...]:
+def limits(claims: Iterable[Claim], fallen: float) -> tuple[Limit, ...]:
     """The limits of one variant beside those that every case has.
 
     Args:
-        variant: one of the case.
         claims: what it claims.
         fallen: height through which the ball moves on its face, over the radius of its circle; infinite where more
             than gravity drives it.
@@ -52,14 +46,12 @@ def limits(variant: str, claims: Iterable[Claim], fallen: float) -> tuple[Limit,
         bounds |= dict.fromkeys(_ENERGIES, (_TOLERATED / fallen, _SMALL))
     return (
         *(Limit(metric=metric, value=value, why=why) for metric, (value, why) in bounds.items()),
-        *_of_engines(variant),
+        *_of_engines(),
     )
 
 
-def _of_engines(variant: str) -> Iterator[Limit]:
+def _of_engines() -> Iterator[Limit]:
     for metric in ("position", "energy_drift"):
         yield Limit(metric=metric, value=2e-5, engine="reference", profile="cvode", why=_MULTISTEP)
     for metric in ("*", "audit"):
         yield Limit(metric=metric, engine="mujoco", profile="default", known=OBVIOUS)
-    if variant in _LANDS:
-        yield Limit(metric="*", engine="mujoco", profile="matched", known=TENDON)

@@ -7,25 +7,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from maze_chain import FAR, PHI, PSI, RHO, THETA, TIPS, B, X, Y, compiled
 
 from crossbody.cases import Case
 from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.memory import CONTACT, Memory
 from crossbody.engines._maze.rows import ABOVE, BELOW, INNER, OUTER, SLIP_ABOVE, SLIP_BELOW, Place
 from crossbody.engines._maze.scene import BallMaze
-from crossbody.engines.linear import Chart
-from crossbody.engines.mujoco._maze_model import (
-    FAR,
-    PHI,
-    PSI,
-    RHO,
-    THETA,
-    TIPS,
-    B,
-    X,
-    Y,
-    compiled,
-)  # fmt: skip
 
 State = tuple[float, ...]
 FACES = {BELOW: (SLIP_BELOW, OUTER), ABOVE: (SLIP_ABOVE, INNER)}
@@ -65,22 +53,6 @@ class Charts:
         vr, vt = s[RHO], rho * s[B]
         q = p[THETA], rho * c, rho * n, p[B] + p[PSI]
         return q, (s[THETA], vr * c - vt * n, vr * n + vt * c, s[B] + s[PSI])
-
-    def linear(self) -> Chart:
-        """Small motions of the ball that moves, about the present state."""
-        T, p = np.zeros((4, self.model.nv)), self.data.qpos
-        T[0, THETA] = 1.0
-        if self.face is None:
-            moving = [THETA, X, Y, PHI]
-            T[1:, [X, Y, PHI]] = np.eye(3)
-        else:
-            moving = [THETA, B, RHO, PSI]
-            c, n, rho = math.cos(p[B]), math.sin(p[B]), float(p[RHO])
-            T[1:3, [B, RHO]] = [[-rho * n, c], [rho * c, n]]
-            T[3, [B, PSI]] = 1.0
-        S = np.zeros(T.T.shape)
-        S[moving] = np.linalg.inv(T[:, moving])
-        return Chart(T=T, S=S)
 
     def arm(self, memory: Memory, q: State, v: State) -> None:
         """Put the state on the chart that the modes ask for, and close its rows."""

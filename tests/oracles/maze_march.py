@@ -6,16 +6,18 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from maze_charts import Charts
 from scipy.optimize import brentq
 
-from crossbody.cases import Outcome
+from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.engines._maze.log import MazeLog
 from crossbody.engines._maze.machine import MazeMachine, Settled
 from crossbody.engines._maze.memory import CONTACT, FREE
 from crossbody.engines._maze.rows import NORMALS
+from crossbody.engines._maze.scene import ball_maze
+from crossbody.engines.mujoco._globals import hooked
 from crossbody.engines.mujoco._march import SAME_INSTANT
-from crossbody.engines.mujoco._maze_charts import Charts
 
 State = tuple[float, ...]
 FULL = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -27,6 +29,16 @@ SETTLED = 1e-6
 """What is left of an approach, |h'| + sqrt(a0) |h|, when a ball has settled on a face, m/s."""
 FASTEST = 1e4
 """Speed at which a run has diverged, rad/s and m/s."""
+
+
+def followed(case: Case, dt: float = 1e-3) -> Trajectory:
+    """Return the motion of a case on MuJoCo's polar chain, whose rows the maze's own machine switches."""
+    maze, log = ball_maze(case), MazeLog()
+    charts = Charts(case, maze)
+    march = MazeMarch(charts, log, dt, 2_000_000)
+    with hooked(charts.stage):
+        march.run(case.q0, case.v0, case.t_end)
+    return log.trajectory(maze.observer(log.places), march.outcome, march.message, march.steps)
 
 
 class MazeMarch:
