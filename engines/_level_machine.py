@@ -205,6 +205,8 @@ class LevelMachine:
         if asked:
             press[asked], noise[asked] = self.rows.pressure(q, v, vd, asked)
         G = np.diag(self.rows.delassus(q))
+        # What is zero by symmetry is so but for rounding of what the others push with.
+        noise[asked] += NOISE * np.sqrt(G[asked]) * float(np.sqrt(G) @ np.abs(lam))
         self._unmoved = set(np.flatnonzero(UNMOVED * G.max(initial=0.0) >= G).tolist())
         allowed = np.divide(noise, G, out=np.full_like(noise, np.inf), where=G > 0.0)  # none moves a row: any
         two = np.array(self.rows.fast, dtype=bool)  # sets of constants: what its law asks depends on the mode

@@ -8,6 +8,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
+from crossbody.engines._scene import masses
 from crossbody.reference import System
 
 DEPENDENT = 1e6
@@ -55,4 +56,4 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
 
 def listed(scene: Scene) -> dict[str, Any]:
     """Return masses, kg, and gravity, m/s^2, of a scene."""
-    return {"masses": np.array([body.mass for body in scene.bodies]), "gravity": float(np.linalg.norm(scene.gravity))}
+    return {"masses": masses(scene), "gravity": float(np.linalg.norm(scene.gravity))}

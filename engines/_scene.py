@@ -7,7 +7,7 @@ of free and ball joints, whose springs act along the rotation from where they re
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -64,6 +64,21 @@ def places(scene: Scene) -> tuple[dict[str, int], dict[str, int]]:
     names = [joint.name for joint in scene.joints]
     q, v = (dict(zip(names, column.tolist(), strict=True)) for column in firsts.T)
     return q, v
+
+
+def masses(scene: Scene, of_bodies: Mapping[str, float] | None = None) -> Floats:
+    """Return the mass, kg, of each body that a joint moves, with those that are fixed to it; the world's is left out.
+
+    Args:
+        scene: with the bodies.
+        of_bodies: their masses, as an engine has them; the scene's own if not given.
+    """
+    moved, to, total = {joint.body for joint in scene.joints}, {"": ""}, dict[str, float]()
+    for body in scene.bodies:
+        to[body.name] = body.name if body.name in moved else to[body.parent]
+        own = body.mass if of_bodies is None else of_bodies[body.name]
+        total[to[body.name]] = total.get(to[body.name], 0.0) + own
+    return np.array([mass for name, mass in total.items() if name])
 
 
 def angle_of(quaternion: Floats) -> Floats:

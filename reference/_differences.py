@@ -38,9 +38,11 @@ def differs(
         spread = np.zeros(len(claimed)) if last is None else np.minimum(np.abs(middle - last), AGREE**0.5 * terms)
         wrong &= ~(np.abs(middle - claimed) <= bound + spread)
         if width == WIDTHS[-1]:
-            kinked = np.abs(2.0 * here - ahead - behind) > AGREE**0.5 * width * (terms + np.abs(middle))
+            jump = np.abs(2.0 * here - ahead - behind) / width
+            kinked = jump > AGREE * (terms + np.abs(middle)) + noise
             for side in ((ahead - here) / width, (here - behind) / width):
-                wrong &= ~(kinked & (np.abs(side - claimed) <= 1e-3 * (terms + np.abs(side)) + 10.0 * width * size))
+                near = np.minimum(1e-3 * (terms + np.abs(side)), 0.1 * jump)
+                wrong &= ~(kinked & (np.abs(side - claimed) <= near + noise + 10.0 * width * size))
         if last is not None:  # the limit that differences of second order tend to
             error = (middle - last) / ((WIDTHS[0] / WIDTHS[1]) ** 2 - 1.0)
             wrong &= ~(np.abs(middle + error - claimed) <= 2.0 * np.abs(error) * AGREE**0.25 + noise)

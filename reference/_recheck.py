@@ -37,6 +37,7 @@ UNDECIDED = 10.0  # times rtol: a pass closer than that is neither a touch nor n
 CLOSING = 1e-6  # part of the largest rate of a row from which on its gap closes
 CAUTION = 4.0  # errors of the quintic in units of that in the middle of its step
 WEAK = 1e3  # times rtol, of the largest multiplier: a pull that is none
+COARSE = 16.0  # roundings of the largest coordinate by which the quintic's ends may be off
 MOST_TERMS = 3  # of a row
 PASSING = (Mode.BALLISTIC, Mode.COLLISION_SEPARATION)
 
@@ -215,7 +216,9 @@ class _Recheck:
             mine = slice(at, at + len(guard.terms))
             at = mine.stop
             i, mode = guard.row, Mode(modes[guard.row])
-            yield from self._judge(i, mode, t, values[:, :, mine], CAUTION * errors[:, None, mine], first)
+            asked = mode in ACTIVE or len(guard.terms) > 2  # of the others no multiplier tells
+            force = self._force(i, first, step)[:, None] if asked else np.zeros((1, 1))
+            yield from self._judge(i, mode, t, values[:, :, mine], CAUTION * errors[:, None, mine], force)
 
     def _terms(self, i: int, mode: Mode) -> Guard:
         """What tells whether row i belongs in its mode."""
@@ -224,10 +227,9 @@ class _Recheck:
         kinds = [Kind.GAP, Kind.RATE] + [Kind.PRESS] * (mode in PASSING and i not in self.frozen)
         return Guard(i, None, [Term(kind, i) for kind in kinds])
 
-    def _judge(self, i: int, mode: Mode, t: Floats, value: Floats, error: Floats, first: int) -> Iterator[Violation]:
+    def _judge(self, i: int, mode: Mode, t: Floats, value: Floats, error: Floats, force: Floats) -> Iterator[Violation]:
         """The three kinds of modes; each value has to pass its error and what the tolerance leaves open."""
         if mode in ACTIVE:
-            force = self._force(i, first)
             yield from _worst(t, -value[..., 0] - error[..., 0] - force, i, mode, "pulls")
             return
         depth = -value[..., 0] - error[..., 0] - self.near
@@ -239,20 +241,27 @@ class _Recheck:
         yield from _worst(t, value[..., 0] - error[..., 0] - self.near - DEEP, i, mode, "above the surface")
         presses = np.ones_like(closing)
         if value.shape[-1] > 2:
-            presses = -value[..., 2] - error[..., 2] > self._force(i, first)
+            presses = -value[..., 2] - error[..., 2] > force
         yield from _worst(t, np.where(closing & presses, depth, -1.0), i, mode, "closing, and would press")
 
-    def _force(self, i: int, row: int) -> float:
-        """What the tolerance leaves open in a multiplier, N: as rounding does, but by errors of the motion."""
+    def _force(self, i: int, row: int, step: Floats) -> Floats:
+        """What the tolerance and the steps (k,) of a stretch leave open in a multiplier (k,), N.
+
+        The tolerance does as rounding does, but by errors of the motion. A step of nanoseconds from one event to the
+        next is shorter than what tells the speed from where it begins and ends.
+        """
         e, run = self.equations, self.run
-        active = e.active
-        if e.beside is not None:  # rows that share a load share their noise
-            most = float(e.noise(run.t[row], run.q[row].copy(), run.v[row].copy())[0].max())
-            return UNDECIDED * self.rtol / (8.0 * ULP) * most
         modes = [*run.mode[row].tolist()]
-        if i not in active:
+        if e.beside is None and i not in e.active:
             modes[i] = Mode.CONTACT if i in self.frozen or not e.has_fast[i] else Mode.COLLISION
             e.activate(modes)
-        noise = float(e.noise(run.t[row], run.q[row].copy(), run.v[row].copy())[0][i])
-        e.activate(run.mode[row].tolist())
-        return UNDECIDED * self.rtol / (8.0 * ULP) * noise
+        at = run.t[row], run.q[row].copy(), run.v[row].copy()
+        a0, a1 = e.law[i, :2]
+        exact, off = (e.noise(*at, error=error)[0] for error in (0.0, a1 / max(a0 + a1, 1e-300)))
+        if e.beside is None:
+            noise, of_speed = float(exact[i]), float(off[i] - exact[i])
+            e.activate(run.mode[row].tolist())
+        else:  # rows that share a load share their noise
+            noise, of_speed = float(exact.max()), float((off - exact).max())
+        rounding: Floats = of_speed * COARSE * ULP * np.abs(run.q).max() / step
+        return UNDECIDED * self.rtol / (8.0 * ULP) * noise + rounding

@@ -52,14 +52,26 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
                 before, time, pair = (before, half, sooner) if sooner else (half, time, pair)
             both = " and ".join(_named(model, geom) for geom in pair)
             return (
-                f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for them, because they "
-                "have friction (without=friction leaves it out of every engine, friction=1 has it where shapes slide "
-                "alone and meet planes, or spheres each other), because no gap is known for such "
-                f"shapes, or because a hull has more than {PLACES['plane', 'hull']} corners (a mesh of a file has at "
-                "most its maxhullvert). "
-                f"{_advice(model, pair)}without=contacts leaves all contacts out, and a shorter t_end ends before."
+                f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for them, because "
+                f"{_why(model, pair)}. {_advice(model, pair)}without=contacts leaves all contacts out, and a shorter "
+                "t_end ends before."
             )
     return ""
+
+
+def _why(model: Any, pair: tuple[int, ...]) -> str:
+    """Return why such shapes have no row."""
+    import mujoco
+
+    types = (mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower() for geom in pair)
+    one, two = ("hull" if kind == "mesh" else kind for kind in types)
+    if not {(one, two), (two, one)} & PLACES.keys():
+        return f"no gap of a {one} and a {two} is known"
+    friction = "they have friction (without=friction leaves it out of every engine)"
+    if "hull" not in (one, two):
+        return friction
+    most = PLACES["plane", "hull"]
+    return f"{friction}, or the hull has more than {most} corners (a mesh of a file has at most its maxhullvert)"
 
 
 def _named(model: Any, geom: int) -> str:

@@ -22,7 +22,7 @@ from crossbody.cases.scene_contacts import frictional
 from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Log
-from crossbody.engines._scene import Forces, Stretch
+from crossbody.engines._scene import Forces, Stretch, masses
 from crossbody.engines.contract import Run
 from crossbody.engines.drake._simulate import Sim
 from crossbody.engines.drake._tree import Tree
@@ -252,9 +252,9 @@ class SceneRun(Run):
             return tree.mass_matrix(context, q)
 
         scene = self.observer.scene
-        masses = [tree.plant.GetBodyByName(body.name).get_mass(context) for body in scene.bodies]
+        own = {body.name: tree.plant.GetBodyByName(body.name).get_mass(context) for body in scene.bodies}
         gravity = tree.plant.gravity_field().gravity_vector()
         return {
-            "masses": np.array(masses), "gravity": float(np.linalg.norm(gravity)), "q0": self.case.q0,
+            "masses": masses(scene, own), "gravity": float(np.linalg.norm(gravity)), "q0": self.case.q0,
             "v0": self.case.v0, "M": M, "bias": bias, "hidden": hidden(self.profile),
         }  # fmt: skip

@@ -355,7 +355,8 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
 
     weightless = bool(model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
     found: dict[str, Any] = {
-        "masses": model.body_mass[1:].copy(),
+        # Compilers fuse bodies without joints, or do not: what moves as one counts as one.
+        "masses": np.bincount(model.body_weldid, model.body_mass)[np.unique(model.body_weldid)[1:]],
         "gravity": 0.0 if weightless else float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip

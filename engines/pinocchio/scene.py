@@ -430,7 +430,7 @@ def _audit(
         return to.velocities(r, rows.jacobian(r))
 
     return {
-        "masses": np.array([body.mass for body in scene.bodies]),
+        "masses": parts.masses(scene),
         "M": M,
         "bias": bias,
         "H": H,

@@ -185,6 +185,30 @@ def push_rows(m: Model, w: Work, na: int, x: Array, factor: float, out: Array) -
 
 
 @inlined
+def weigh(s: Any, m: Model, w: Work, x: Array) -> None:
+    """Sum up the sizes of what multipliers x of the active rows do to every coordinate, in w.pull and w.shift."""
+    for c in range(s.n):
+        w.pull[c], w.shift[c] = 0.0, 0.0
+    for j in range(s.na):
+        i = w.idx[j]
+        for c in range(m.span[i, 0], m.span[i, 1]):
+            w.pull[c] += abs(w.H[j, c] * x[j])
+            w.shift[c] += abs(w.X[j, c] * x[j])
+
+
+@inlined
+def pushed(m: Model, w: Work, j: int) -> float:
+    """Size of the terms by which the multipliers that were weighed accelerate the row in place j.
+
+    H M^-1 H^T is symmetrical, its rounding is not: what is zero for one row may not be so for the other.
+    """
+    total, i = 0.0, w.idx[j]
+    for c in range(m.span[i, 0], m.span[i, 1]):
+        total += abs(w.H[j, c]) * w.shift[c] + abs(w.X[j, c]) * w.pull[c]
+    return float(total)
+
+
+@inlined
 def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, on: float, t: float, q: Array, v: Array) -> int:
     """One coordinate and at most one active row: everything is scalar."""
     M, f = w.M, w.f

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
-from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of
+from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, pushed, weigh
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.friction import is_shared
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
@@ -41,19 +41,6 @@ def _residual(s: Any, m: Model, w: Work, mode: Bytes, j: int, stage: int) -> tup
 
 
 @inlined
-def _all_terms(s: Any, m: Model, w: Work, j: int) -> float:
-    """Sum of the sizes of all terms of the law of the active row in place j, what each multiplier does included."""
-    first, last = m.span[w.idx[j], 0], m.span[w.idx[j], 1]
-    size = w.scale[j]
-    for b in range(s.na):
-        pushed = 0.0
-        for c in range(first, last):
-            pushed += abs(w.H[j, c] * w.X[b, c]) if m.span[w.idx[b], 0] <= c < m.span[w.idx[b], 1] else 0.0
-        size += pushed * abs(w.la[b])
-    return float(size)
-
-
-@inlined
 def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bool:
     """Whether the accelerations at the step's end, k[stage], are those of every active row's law.
 
@@ -72,10 +59,10 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
         if s.frictional and is_shared(s, m, w, w.idx[j]):
             continue
         missing, rounding = _residual(s, m, w, b.mode, j, stage)
-        if (
-            not missing <= CLOSE * w.scale[j] + rounding
-            and not missing <= WRONG * _all_terms(s, m, w, j) + 64.0 * rounding
-        ):
+        if missing <= CLOSE * w.scale[j] + rounding:
+            continue
+        weigh(s, m, w, w.la)
+        if not missing <= WRONG * (w.scale[j] + pushed(m, w, j)) + 64.0 * rounding:
             marks = b.history[len(b.history) - 1]
             marks[:] = 0
             marks[w.idx[j]] = 1

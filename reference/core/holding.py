@@ -17,12 +17,21 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
-from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, assemble, free, is_active
+from crossbody.reference.core.acceleration import (
+    GENERAL,
+    accelerate,
+    activate,
+    assemble,
+    free,
+    is_active,
+    pushed,
+    weigh,
+)
 from crossbody.reference.core.algebra import DEPENDENT, RANK
 from crossbody.reference.core.journal import move
 from crossbody.reference.core.layout import ILL_POSED, Buffers, Model, Work
-from crossbody.reference.core.machine import noise, released_mode
-from crossbody.reference.core.shares import allow
+from crossbody.reference.core.machine import ROUNDING, noise, released_mode
+from crossbody.reference.core.shares import allow, solve_dependent
 
 MOVED = np.int64(1)  # rows have let go
 SAME = 1.0 + 1e-12  # rows that arrive at zero together
@@ -176,15 +185,22 @@ def _excess(s: Any, w: Work, j: int) -> float:
 
 
 @inlined
-def _most_pressed(s: Any, w: Work) -> int:
+def _allowed(m: Model, w: Work, j: int) -> float:
+    """By how much the row in place j may be off its law under the shares that were weighed."""
+    return float(w.allowed[j] + ROUNDING * pushed(m, w, j))
+
+
+@inlined
+def _most_pressed(s: Any, m: Model, w: Work) -> int:
     """Place of the row that is furthest below its law, -1 for none; of those that were let go just now at last."""
+    weigh(s, m, w, w.share)
     for late in range(2):
         found, most = -1, 0.0
         for j in range(s.na):
             if not w.carries[j] and w.spent[w.idx[j]] <= late:
                 excess = _excess(s, w, j)
                 size = excess / np.sqrt(w.gram[j, j])
-                if excess < -w.allowed[j] and size < most:
+                if excess < -_allowed(m, w, j) and size < most:
                     found, most = j, size
         if found >= 0:
             return found
@@ -216,7 +232,7 @@ def _exchange(s: Any, w: Work, j: int) -> bool:
 
 
 @compiled
-def _carry(s: Any, w: Work) -> bool:
+def _carry(s: Any, m: Model, w: Work) -> bool:
     """Find a smallest set that carries: w.carries by place, w.share; False if the rows contradict each other."""
     w.carries[:] = 0
     for j in range(s.na):
@@ -224,7 +240,7 @@ def _carry(s: Any, w: Work) -> bool:
     for _ in range(CHANGES * (s.na + 1)):
         if not _settle_shares(s, w):
             return False
-        j = _most_pressed(s, w)
+        j = _most_pressed(s, m, w)
         if j < 0:
             return True
         if not _exchange(s, w, j):
@@ -241,13 +257,14 @@ def _let_go(s: Any, w: Work, b: Buffers, i: int) -> None:
 
 
 @inlined
-def _lift(s: Any, w: Work, b: Buffers) -> bool:
+def _lift(s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Release the rows whose gaps open faster than their law; whether there were any."""
     lifted = False
     w.holds[:] = 0
+    weigh(s, m, w, w.share)
     for j in range(s.na):
         w.holds[w.idx[j]] = w.carries[j]
-        if not w.carries[j] and _excess(s, w, j) > w.allowed[j]:
+        if not w.carries[j] and _excess(s, w, j) > _allowed(m, w, j):
             _let_go(s, w, b, w.idx[j])
             lifted = True
     return lifted
@@ -285,6 +302,19 @@ def _most_pulling(s: Any, w: Work) -> int:
         if w.shares[i] and w.la[j] < min(least, -w.noise[i]):
             found, least = i, w.la[j]
     return found
+
+
+@inlined
+def _all_push(s: Any, m: Model, w: Work) -> bool:
+    """Whether the multipliers of least norm push, so that no row has to let go.
+
+    Where rows hardly depend on each other a smallest set would load a third row otherwise, and the two would disagree
+    on whether it pushes.
+    """
+    if not solve_dependent(s, w, w.y[: s.nq], w.y[s.nq :]):
+        return False
+    noise(s, m, w)
+    return bool(_most_pulling(s, w) < 0)
 
 
 @inlined
@@ -335,9 +365,14 @@ def hold(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         spent += w.spent[i]
     if rank == s.na and spent == 0:
         return 0
-    if rank < 0 or not _carry(s, w):
+    if rank >= 0 and spent == 0:
+        if _all_push(s, m, w):
+            s.redundant = max(s.redundant, s.na - rank)
+            return 0
+        rank = _look(K, s, m, w, b)
+    if rank < 0 or not _carry(s, m, w):
         return ILL_POSED
-    moved = _lift(s, w, b)
+    moved = _lift(s, m, w, b)
     if not moved:
         moved = _rest_the_spent(K, s, m, w, b, rank)
     w.spent[:] = 0

@@ -110,6 +110,7 @@ STATE = np.dtype(
         ("speed", "f8"),
         ("collision_t", "f8"),
         ("collisions_now", "i8"),
+        ("unsure", "f8"),  # by how much rounding may move v', in the norm of M; as the rows were last weighed
         ("touch", "f8"),  # a gap below this is closed as far as rounding tells
         ("theta", "f8"),
         ("history", "i8"),
@@ -216,6 +217,8 @@ class Work:
     r: Floats
     scale: Floats  # size of the terms behind each row's right-hand side
     noise: Floats  # (nc,) what rounding alone may make of each multiplier
+    pull: Floats  # (n,) sum of |H^T lam|, term by term, of active rows as they were last weighed
+    shift: Floats  # (n,) likewise of |M^-1 H^T lam|
     ha: Floats  # active rows, compact: gap, rate, multiplier
     hda: Floats
     la: Floats
@@ -342,7 +345,7 @@ def workspace(
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),
         **dict.fromkeys(("G", "overlap", "null", "gram", "part"), (nc, nc)), "law": (nc, 3),
-        **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot"), (n,)),
+        **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot", "pull", "shift"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
         "lam_at": (STAGES_MOST, nc), "gap_at": (BETWEEN, nc), "guard_at": (BETWEEN, ng),

@@ -17,8 +17,17 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
-from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, clear, is_active, scatter
-from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_schur
+from crossbody.reference.core.acceleration import (
+    GENERAL,
+    accelerate,
+    activate,
+    clear,
+    is_active,
+    pushed,
+    scatter,
+    weigh,
+)
+from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_mass, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
 from crossbody.reference.core.friction import has_friction, slip_velocity, stopped_slip
 from crossbody.reference.core.layout import (
@@ -114,18 +123,31 @@ def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
 
 @inlined
 def noise(s: Any, m: Model, w: Work) -> None:
-    """What rounding of the state and of the sums, and what collisions left, can make of each multiplier."""
-    largest, touch = 0.0, touching(s, w)
+    """What rounding of the state and of the sums, and what collisions left, can make of each multiplier.
+
+    Row j is off its law by e_j, so that lam_i is off by at most the sum of |G^-1|_ij e_j. By Cauchy and Schwarz that is
+    no more than sqrt (G^-1)_ii times the sum of sqrt (G^-1)_jj e_j, which bounds the change of v' in the norm of M.
+    """
+    touch, spread = touching(s, w), 0.0
+    weigh(s, m, w, w.la)
+    for j in range(s.na):
+        if s.frictional:  # w.G has no factor, and what slides makes no symmetric matrix: by each row alone
+            w.trial[j] = 1.0 / w.gram[j, j] if w.gram[j, j] > 0.0 else 0.0
+        else:
+            w.trial[j] = inverse_diagonal(w.G, s.na, w.reach, j, w.r)
+        spread = max(spread, w.trial[j])
+    largest, s.unsure = 0.0, 0.0
     for j in range(s.na):
         i = w.idx[j]
         # A touch stands open by the rounding of where bodies came from: near the origin that is more than theirs now.
         opened = w.law[i, 0] * w.ha[j] if 0.0 < w.ha[j] <= touch else 0.0
-        G = 0.0
-        for c in range(m.span[i, 0], m.span[i, 1]):
-            G += w.H[j, c] * w.X[j, c]
-        w.noise[i] = (ROUNDING * w.scale[j] + _from_state(s, w, i) + opened) / G if G > 0.0 else 0.0
+        if w.trial[j] == 0.0:  # one that depends on the others: its share is made of theirs
+            w.trial[j] = spread
+        s.unsure += np.sqrt(w.trial[j]) * (ROUNDING * (w.scale[j] + pushed(m, w, j)) + _from_state(s, w, i) + opened)
         w.r[j] = _left_over(s, m, w, i)
         largest = max(largest, w.r[j])
+    for j in range(s.na):
+        w.noise[w.idx[j]] = np.sqrt(w.trial[j]) * s.unsure
     if largest > 0.0:
         _spread_left_over(s, w)
 
@@ -210,6 +232,24 @@ def _alone(K: Any, m: Model, w: Work, j: int, i: int, t: float, q: Any, v: Any) 
 
 
 @inlined
+def _stirred(s: Any, m: Model, w: Work, j: int) -> float:
+    """What rounding of the active rows' multipliers makes of the law of the row in place j, behind them."""
+    if s.na == 0:
+        return 0.0
+    first, last = m.span[w.idx[j], 0], m.span[w.idx[j], 1]
+    for c in range(first, last):
+        w.X[j, c] = w.H[j, c]
+    if s.n == 1:  # `accelerate` leaves no factor of M
+        w.X[j, 0] *= w.X[0, 0] / w.H[0, 0]
+    else:
+        solve_mass(w.L, w.X[j], m.above, s.k, first, last)
+    G = 0.0
+    for c in range(first, last):
+        G += w.H[j, c] * w.X[j, c]
+    return float(ROUNDING * pushed(m, w, j) + np.sqrt(G) * s.unsure)
+
+
+@inlined
 def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float, t: float, q: Any, v: Any) -> float:
     """What row i lacks beside the active rows: its multiplier, or if it depends on them by how much it is off its law.
 
@@ -221,11 +261,12 @@ def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float
         return -np.inf
     if dependent == s.dependent:
         return lam
+    noise(s, m, w)
     j = s.na
     _alone(K, m, w, j, i, t, q, v)
     off, size = _off_law(m, w, j, i, 1.0, v, w.vd)
     w.noise[i], w.tied[i] = 0.0, 1
-    band = max(CONSISTENT, s.rtol) * size + 8.0 * _from_state(s, w, i)
+    band = max(CONSISTENT, s.rtol) * size + _stirred(s, m, w, j) + 8.0 * _from_state(s, w, i)
     open_for = (t - w.let_go[i]) * max(np.sqrt(w.law[i, 0]), w.law[i, 1])
     return float(-off + band if open_for > LIFTED else -off - band)
 
@@ -270,7 +311,8 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
     nq, j = s.nq, s.na
     _alone(K, m, w, j, i, s.t, w.y[:nq], w.y[nq:])
     off, size = _off_law(m, w, j, i, 0.0 if at_rest else 1.0, w.y[nq:], w.k[START, nq:])
-    return bool(-off > ROUNDING * size + _from_state(s, w, i) + _left_over(s, m, w, i))
+    rounding = ROUNDING * size + _stirred(s, m, w, j) + _from_state(s, w, i)
+    return bool(-off > rounding + _left_over(s, m, w, i))
 
 
 @inlined

@@ -63,9 +63,12 @@ def _without(na: int, x: Array, z: Array) -> None:
 
 @compiled
 def solve_dependent(s: Any, w: Work, q: Array, v: Array) -> bool:
-    """Fill la of least norm from r and the factor of rows that depend on each other; False if these contradict."""
+    """Fill la of least norm from r and the factor of rows that depend on each other; False if these contradict.
+
+    By as much as they do not agree each is off its law: rows that depend on others in one order, and not in another,
+    would else move the rest by that, and rows which nothing presses would join and let go for ever.
+    """
     na = s.na
-    solve_schur(w.G, na, w.reach, w.r, w.la)
     allow(s, w, q, v)
     count = 0
     for d in range(na):
@@ -81,6 +84,9 @@ def solve_dependent(s: Any, w: Work, q: Array, v: Array) -> bool:
             size2 += z[j] * z[j]
         for j in range(na):
             z[j] /= np.sqrt(size2)
-        _without(na, w.la, z)
+        _without(na, w.r, z)
         count += 1
+    solve_schur(w.G, na, w.reach, w.r, w.la)
+    for known in range(count):
+        _without(na, w.la, w.null[known])
     return True

@@ -184,7 +184,10 @@ class Equations:
         terms = np.abs(H @ X[:, -1]) + np.abs(Hdv) + law[:, 1] * np.abs(rate) + spring
         off_q, off_v = (error + 8.0 * ULP * float(np.abs(x).max()) for x in (q, v))
         state = law[:, 0] * off_q + law[:, 1] * off_v
-        noise[self.active] = (ROUNDING * terms + state) / np.diag(G)
+        inverse, lam = np.linalg.inv(G), np.abs(np.linalg.solve(G, self.drive(h, rate) + Hdv + H @ X[:, -1]))
+        H, X = np.abs(H), np.abs(X[:, :-1])
+        pushed = H @ (X @ lam) + X.T @ (H.T @ lam)  # what is zero by symmetry is so but for the rounding of its terms
+        noise[self.active] = np.abs(inverse) @ (ROUNDING * (terms + pushed) + state)
         size[self.active] = (terms + np.sqrt(law[:, 0]) * np.maximum(np.abs(rate), speed)) / np.diag(G)
         return noise, size
 

@@ -185,12 +185,16 @@ class LevelMachine:
         self.fastest = max([self.fastest, *(abs(float(rate[i])) for i in self.rows)])
         if self.rows:  # where bodies slide along each other, their gaps hardly move at all
             self._rounding = 8.0 * ULP * float((np.abs(e.held(t, q, v, self.rows)[1]) @ np.abs(v)).max())
-        noise, size = e.noise(t, q, v, self.fastest)
+        noise, size = e.noise(t, q, v, self.fastest, self._disagreement(q))
         vd, lam = e.accelerate(t, q, v)
         if e.beside is None:
             return View(gap, rate, vd, lam, noise, size, lam)
         shared = e.share(t, q, v, lam)
         return View(gap, rate, vd, shared, np.full(len(lam), noise.max()), np.full(len(lam), size.max()), lam)
+
+    def _disagreement(self, q: Floats) -> float:
+        """By how much gaps of rows that share a load disagree by rounding: chance has which of them hold the rest."""
+        return 0.0 if self.sharing is None else self._touch(q)
 
     def pressure(self, i: int, t: float, q: Floats, v: Floats, error: float = 0.0) -> tuple[float, float]:
         """Multiplier of row i if it were active now, and its noise; -inf if ill posed. `error` is that of `noise`."""
@@ -200,7 +204,7 @@ class LevelMachine:
         trial[i] = self._active_mode(i)
         self._activate(trial, [i])
         try:
-            noise, _ = self.equations.noise(t, q, v, error=error)
+            noise, _ = self.equations.noise(t, q, v, error=error + self._disagreement(q))
             _, lam = self.equations.accelerate(t, q, v)
             return float(lam[i]), float(noise[i])
         except Ended:

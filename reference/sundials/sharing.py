@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from crossbody.cases import Outcome
 from crossbody.reference.kinds import Floats
-from crossbody.reference.sundials.equations import ULP, Ended, Equations
+from crossbody.reference.sundials.equations import ROUNDING, ULP, Ended, Equations
 
 Flags = NDArray[np.bool_]
 RANK = 1e-5  # singular value of the rows, scaled to length one, over the largest, that counts as zero
@@ -118,7 +118,8 @@ def share(
     one_sided = np.array([i not in bilateral for i in every], dtype=bool)
     y = _nearest(at, one_sided, every)
     excess = at.A @ y - at.least
-    lifted = [every[k] for k in np.flatnonzero(one_sided & (excess > at.allowed))]
+    rounding = ROUNDING * (np.linalg.norm(at.free) + np.linalg.norm(y - at.free))
+    lifted = [every[k] for k in np.flatnonzero(one_sided & (excess > at.allowed + rounding))]
     if lifted:
         return Sharing([], [], lifted)
     carrying = _carrying(at, y, one_sided, every, spent, span)

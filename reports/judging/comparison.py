@@ -39,6 +39,8 @@ GROWING = frozenset({
 })  # fmt: skip
 """Metrics that compare a motion with the truth's, or those of two readers of a file: rounding grows as the motion has
 it."""
+WIDEST = 1e-3
+"""To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion."""
 LARGEST = "largest"
 """Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 FLOOR = 0.5
@@ -205,12 +207,12 @@ class _Judge:
         self.command = f"{command} --engine {entry.engine}:{entry.profile}"
 
     def limit(self, metric: str) -> Limit | None:
-        """The limit that judges this run, the wider the more errors grow."""
+        """The limit that judges this run, the wider the more errors grow, as far as a fault of a per cent is seen."""
         found, grows = limit_for(self.limits, metric, self.entry.engine, self.entry.profile), self.truth.grows
         if found is None or metric not in GROWING or grows <= 1.0:
             return found
         why = f"{found.why}; the motion makes errors {grows:.2g} times as large as free flight does"
-        return replace(found, value=found.value * grows, why=why)
+        return replace(found, value=max(found.value, min(found.value * grows, WIDEST)), why=why)
 
     def row(self, metric: str, value: float, unit: str, verdict: Word, why: str, **more: Any) -> Verdict:
         return Verdict(

@@ -8,6 +8,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
+from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.scale import least, of_like
 
@@ -37,13 +38,24 @@ def scale_of(exact: Trajectory, case: Case) -> Floats:
     """Return the largest |q_truth| (n,) of each coordinate; of its like, for one that rests but for rounding.
 
     The joints of a scene, a robot's, are measured by the largest of their unit: one that hardly moves in the truth, by
-    the balance of others, tells of an engine that moves it how far that is, and not how still it ought to be. Where all
-    of these rest, what the case says of their size. Errors below 1e-12, what absolute tolerances are, pass the usual
-    limit of 1e-6.
+    the balance of others, tells of an engine that moves it how far that is, and not how still it ought to be. But not
+    by where bodies float, nor by more than a radian, what other rotations are measured by: a robot far from the origin,
+    or the turns of a wheel, would hide what a finger does. Where all of these rest, what the case says of their size.
+    Errors below 1e-12, what absolute tolerances are, pass the usual limit of 1e-6.
     """
     own: Floats = np.max(np.abs(exact.q), axis=0)
-    shared, smallest = of_like(own, case.coordinates), least(case.coordinates)
-    own = shared if case.scene is not None else own
+    smallest = least(case.coordinates)
+    shared = of_like(own, case.coordinates) if case.scene is None else _of_joints(own, case, case.scene)
+    own = own if case.scene is None else shared
     scale = np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
     scale[list(case.quaternions)] = 1.0  # rad
     return scale
+
+
+def _of_joints(own: Floats, case: Case, scene: Scene) -> Floats:
+    """Return what each coordinate (nq,) of a scene is measured by: its own largest, or that of the joints like it."""
+    floats = np.repeat([j.type == "free" for j in scene.joints], [WIDTHS[j.type][0] for j in scene.joints])
+    turns = np.array([coordinate.unit == "rad" for coordinate in case.coordinates])
+    joints, bodies = (of_like(np.where(kind, own, 0.0), case.coordinates) for kind in (~floats, floats))
+    shared = np.where(floats, bodies, np.where(turns, np.minimum(joints, 1.0), joints))
+    return np.maximum(own, shared)

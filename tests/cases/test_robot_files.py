@@ -679,8 +679,42 @@ def test_positions_of_a_robot_are_measured_by_the_largest_of_their_unit(tmp_path
     case = cases.load(write(tmp_path, elbow='armature="1e6"'), "raised")
     run = engines.load("reference").prepare(case, "compiled").run()
     scale = scale_of(run, case)
-    assert np.allclose(scale, np.abs(run.q).max())
+    assert scale == pytest.approx([np.abs(run.q[:, 0]).max(), 1.0]), "rotations of others, up to a radian"
     assert np.ptp(run.q, axis=0).min() < 1e-2 * scale[0], "one rests"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_fixed_to_a_link_weighs_with_it_in_every_engine(seed: int, tmp_path: Path) -> None:
+    """MuJoCo's compiler fuses links without joints where it reads a URDF; what the world bears it leaves out."""
+    rng = np.random.default_rng(seed)
+    parents = [-1, *(int(rng.integers(i)) for i in range(1, 7))]
+    fixed = [True, False, *(rng.random(5) < 0.5).tolist()]
+    weights = rng.uniform(0.1, 5.0, 7)
+    links = "".join(
+        f'<link name="l{i}"><inertial><mass value="{m}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        "</inertial></link>"
+        for i, m in enumerate(weights)
+    )
+    joints = "".join(
+        f'<joint name="j{i}" type="{"fixed" if fixed[i] else "continuous"}"><parent link="l{parents[i]}"/>'
+        f'<child link="l{i}"/><axis xyz="0 1 0"/></joint>'
+        for i in range(1, 7)
+    )
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="robot">{links}{joints}</robot>')
+    owner = list(range(7))
+    for i in range(1, 7):
+        owner[i] = owner[parents[i]] if fixed[i] else i
+    expected = sorted(sum(weights[k] for k in range(7) if owner[k] == i) for i in set(owner) - {0})
+    case = cases.load(str(path))
+    for engine, profile in (
+        ("reference", "compiled"),
+        ("mujoco", "as_is"),
+        ("mujoco", "matched"),
+        ("pinocchio", "law"),
+    ):
+        found = engines.load(engine).prepare(case, profile).audit()["masses"]
+        assert sorted(found) == pytest.approx(expected, rel=1e-12), (engine, profile)
 
 
 def test_gravity_that_a_flag_turns_off_is_none_in_every_audit(tmp_path: Path) -> None:

@@ -30,8 +30,8 @@ ARM = """
 <actuator>
 <general name="direct" joint="elbow" gainprm="2" ctrllimited="true" ctrlrange="-1 1"/>
 <general name="sum" joint="shoulder" dyntype="integrator" gainprm="3" biastype="affine" biasprm="0 -2 -.1" {sum}/>
-<general name="lag" joint="elbow" gear=".9" dyntype="filter" dynprm=".05" gainprm="4" biastype="affine" biasprm=".1 -4 0"
-ctrllimited="true" ctrlrange="-2 .6"/>
+<general name="lag" joint="elbow" gear=".9" dyntype="filter" dynprm=".05" gainprm="4" biastype="affine"
+biasprm=".1 -4 0" ctrllimited="true" ctrlrange="-2 .6"/>
 <general name="exact" joint="shoulder" dyntype="filterexact" dynprm=".2" gainprm="1.5" {exact}/></actuator>
 <keyframe><key name="go" qpos=".4 -.3" qvel="1 -2" act=".1 -.2 .3" ctrl=".3 1.5 2 1.2"/></keyframe></mujoco>
 """

@@ -16,8 +16,11 @@ from places import helped
 
 from crossbody import cases
 from crossbody.cases import SceneError
+from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
+from crossbody.engines.equations import system_of
 from crossbody.reference import Options, System, _check, kernels, prepare, simulate
 from crossbody.reference._check import check_kernels
+from crossbody.reference._differences import differs
 
 VARIANTS = [
     (name, variant) for name in cases.names() for variant in import_module(f"crossbody.cases.library.{name}").VARIANTS
@@ -289,3 +292,25 @@ def test_with_debugging_on_kernels_check_their_indices(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("SceneError Kernel energy reads or writes beyond an array: index")
+
+
+@pytest.mark.parametrize("bend", 10.0 ** np.arange(-5, 1))
+def test_a_slope_that_bends_is_either_of_both_and_no_other(bend: float) -> None:
+    """A sphere over the edge of a box's face: its gap bends twice there, by as little as the edge is far."""
+    one = np.ones(1)
+    for part, wrong in ((0.0, False), (1.0, False), (-0.5, True), (1.5, True), (3.0, True)):
+        claimed = np.array([1.3 + part * bend])
+        found = differs(lambda x: 0.7 + 1.3 * x + bend * np.maximum(x, 0.0), np.zeros(1), one, claimed, one, one)
+        assert found[0] == wrong, (bend, part)
+
+
+def test_a_sphere_over_the_edge_of_a_face_passes() -> None:
+    box = Shape(name="box", type="box", size=(0.2, 0.03, 0.04))
+    ball = Shape(name="ball", type="sphere", body="ball", size=(0.04, 0.0, 0.0))
+    body = Body(name="ball", position=(0.7, 0.03, 0.1), mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    scene = Scene(
+        bodies=(body,), joints=(Joint(name="free", body="ball", type="free"),), shapes=(box, ball),
+        pairs=(Pair(name="both", first="box", second="ball"),),
+    )  # fmt: skip
+    case = cases.from_scene(scene, q0=[0.7, 0.03, 0.1, 1.0, 0.0, 0.0, 0.0])
+    system_of(case).check(case.q0, case.v0)

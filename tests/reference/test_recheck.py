@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from springs import drawn, known, suite
 
+from crossbody import cases, engines
 from crossbody.cases import Law, Mode, load
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene
+from crossbody.engines.equations import system_of
 from crossbody.reference import Violation, recheck, simulate
 from crossbody.reports.judging import truth
 from crossbody.reports.judging.comparison import truth_row
@@ -96,3 +99,14 @@ def test_a_motion_of_one_row_is_looked_at_by_itself(seed: int) -> None:
     assert recheck(system, run) == ()
     below = replace(run, gap=run.gap - 1e3, mode=np.full_like(run.mode, Mode.FREE), events=())
     assert {one.reason for one in recheck(system, below)} == {"below the surface"}
+
+
+@pytest.mark.parametrize("apart", 10.0 ** np.arange(-12.0, -5.0))
+def test_rows_that_let_go_right_behind_each_other_pull_nothing(apart: float) -> None:
+    """Between two events nanoseconds apart rounding of the places says little of the speed."""
+    law = RowLaw(a0=2500.0, a1=100.0)
+    bodies = tuple(Body(name=name, mass=1.0) for name in "ab")
+    joints = tuple(Joint(name=name, body=name, type="slide", range=(0.0, 9.0), law=law) for name in "ab")
+    case = cases.from_scene(Scene(bodies=bodies, joints=joints), q0=[-0.7, -0.7 * (1.0 + apart)], t_end=0.5)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-13).run()
+    assert recheck(system_of(case), run, rtol=1e-12) == ()

@@ -138,7 +138,7 @@ def _flight_error(run):
 
 def test_how_far_the_loop_is_from_its_right_hand_sides():
     run = prepare(ball(), [1.0], [0.0], Options(t_end=T_END, rtol=1e-9, shortcuts=False, samples=[T_END]))
-    run.warm()
+    run.go()
     count = int(run.state["rhs"][0])
     functions = [kernels.function_type(name) for name in kernels.NAMES]
     table = types.int64[:, ::1]

@@ -11,7 +11,9 @@ from crossbody.cases import Case, Ledger, Tier, Trajectory, load
 from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring import scale
 from crossbody.reports.measuring.alignment import clock
+from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, from_run, sample_times
 
 
@@ -94,13 +96,24 @@ def test_raised_position_is_a_position_error(truth: Truth, case: Case) -> None:
     assert measure("position", truth, run, case) == pytest.approx(1e-4, rel=1e-9)
 
 
+def test_energy_of_what_rests_is_measured_as_its_positions_are(truth: Truth) -> None:
+    """The swing of a weight that sinks by a nanometre is that of one that sinks by a tenth of a millimetre."""
+    run = truth.trajectory
+    depth = np.linspace(0.0, 1.0, len(run.t))
+    for moved in (1e-9, 1e-6, RESTS):
+        energy = np.column_stack([0.0 * depth, -3.0 * moved * depth])
+        sunk = replace(run, q=1.0 - moved * depth[:, None], energy=energy)
+        assert scale.energy(sunk) == pytest.approx(3.0 * RESTS, rel=1e-6)
+    assert scale.energy(replace(sunk, q=run.q + depth[:, None])) == pytest.approx(3.0 * RESTS, rel=1e-6)
+
+
 def test_unexplained_energy_belongs_to_the_integrator(truth: Truth, case: Case) -> None:
     energy = truth.trajectory.energy.copy()
     energy[len(energy) // 2 :, 0] += 0.05
     run = replace(truth.trajectory, energy=energy)
-    scale = max(truth.trajectory.energy[:, 0].max(), np.ptp(truth.trajectory.energy[:, 1]))
-    assert measure("energy_integrator", truth, run, case) == pytest.approx(0.05 / scale, rel=1e-9)
-    assert measure("energy_drift", truth, run, case) == pytest.approx(0.05 / scale, rel=1e-9)
+    size = max(truth.trajectory.energy[:, 0].max(), np.ptp(truth.trajectory.energy[:, 1]))
+    assert measure("energy_integrator", truth, run, case) == pytest.approx(0.05 / size, rel=1e-9)
+    assert measure("energy_drift", truth, run, case) == pytest.approx(0.05 / size, rel=1e-9)
 
 
 def test_energy_made_by_the_law_is_the_gain_of_every_bounce() -> None:
@@ -108,8 +121,8 @@ def test_energy_made_by_the_law_is_the_gain_of_every_bounce() -> None:
     truth = truth_of(case)
     gain = next(c.expected for c in case.claims if c.metric == "energy_per_bounce")
     ended = [c for c in contacts(truth.trajectory) if np.isfinite(c.release)]
-    scale = truth.trajectory.energy[:, 0].max()
-    assert measure("energy_law", truth, truth.trajectory, case) == pytest.approx(len(ended) * gain / scale, rel=1e-9)
+    size = truth.trajectory.energy[:, 0].max()
+    assert measure("energy_law", truth, truth.trajectory, case) == pytest.approx(len(ended) * gain / size, rel=1e-9)
     assert measure("energy_per_bounce", truth, truth.trajectory, case) == pytest.approx(gain, rel=1e-10)
     assert measure("energy_integrator", truth, truth.trajectory, case) < 1e-12
 

@@ -9,10 +9,12 @@ import pytest
 from four_bars import four_bar
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Outcome
+from crossbody.cases import Case, Outcome, Tier
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
+from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, verdicts
 from crossbody.reports.judging.truth import LEAST, MANY, tightened, truth_of
+from crossbody.reports.measuring.truth import from_run
 
 INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
 
@@ -54,6 +56,34 @@ def test_a_limit_is_as_wide_as_the_motion_makes_errors_large() -> None:
         assert rows["position"].verdict == word
         assert "free flight" in rows["position"].why or word == "within"
         assert rows["position"].limit == pytest.approx(1e-6 * truth.grows)
+
+
+def test_no_limit_grows_so_wide_that_a_fault_of_a_per_cent_passes() -> None:
+    case = pendulum(0.4, True, 1e-5, 1.0)
+    truth = replace(truth_of(case), grows=1e9)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    rows = verdicts(case, Entry(engine="some", profile="one", run=replace(run, q=1.01 * run.q)), truth, "")
+    assert {row.metric: row.verdict for row in rows}["position"] == "outside"
+
+
+@pytest.mark.parametrize("joint", ["finger", "elbow"])
+def test_a_fault_of_a_per_cent_is_seen_beside_a_far_body_and_a_fast_wheel(joint: str) -> None:
+    """A finger that slides by millimetres, a kilometre from the origin, and a joint beside one that turns for ever."""
+    size = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+    bodies = tuple(
+        Body(name=name, parent="" if name == "base" else "base", mass=1.0, inertia=size)
+        for name in ("base", "finger", "wheel", "elbow")
+    )
+    types = {"base": "free", "finger": "slide", "wheel": "hinge", "elbow": "hinge"}
+    joints = tuple(Joint(name=name, body=name, type=kind) for name, kind in types.items())
+    q0, v0 = np.zeros(10), np.zeros(9)
+    q0[:4], v0[6:] = (1e3, 0.0, 0.0, 1.0), (5e-3, 1e4, 1e-2)
+    case = cases.from_scene(Scene(bodies=bodies, joints=joints, gravity=(0.0, 0.0, 0.0)), q0=q0, v0=v0, t_end=1.0)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    truth, at = from_run(run, Tier.D, "itself"), {"finger": 7, "elbow": 9}[joint]
+    wrong = run.q.copy()
+    wrong[:, at] *= 1.01
+    assert metrics.load("position").measure(truth, replace(run, q=wrong), case) > 1e-5
 
 
 @pytest.mark.parametrize("a0", [1e4, 1e9])
