@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
-from crossbody.cases.scene import Scene, Shape
+from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.nearest import ROUND, Pose, corners, crossing, lying, meet, overlap, tilt
 
@@ -190,9 +190,12 @@ class Contacts:
             before: how the shapes of the contacts in `turning` lay last, which is brought up to date.
         """
         along: dict[int, NDArray[np.bool_]] = {}
+        R, p = self._placed(poses, self._choice_of(None))
         for k in self.turning:
             pair = self.all[k]
-            at, by = self._ends(poses, pair)
+            at, by = (
+                (R[..., j, :, :], p[..., j, :]) for j in (self.number[pair.first.name], self.number[pair.second.name])
+            )
             kinds, sizes = (pair.first.type, pair.second.type), _sizes(pair)
             found = lying(kinds, sizes, at, by, np.array(pair.parallel))
             last = np.maximum.accumulate(np.where(_within_reach(pair, at, by), np.arange(len(found)), -1))
@@ -208,7 +211,7 @@ class Contacts:
         """
         found, ways = np.zeros(len(which)), np.ones(len(which))
         for i, pair in enumerate(self.all[k] for k in which):
-            at, by = self._ends(poses, pair)
+            at, by = self.ends(poses, pair)
             if pair.first.type == "plane":
                 found[i] = tilt(at, by) / pair.parallel - 1.0
                 continue
@@ -218,8 +221,13 @@ class Contacts:
             ways[i] = np.cross(at[0][:, 2], by[0][:, 2]) @ (by[1] - at[1])
         return found, ways
 
-    def _ends(self, poses: Poses, contact: Contact) -> tuple[Pose, Pose]:
-        """Return the poses of both shapes of a contact (..., 3, 3) and (..., 3)."""
+    def ends(self, poses: Poses, contact: Contact) -> tuple[Pose, Pose]:
+        """Return the poses of both shapes of a contact (..., 3, 3) and (..., 3).
+
+        Args:
+            poses: of the bodies.
+            contact: one of `all`.
+        """
         one, two = (self._place(poses, self.number[shape.name]) for shape in (contact.first, contact.second))
         return one, two
 
@@ -317,10 +325,11 @@ class Flat:
     """
 
     def __init__(self, contacts: Contacts, frames: Sequence[Pose]) -> None:
-        rows = []
+        rows, framed = [], dict(zip(contacts.bodies, frames, strict=True)).__getitem__
         for k, place in contacts.rows:
             contact = contacts.all[k]
-            (one, R, o), (two, S, p) = (_in_frame(contacts, frames, shape) for shape in (contact.first, contact.second))
+            one, two = (contacts.bodies.index(shape.body) for shape in (contact.first, contact.second))
+            (R, o), (S, p) = contacts.ends(framed, contact)
             solid, extents = contact.second.type, contact.second.extents
             at = p + S @ corners(solid, extents)[place] if solid in ROUND else p
             radius = extents[0] if solid in ("sphere", "capsule") else 0.0
@@ -359,13 +368,6 @@ class Flat:
         seen = accelerates.take(two, 0) - accelerates.take(one, 0) - 2.0 * below[:, :, :3] @ (of - below)
         total: Floats = (n * ((seen[:, :, :3] @ x[:, :, None])[:, :, 0] + seen[:, :, 3])).sum(axis=1)
         return total
-
-
-def _in_frame(contacts: Contacts, frames: Sequence[Pose], shape: Shape) -> tuple[int, Floats, Floats]:
-    """Return the number of a shape's body, and the shape's pose in its frame."""
-    k = contacts.bodies.index(shape.body)
-    R, o = frames[k]
-    return k, R @ matrices(np.array(shape.orientation)), o + R @ np.array(shape.position)
 
 
 def _sizes(contact: Contact) -> tuple[Floats, Floats]:

@@ -207,11 +207,11 @@ def _loop(loop: Loop, scene: Scene, unit: dict[str, Floats]) -> list[Row] | None
     return [(unit[loop.first], -reference - loop.polynomial[0])]
 
 
-def followed(case: Case) -> Case | None:
+def followed(case: Case, scene: Line) -> Case | None:
     """The same rows without ballistic memory; None where several rows are not those of the law (`spring`)."""
-    return in_real_time(case, "memoryless") if line(case).alone and case.law.unilateral.all() else None
+    return in_real_time(case, "memoryless") if scene.alone and case.law.unilateral.all() else None
 
 
-def law_name(case: Case) -> str:
+def law_name(scene: Line) -> str:
     """What `Line.memoryless` is: the machine of that name for rows of their own, else a chain of springs."""
-    return "memoryless" if line(case).alone else "springs"
+    return "memoryless" if scene.alone else "springs"

@@ -238,10 +238,10 @@ class Exudyn(Engine):
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
         scene = line(case)
         model = _build(scene, symbolic=profile == "matched")
-        extra = {"law": law_name(case)} if profile == "matched" else {"method": "GeneralizedAlpha"}
+        extra = {"law": law_name(scene)} if profile == "matched" else {"method": "GeneralizedAlpha"}
         return PeerRun(
             engine=self.name, profile=profile, settings=used | extra, integrate=_integrator(case, scene, model, used),
-            physics=_audit(case, scene, model), follows=followed(case) if profile == "matched" else None,
+            physics=_audit(case, scene, model), follows=followed(case, scene) if profile == "matched" else None,
         )  # fmt: skip
 
 

@@ -186,7 +186,7 @@ def case_of(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
-        contacts=tuple(rows_of(scene)[0]), q0=start,
+        contacts=tuple(names), q0=start,
         v0=np.zeros(scene.nv) if v0 is None else cast(Floats, v0),  # arrays are checked there
         act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law_of(scene),
         inputs=inputs or held(scene), scene=scene, rank=rank,

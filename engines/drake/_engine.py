@@ -124,12 +124,12 @@ class Drake(Engine):
             physics = _read(scene, made)
         start = np.concatenate((scene.q0, scene.v0))
         sim = Sim(root, start, str(used.get("scheme", USUAL_SCHEME)), float(used.get("rtol", 0.0)))
-        law = {"law": law_name(case)} if profile == "matched" else {}
+        law = {"law": law_name(scene)} if profile == "matched" else {}
         return PeerRun(
             engine=self.name, profile=profile, settings=used | law,
             integrate=_runner(case, scene, sim, int(used["max_steps"]), dt),
             physics={"gravity": scene.gravity, "q0": case.q0, "v0": case.v0} | physics,
-            follows=followed(case) if profile == "matched" else None,
+            follows=followed(case, scene) if profile == "matched" else None,
         )  # fmt: skip
 
 

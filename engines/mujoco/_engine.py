@@ -15,6 +15,7 @@ from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Tr
 from crossbody.cases.files.warned import captured
 from crossbody.cases.registry import Registry
 from crossbody.engines import settings as _settings
+from crossbody.engines._scene import module_of
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.mujoco._globals import hooked
@@ -110,7 +111,7 @@ class Mujoco(Engine):
         _settings.profile_of(self.name, self.profiles, profile)
         if profile == "as_is" and case.scene is None:
             return f"The profile as_is runs a robot file as it stands, and {case.name} is none; its own is default."
-        if (name := _module(case)) in MECHANISMS.names():
+        if (name := module_of(case)) in MECHANISMS.names():
             own = getattr(MECHANISMS.load(name), "why_not", None)
             return own(case, profile) if own else None
         return f"MuJoCo has no model of the mechanism {name!r}; it has: {', '.join(MECHANISMS.names())}."
@@ -132,7 +133,7 @@ class Mujoco(Engine):
         reason = self.why_not(case, profile)
         if reason is not None:
             raise CaseUnsupported(reason)
-        mechanism = MECHANISMS.load(_module(case))
+        mechanism = MECHANISMS.load(module_of(case))
         with captured(), _refused(case):
             known = _known(case, mechanism.default_step(case, profile))
         known |= getattr(mechanism, "settings", lambda *_: {})(case, profile)
@@ -163,7 +164,7 @@ class Mujoco(Engine):
         reason = self.why_not(case, "matched")
         if reason is not None:
             raise CaseUnsupported(reason)
-        return linearise(MECHANISMS.load(_module(case)), case, spot)
+        return linearise(MECHANISMS.load(module_of(case)), case, spot)
 
 
 @contextmanager
@@ -175,11 +176,6 @@ def _refused(case: Case) -> Iterator[None]:
         raise  # ours, and it is a ValueError too
     except ValueError as error:
         raise CaseUnsupported(f"MuJoCo refuses the model of {case.label}: {error}.") from None
-
-
-def _module(case: Case) -> str:
-    """Return what builds a case's model: that of all scenes, where it is one."""
-    return "scene" if case.scene is not None else case.mechanism
 
 
 def _dividing(case: Case, dt: float) -> tuple[float, str]:

@@ -92,17 +92,17 @@ def default_step(case: Case, profile: str) -> float:
     if profile == "default":
         return float(mujoco.MjModel.from_xml_string("<mujoco/>").opt.timestep)
     case = followed(case, profile) or case
-    law, opening = case.law, case.law.unilateral
+    scene, law, opening = _scene(case), case.law, case.law.unilateral
     deep = 0.0
     if law.a2.any():
-        model = matched(_scene(case))
-        deep = _reach(case, Switched(_scene(case), model, mujoco.MjData(model)))[0]
+        model = matched(scene)
+        deep = _reach(case, Switched(scene, model, mujoco.MjData(model)))[0]
     if not case.general:  # nothing but rows moves its bodies fast
         return min(SLOWEST, resolving_step(law, deep))
     stiffness = law.a0 + 3.0 * law.a2 * deep**2
     poles = [np.roots([1.0, a1, k]) for k, a1 in zip(stiffness[opening], law.a1[opening], strict=True)]
     rate = float(np.abs(np.concatenate([np.zeros(1), *poles])).max())
-    return min(SLOWEST, OF_RATE / fastest(_scene(case), case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
+    return min(SLOWEST, OF_RATE / fastest(scene, case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
 
 
 def followed(case: Case, profile: str) -> Case | None:
@@ -169,7 +169,8 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     Raises:
         ValueError: MuJoCo's own, for a model that it refuses.
     """
-    scene = _scene(followed(case, profile) or case)
+    integrated = followed(case, profile) or case
+    scene = _scene(integrated)
     if profile == "as_is":
         model = held(_from_file(case))
         model = model if reader == "file" else rebuilt(scene, model)
@@ -184,7 +185,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
     prepared = Prepared(
         model=model, data=data, nc=len(case.contacts), start=_start(case, data, rows, acting, driver),
         modes=rows.modes, lam=rows.lam,
-        safe=_guard(followed(case, profile) or case, data, rows),
+        safe=_guard(integrated, data, rows),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
         hook=_hook(scene, switched, driver) if switched else None,

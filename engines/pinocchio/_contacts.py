@@ -44,7 +44,8 @@ class ContactRows:
             found = [
                 [now(body) for body in self.contacts.bodies] for now in map(self._now, q[first : first + TOGETHER])
             ]
-            gaps.append(self.contacts.recorded(self._stacked(found), ways))
+            R, p = (np.array([[pose[k] for pose in one] for one in found]) for k in (0, 1))
+            gaps.append(self.contacts.recorded(self._stacked(R, p), ways))
         return np.concatenate(gaps) if self.count else np.zeros((len(q), 0))
 
     def parted(self, q: Floats, which: Sequence[int]) -> tuple[Floats, Floats]:
@@ -84,20 +85,18 @@ class ContactRows:
                     R[k, i], p[k, i] = self._pose(self.contacts.bodies[i], data)
                     moving[k, i] = pin.getVelocity(self.model, data, self.carriers[i], WORLD).vector
                     at[k, i] = data.oMi[self.carriers[i]].translation
-            poses = {self.contacts.bodies[i]: (R[:, i], p[:, i]) for i in needed}.__getitem__
 
             def carried(bodies: Indices, points: Floats) -> Floats:
                 twist = moving[:, bodies]
                 velocity: Floats = twist[..., :3] + cross(twist[..., 3:], points - at[:, bodies])
                 return velocity
 
-            return closing(self.contacts.touches(poses, rows, along), carried)
+            return closing(self.contacts.touches(self._stacked(R, p), rows, along), carried)
 
         return drift(rates, v, turn)
 
-    def _stacked(self, placed: Sequence[Sequence[Pose]]) -> Poses:
-        """Return what gives the poses of bodies at several instants at once (m, 3, 3) and (m, 3)."""
-        R, p = (np.array([[pose[k] for pose in one] for one in placed]) for k in (0, 1))
+    def _stacked(self, R: Floats, p: Floats) -> Poses:
+        """Return what gives each body's poses at several instants, of those of all (m, nb, 3, 3) and (m, nb, 3)."""
         return {body: (R[:, i], p[:, i]) for i, body in enumerate(self.contacts.bodies)}.__getitem__
 
     def _now(self, q: Floats) -> Poses:

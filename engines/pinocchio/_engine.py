@@ -18,6 +18,7 @@ from crossbody.engines import settings as _settings
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
+from crossbody.engines._scene import module_of
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.pinocchio._admm import TimeStepper
@@ -133,7 +134,7 @@ class Pinocchio(Engine):
         _settings.check_case(case)
         profile = _settings.profile_of(self.name, self.profiles, profile)
         known = MECHANISMS.names()
-        if (name := _module(case)) not in known:
+        if (name := module_of(case)) not in known:
             return f"Pinocchio has no model of the mechanism {name!r}; it has: {', '.join(known)}."
         own = getattr(MECHANISMS.load(name), "why_not", lambda *_: None)(case, profile)
         if own is not None or hasattr(MECHANISMS.load(name), "prepare"):
@@ -168,7 +169,7 @@ class Pinocchio(Engine):
         if reason is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
-        mechanism = MECHANISMS.load(_module(case))
+        mechanism = MECHANISMS.load(module_of(case))
         if hasattr(mechanism, "prepare"):
             run: Run = mechanism.prepare(case, used)
             return run
@@ -196,17 +197,12 @@ class Pinocchio(Engine):
         reason = self.why_not(case, "law")
         if reason is not None:
             raise CaseUnsupported(reason)
-        return linearise(MECHANISMS.load(_module(case)), case, spot)
-
-
-def _module(case: Case) -> str:
-    """Return what builds a case's model: that of all scenes, where it is one."""
-    return "scene" if case.scene is not None else case.mechanism
+        return linearise(MECHANISMS.load(module_of(case)), case, spot)
 
 
 def _known(case: Case, profile: str) -> dict[str, Parameter]:
     """The settings of a profile."""
-    mechanism = MECHANISMS.load(_module(case))
+    mechanism = MECHANISMS.load(module_of(case))
     if hasattr(mechanism, "SETTINGS"):
         own: dict[str, Parameter] = mechanism.SETTINGS
         return own

@@ -195,11 +195,11 @@ class Spans:
         """Return d'' at v' = 0 (nt,)."""
         pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
         points, d, n = self._apart()
-        carried = self.moving * v
-        twist, change = (carried @ part.reshape(6, -1).T for part in (self.data.J, self.data.dJ))
+        own = self.moving * v
+        twist, change = (own @ part.reshape(6, -1).T for part in (self.data.J, self.data.dJ))
         rate = twist[:, :3] + crossed(twist[:, 3:], points)
-        own = change[:, :3] + crossed(change[:, 3:], points) + crossed(twist[:, 3:], rate)
-        W, a = self._between(rate), self._between(own)
+        bent = change[:, :3] + crossed(change[:, 3:], points) + crossed(twist[:, 3:], rate)
+        W, a = self._between(rate), self._between(bent)
         across = W - (n * W).sum(axis=1)[:, None] * n
         total: Floats = (n * a).sum(axis=1) + (across * across).sum(axis=1) / d
         return total

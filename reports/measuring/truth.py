@@ -15,6 +15,8 @@ from crossbody.cases.between import between
 
 TRUTH = "truth"
 """Name of the truth where engines have theirs, and of the row that judges it."""
+MOST, FEWEST = 4000, 21
+"""Samples inside all short intervals between events together, unless each has but the fewest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,10 +51,6 @@ class Truth:
     tight: float = math.nan
     grows: float = 1.0
     joined: bool = False
-
-
-MOST, FEWEST = 4000, 21
-"""Points inside all short intervals between events together, unless each has but the fewest."""
 
 
 def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:

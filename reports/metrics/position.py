@@ -45,8 +45,9 @@ def scale_of(exact: Trajectory, case: Case) -> Floats:
     """
     own: Floats = np.max(np.abs(exact.q), axis=0)
     smallest = least(case.coordinates)
-    shared = of_like(own, case.coordinates) if case.scene is None else _of_joints(own, case, case.scene)
-    own = own if case.scene is None else shared
+    shared = of_like(own, case.coordinates)
+    if case.scene is not None:
+        own = shared = _of_joints(own, case, case.scene)
     scale = np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
     scale[list(case.quaternions)] = 1.0  # rad
     return scale

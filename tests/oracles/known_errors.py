@@ -366,7 +366,7 @@ def misnamed(s: Scene) -> tuple[Trajectory, float]:
 
 
 ERRORS: dict[str, tuple[str, Known]] = {
-    "position": ("box", bumped("q", of_each("q"), moving("q"))),
+    "position": ("box", bumped("q", of_unit("q", "coordinates"), moving("q"))),
     "position below zero": ("mirrored robot", bumped("q", of_each("q"), moving("q"))),
     "velocity": ("box", bumped("v", of_unit("v", "velocities"))),
     "start_error": ("box", begun("q", of_unit("q", "coordinates"))),

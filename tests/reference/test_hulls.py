@@ -240,7 +240,7 @@ def test_what_stays_watched_is_told(tmp_path: Path) -> None:
     assert [pair.name for pair in watched(case.scene)] == ["floor:ball"]  # type: ignore[arg-type]
     run = engines.load("reference").prepare(case).run()
     assert run.outcome is Outcome.INCONSISTENT
-    assert "a hull has more than 256 corners" in run.message
+    assert "the hull has more than 256 corners" in run.message
     path.write_text(text.format(most=' maxhullvert="20"'), encoding="utf-8")
     fewer = contacts(cases.load(str(path)).scene)  # type: ignore[arg-type]
     assert [contact.places for contact in fewer] == [20]

@@ -129,33 +129,32 @@ def scene(parameters: Mapping[str, Value], mechanism: str, law: RowLaw) -> Scene
     names = [f"ball {i}" for i in range(int(parameters["n"]))]
     placed = [(i * (2.0 * radius + gap), 0.0, -hung[2]) for i in range(len(names))]
     reaches = [(b[0] - a[0] - gap, gap) for a, b in pairwise(placed)]  # 2 r as places are rounded: a gap of 0 is 0
-    between = zip(pairwise(names), reaches, strict=True)
+    rows = [f"balls {i} and {i + 1}" for i in range(len(reaches))]
+    between = zip(rows, pairwise(names), reaches, strict=True)
     balls = zip(names, placed, masses(parameters).tolist(), strict=True)
     return Scene(
         bodies=tuple(Body(name=name, position=at, mass=mass, com=hung) for name, at, mass in balls),
         joints=tuple(Joint(name=name, body=name, type=kind, axis=axis) for name in names),
         shapes=tuple(Shape(name=name, body=name, size=(radius, 0.0, 0.0), position=hung) for name in names),
-        tendons=tuple(_between(mechanism, pair, hung, ends, law) for pair, ends in between),
+        tendons=tuple(_between(mechanism, name, pair, ends, hung, law) for name, pair, ends in between),
         gravity=(0.0, 0.0, -float(parameters["gravity"]) if mechanism == "pendulums" else 0.0),
     )  # fmt: skip
 
 
-def _between(mechanism: str, pair: tuple[str, str], point: Vector, reach: tuple[float, float], law: RowLaw) -> Tendon:
+def _between(
+    mechanism: str, name: str, pair: tuple[str, str], reach: tuple[float, float], point: Vector, law: RowLaw
+) -> Tendon:
     """Return what lies between neighbours: a difference of coordinates, 0 of sliders that touch, or their distance.
 
     Args:
         mechanism: of the case.
+        name: of the row.
         pair: names of the neighbours.
-        point: where the ball is in its body, m.
         reach: distance at which they touch, and their gap at rest, m.
+        point: where the ball is in its body, m.
         law: of the row.
     """
-    name, (touching, gap) = contact(pair), reach
+    touching, gap = reach
     if mechanism == "sliders":
         return Tendon(name=name, joints=pair, coefficients=(-1.0, 1.0), range=(-gap, math.inf), law=law)
     return Tendon(name=name, bodies=pair, positions=(point, point), range=(touching, math.inf), law=law)
-
-
-def contact(pair: tuple[str, str]) -> str:
-    """Return the name of the row of two neighbours."""
-    return f"{pair[0].replace(' ', 's ')} and {pair[1].split()[-1]}"

@@ -30,8 +30,6 @@ _MULTISTEP = (
     "to 20,000 of them in stiff contact"
 )
 
-"""Variants in which a ball lands on a face."""
-
 
 def limits(claims: Iterable[Claim], fallen: float) -> tuple[Limit, ...]:
     """The limits of one variant beside those that every case has.
