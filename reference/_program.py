@@ -14,6 +14,7 @@ from numba import types
 from crossbody.reference import kernels
 from crossbody.reference.cache import compiled, embedding
 from crossbody.reference.core import advance as core
+from crossbody.reference.core import friction, friction_answers
 from crossbody.reference.core._struct import TABLE
 from crossbody.reference.core.layout import STATE
 
@@ -31,6 +32,18 @@ def _signature() -> Any:
 def program() -> Any:
     """The function `advance`, from the cache or compiled (once per installation)."""
     return compiled(core.advance, [_signature()])
+
+
+@cache
+def _friction() -> Any:
+    """What answers for contacts with friction, from the cache or compiled once a scene has some."""
+    return compiled(friction_answers.answer, [friction.SIGNATURE])
+
+
+def friction_code() -> int:
+    """Where that stands, callable by the convention of compiled functions."""
+    found = _friction().overloads[friction.SIGNATURE.args]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
 class Address(types.WrapperAddressProtocol):  # type: ignore[misc]

@@ -19,7 +19,7 @@ from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._dense import Marks, Motion
 from crossbody.reference._interrupt import LONG_S, Interrupts
-from crossbody.reference._program import entry, program
+from crossbody.reference._program import entry, friction_code, program
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
@@ -117,7 +117,7 @@ class CompiledRun:
             "affine": system.affine and options.shortcuts and not system.frictional,
             "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
-            "frictional": system.frictional,
+            "frictional": system.frictional, "friction_code": friction_code() if system.frictional else 0,
             "loops": system.solve is None and bool(np.any(system.held)),
             "keep_events": options.events, "has_energy": system.energy is not _none.energy,
             "has_control": system.control is not None,

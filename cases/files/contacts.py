@@ -67,7 +67,10 @@ def _why(model: Any, pair: tuple[int, ...]) -> str:
     one, two = ("hull" if kind == "mesh" else kind for kind in types)
     if not {(one, two), (two, one)} & PLACES.keys():
         return f"no gap of a {one} and a {two} is known"
-    friction = "they have friction (without=friction leaves it out of every engine)"
+    friction = (
+        "they have friction (without=friction leaves it out of every engine; friction=1 has it in the reference, where "
+        "shapes that slide and neither spin nor roll meet planes, or spheres each other)"
+    )
     if "hull" not in (one, two):
         return friction
     most = PLACES["plane", "hull"]

@@ -14,8 +14,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
-from crossbody.reference.core.friction import enter, factor
-from crossbody.reference.core.friction import solve as solve_rows
+from crossbody.reference.core.friction import FACTOR, NOTHING, SOLVE, ask, enter
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 from crossbody.reference.core.shares import solve_dependent
 from crossbody.reference.kinds import Array, Bytes, Floats
@@ -170,7 +169,7 @@ def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array
         _rate_and_drive(s, m, w, on, j, v)
         _schur_row(s, m, w, j)
     if s.frictional:
-        return factor(s, m, w, on > 0.0)
+        return int(ask(FACTOR, s, m, w, np.int64(on > 0.0)))
     s.dependent = factor_schur(w.G, na, w.reach, w.idx, w.shares)
     return int(s.dependent < 0)
 
@@ -258,7 +257,7 @@ def accelerate(
     if assemble(rows, s, m, w, on, t, q, v) != 0:
         return 1
     if s.frictional:
-        solve_rows(s, m, w, w.r, w.la)
+        ask(SOLVE, s, m, w, NOTHING)
     elif s.dependent == 0:
         solve_schur(w.G, na, w.reach, w.r, w.la)
     elif not solve_dependent(s, w, q, v):

@@ -15,17 +15,16 @@ from crossbody.reference.core import (
     events,
     exact,
     folds,
-    friction,
     guards,
     journal,
     peaks,
     record,
     settle,
     stepping,
-    sticking,
 )
-from crossbody.reference.core.acceleration import scatter
+from crossbody.reference.core.acceleration import GENERAL, accelerate, scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
+from crossbody.reference.core.friction import BEGIN_SLIP, FOLLOW_TURNS, NOTHING, RENEW, ask
 from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
     DONE,
@@ -161,7 +160,8 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Apply the transitions that fired at the step's end and settle what follows from them."""
     nq = s.nq
     if s.frictional:
-        _follow_turns(K, s, m, w)
+        K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
+        ask(FOLLOW_TURNS, s, m, w, NOTHING)
     if s.natural:
         if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
             return ILL_POSED
@@ -198,30 +198,19 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @inlined
-def _follow_turns(K: Any, s: Any, m: Model, w: Work) -> None:
-    """Renew directions of slips that have turned by a right angle, and do not stop."""
-    K.gaps(s.t, w.y[: s.nq], w.y[s.nq :], m.p, w.gap, w.rate)
-    for i in range(s.nc):
-        if (
-            w.hit[i] <= s.theta
-            and w.kind[i] == guards.STOP
-            and (friction.slip_velocity(m, i, w.rate) > friction.stopped_slip(s))
-        ):
-            friction.face(m, w, i, w.rate)
-
-
-@inlined
 def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked."""
+    slips = False
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == guards.JAM:
             marks = b.history[len(b.history) - 1]
             marks[:] = 0
             marks[i] = 1
             return True
-    for i in range(s.nc):
-        if w.hit[i] <= s.theta and w.kind[i] == guards.CONE:
-            sticking.begin_slip(K, s, m, w, i)
+        slips = slips or (w.hit[i] <= s.theta and w.kind[i] == guards.CONE)
+    nq = s.nq
+    if slips and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
+        ask(BEGIN_SLIP, s, m, w, NOTHING)
     return False
 
 
@@ -261,7 +250,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _move(s, w, t)
     _remember_step(s, before)
     if s.frictional:
-        friction.renew(s, m, w, b.mode, w.rates[0])
+        ask(RENEW, s, m, w, NOTHING)
     if s.audited:
         code = audit.account(K, s, m, w)
         if code != 0:

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import inlined
-from crossbody.reference.core import dop853, friction
+from crossbody.reference.core import dop853
 from crossbody.reference.core.dop853_table import STABILITY_LIMIT
+from crossbody.reference.core.friction import NOTHING, TURNING_RATE, ask
 from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work
 
 SAFETY = 0.9
@@ -55,7 +56,7 @@ def longest_step(s: Any, m: Model, w: Work) -> float:
         return float(s.h_max)
     s.row_rate = _row_rate(s, w)
     if s.frictional:
-        s.turning_rate = friction.turning_rate(s, m, w)
+        s.turning_rate = ask(TURNING_RATE, s, m, w, NOTHING)
     return float(min(s.h_max, STABILITY_LIMIT / s.row_rate) if s.row_rate > 0.0 else s.h_max)
 
 

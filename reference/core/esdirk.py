@@ -25,8 +25,7 @@ from crossbody.reference.core.dop853 import (
     watch_guards,
     watch_multipliers,
 )
-from crossbody.reference.core.friction import has_friction, turn_part
-from crossbody.reference.core.friction import solve as solve_rows
+from crossbody.reference.core.friction import NOTHING, SOLVE, TURN_PART, ask, has_friction
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -100,7 +99,7 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
     w.r[: s.na] = 0.0
     w.r[j] = 1.0
     if s.frictional:
-        solve_rows(s, m, w, w.r, w.la)
+        ask(SOLVE, s, m, w, NOTHING)
     else:
         solve_schur(w.G, s.na, w.reach, w.r, w.la)
     spring = w.law[i, 0] + 3.0 * w.law[i, 2] * w.ha[j] ** 2
@@ -115,7 +114,7 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
 @inlined
 def _slip_part(s: Any, m: Model, w: Work, i: int) -> None:
     """Add what follows from friction that turns with the slip of contact i."""
-    turn = turn_part(s, m, w, i)
+    turn = ask(TURN_PART, s, m, w, i)
     if turn == 0.0:
         return
     c, t = w.listed[m.tangent[i]], m.tangent[i]

@@ -15,7 +15,7 @@ from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
-from crossbody.reference.core.friction import slip_velocity, stopped_slip, watch_friction
+from crossbody.reference.core.friction import WATCH, ask
 from crossbody.reference.core.guards import (
     CATCH,
     CONE,
@@ -129,7 +129,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
                 return 1
             scatter(s, w, w.lams[node])
             if s.frictional:
-                watch_friction(s, m, w, w.cones[node])
+                ask(WATCH, s, m, w, node)
     for node in range(0, NODES if s.frictional and multipliers else 0, NODES - 1):
         dense.state(s, m, w, at_node(node), w.ys)
         if (
@@ -139,7 +139,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
             != 0
         ):
             return 1
-        watch_friction(s, m, w, w.cones[node])
+        ask(WATCH, s, m, w, node)
     return 0
 
 
@@ -263,7 +263,7 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
     if kind == CONE:
         return SLIP
     if kind == STOP:  # else it has turned by more than a right angle within a step
-        return STICK if slip_velocity(m, i, w.rate) <= stopped_slip(s) else int(mode[i])
+        return STICK if active_mode(s, m, w, i) == STICK else int(mode[i])
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
         return int(mode[i])
     if s.frozen and m.beta[i, 0] > 0.0:

@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.reference.cache import inlined
 from crossbody.reference.core import bogacki, dop853_table, esdirk
 from crossbody.reference.core.algebra import inverse_diagonal
+from crossbody.reference.core.friction import HOLDS_ON, ask
 from crossbody.reference.core.layout import (
     BETWEEN,
     COLLISION,
@@ -25,7 +26,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.kinds import Array, Bytes
+from crossbody.reference.kinds import Bytes
 
 # What values at the stages say about the whole step (linear programming over all polynomials of a degree).
 STAGES_RANGE = 1.7  # degree 6 within a range at the stages of DOP853: how many times the range it may leave it by
@@ -68,26 +69,6 @@ def _presses_on(s: Any, w: Work, i: int) -> bool:
         c = stage_place(s, stage)
         off = max(off, abs(w.lam_at[stage, i] - _parabola(start, half, end, stage_place(s, middle), c)))
     return _stays_clear(start, half, end, stage_place(s, middle), off)
-
-
-@inlined
-def _margin(m: Model, i: int, lam: Array) -> float:
-    """Mu lam_n - |lam_t| of contact i, from the multipliers of all rows."""
-    square = 0.0
-    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-        square += lam[t] * lam[t]
-    return float(m.friction[i] * lam[i] - np.sqrt(square))
-
-
-@inlined
-def _holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether a contact that sticks stays clear of its bound, as far as the stages tell."""
-    start, end = _margin(m, i, w.lams[0]), _margin(m, i, w.lams[NODES - 1])
-    low, high = min(start, end), max(start, end)
-    for stage in range(1, s.end):
-        value = _margin(m, i, w.lam_at[stage])
-        low, high = min(low, value), max(high, value)
-    return bool(low > 0.0 and low > STAGES_RANGE * (high - low))
 
 
 @inlined
@@ -166,7 +147,7 @@ def row_may_switch(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     if mode[i] == COLLISION:
         return not (_presses_on(s, w, i) and _stays_elastic(s, w, i))
     if mode[i] == STICK:
-        return not (_presses_on(s, w, i) and _holds_on(s, m, w, i))
+        return not (_presses_on(s, w, i) and ask(HOLDS_ON, s, m, w, i) > 0.0)
     return mode[i] != CONTACT or not _presses_on(s, w, i)
 
 

@@ -10,7 +10,7 @@ from crossbody.reference.cache import compiled, inlined
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.friction import has_friction, margin, slip_along, small_slip, stiffness, without_pull
+from crossbody.reference.core.friction import MARGIN, STIFFNESS, ask, has_friction, slip_along, small_slip
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, off_law, slow
 from crossbody.reference.kinds import Array, Bytes
@@ -83,20 +83,11 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
 
 
 @inlined
-def _sticking(K: Any, s: Any, m: Model, w: Work, i: int, t: float, y: Array) -> None:
-    """Leave mu lam_n - |lam_t| of contact i in w.parts, without what pulls it back."""
+def _of_friction(K: Any, s: Any, m: Model, w: Work, what: int, i: int, t: float, y: Array) -> None:
+    """Leave in w.parts how far contact i is from sliding (MARGIN), or from a jam (STIFFNESS)."""
     w.parts[0] = np.nan
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], GENERAL) == 0:
-        without_pull(s, m, w)
-        w.parts[0] = margin(m, w, i, w.la)
-
-
-@inlined
-def _jammed(K: Any, s: Any, m: Model, w: Work, i: int, t: float, y: Array) -> None:
-    """Leave in w.parts what a multiplier of contact i does to its own gap while it slides."""
-    w.parts[0] = np.nan
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], GENERAL) == 0:
-        w.parts[0] = stiffness(s, m, w, w.listed[i])
+        w.parts[0] = ask(what, s, m, w, i)
 
 
 @compiled
@@ -117,10 +108,8 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     elif kind == PRESS:
         lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
         w.parts[0] = w.noise[i] - lam if lam > -np.inf else REDUNDANT
-    elif kind == CONE:
-        _sticking(K, s, m, w, i, t, w.ys)
-    elif kind == JAM:
-        _jammed(K, s, m, w, i, t, w.ys)
+    elif kind in (CONE, JAM):
+        _of_friction(K, s, m, w, MARGIN if kind == CONE else STIFFNESS, i, t, w.ys)
     elif kind == STOP:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         w.parts[0] = slip_along(m, w, i, w.rate)

@@ -29,7 +29,7 @@ from crossbody.reference.core.acceleration import (
 )
 from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_mass, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
-from crossbody.reference.core.friction import has_friction, slip_velocity, stopped_slip
+from crossbody.reference.core.friction import STANDS, ask, has_friction
 from crossbody.reference.core.layout import (
     BALLISTIC,
     COLLISION,
@@ -78,7 +78,7 @@ def active_mode(s: Any, m: Model, w: Work, i: int) -> int:
     With friction SLIP or STICK by the rates in w.rate; whether the latter holds is decided with all others that stand.
     """
     if s.frictional and has_friction(m, i):
-        return SLIP if slip_velocity(m, i, w.rate) > stopped_slip(s) else STICK
+        return STICK if ask(STANDS, s, m, w, i) > 0.0 else SLIP
     return COLLISION if m.beta[i, 0] > 0.0 and not s.frozen else CONTACT
 
 

@@ -18,30 +18,11 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled, inlined
-from crossbody.reference.core.acceleration import GENERAL, accelerate, activate
 from crossbody.reference.core.algebra import factor_lu, solve_lu
-from crossbody.reference.core.friction import (
-    factor_set,
-    has_friction,
-    note_speed,
-    solve,
-    stiffness,
-    stopped_slip,
-    without_pull,
-)
-from crossbody.reference.core.journal import change
-from crossbody.reference.core.layout import (
-    BALLISTIC,
-    FREE,
-    ILL_POSED,
-    NO_CONSISTENT_MODES,
-    PAINLEVE,
-    SLIP,
-    STICK,
-    Buffers,
-    Model,
-    Work,
-)
+from crossbody.reference.core.coulomb import factor_set, note_speed, solve, stiffness, stopped_slip, without_pull
+from crossbody.reference.core.friction import has_friction
+from crossbody.reference.core.guards import CONE
+from crossbody.reference.core.layout import FREE, NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.kinds import Array
 
 TOLERATED = 1e-9  # part of the largest acceleration by which a set may be off
@@ -53,6 +34,7 @@ MOST_TURN = 0.5  # rad, of one of them
 AROUND, HALVINGS = 24, 50  # directions that are looked at where that leads nowhere, and halvings between two
 MOST_SETS = 256
 FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
+WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 DIFFERENT = 1e-6  # part of the largest acceleration by which motions differ
 
 
@@ -63,14 +45,11 @@ def _first(m: Model, w: Work, i: int) -> int:
 
 
 @inlined
-def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Evaluate the rows in contact, and leave their right-hand sides without what pulls sticking ones back in w.bare.
+def _look(s: Any, m: Model, w: Work) -> None:
+    """Leave the right-hand sides of the rows in contact without what pulls sticking ones back in w.bare.
 
     Which contacts stand is left in w.stands, 0 for those that slide on: their direction is that of their slip.
     """
-    activate(s, m, w, b.mode)
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) != 0:
-        return False
     s.push_scale = 0.0
     for j in range(s.na):
         i = w.idx[j]
@@ -90,7 +69,6 @@ def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
                 for c in range(first, last):
                     w.way[w.idx[c]] = w.hda[c] / size
             _put(m, w, i, STICK if w.stands[i] and not w.begins[i] else SLIP)
-    return True
 
 
 @inlined
@@ -311,7 +289,7 @@ def _look_around(s: Any, m: Model, w: Work, i: int) -> None:
                 return
 
 
-@inlined
+@compiled
 def _judge(s: Any, m: Model, w: Work) -> int:
     """Evaluate the set, with directions that agree with what they lead to; the contact that violates it most, or -1."""
     _evaluate(s, m, w)
@@ -327,8 +305,8 @@ def _judge(s: Any, m: Model, w: Work) -> int:
 
 
 @compiled
-def _iterate(s: Any, m: Model, w: Work, together: bool) -> bool:
-    """Change what is violated most, or all that is `together`, until nothing is; False if a set comes again.
+def _iterate(s: Any, m: Model, w: Work, together: int) -> bool:
+    """Change the WORST of what is violated, or ALL of it together, until nothing is; False if a set comes again.
 
     Corners of one box begin to slide together: one after another they would each choose another direction.
     """
@@ -339,7 +317,7 @@ def _iterate(s: Any, m: Model, w: Work, together: bool) -> bool:
             return _jammed(s, m, w) < 0
         for j in range(s.na):
             k = w.idx[j]
-            if has_friction(m, k) and (k == i or together) and w.wants[k] != w.state[k]:
+            if has_friction(m, k) and (k == i or together == ALL) and w.wants[k] != w.state[k]:
                 _change(m, w, k, w.wants[k])
     return False
 
@@ -403,7 +381,7 @@ def _sweep(s: Any, m: Model, w: Work) -> None:
 
 
 @inlined
-def _swept(s: Any, m: Model, w: Work, together: bool) -> bool:
+def _swept(s: Any, m: Model, w: Work, together: int) -> bool:
     """Whether a consistent set is found from what sweeps give."""
     _sweep(s, m, w)
     return bool(_iterate(s, m, w, together))
@@ -469,16 +447,16 @@ def _near_sets(s: Any, m: Model, w: Work) -> bool:
     return False
 
 
-@compiled
-def begin_slip(K: Any, s: Any, m: Model, w: Work, i: int) -> None:
-    """Take the direction against the force that holds contact i at the present instant for that of its slip."""
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) != 0:
-        return
+@inlined
+def begin_slip(s: Any, m: Model, w: Work) -> None:
+    """Let contacts that have reached their bounds begin to slide against the forces that held them, as evaluated."""
     without_pull(s, m, w)
-    w.begins[i] = 1
-    size = _size(m, w, i, w.la)
-    for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
-        w.way[w.idx[c]] = -w.la[c] / size if size > 0.0 else 0.0
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta and w.kind[i] == CONE:
+            w.begins[i] = 1
+            size = _size(m, w, i, w.la)
+            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
+                w.way[w.idx[c]] = -w.la[c] / size if size > 0.0 else 0.0
 
 
 @inlined
@@ -518,19 +496,16 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def decide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Put every contact with friction in the mode that the present instant asks for.
+def decide(s: Any, m: Model, w: Work) -> int:
+    """Leave in w.state the mode that the present instant, as evaluated, asks for, of every contact with friction.
 
     Returns:
-        0, or ILL_POSED, NO_CONSISTENT_MODES or PAINLEVE; with one of these the last line of the history marks contacts.
+        0, or NO_CONSISTENT_MODES or PAINLEVE; with one of these w.wants marks contacts.
     """
     note_speed(s, m, w.rate)
-    for i in range(s.nc):
-        w.off[i] = 0
-    if not _look(K, s, m, w, b):
-        return ILL_POSED
-    if not (_iterate(s, m, w, True) or _swept(s, m, w, True) or _swept(s, m, w, False) or _near_sets(s, m, w)):
-        return _mark(s, m, w, b)
+    _look(s, m, w)
+    if not (_iterate(s, m, w, ALL) or _swept(s, m, w, ALL) or _swept(s, m, w, WORST) or _near_sets(s, m, w)):
+        return _mark(s, m, w)
     _count_others(s, m, w)
     for j in range(s.na):
         i = w.idx[j]
@@ -538,28 +513,24 @@ def decide(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
                 w.rest[w.idx[c]] = w.hda[c] if w.stands[i] and w.state[i] == SLIP else 0.0
             w.tolerated[i] = TOLERATED * s.push_scale / w.gram[j, j]
-            after = w.state[i] if w.state[i] != FREE else (FREE if w.gap[i] > 0.0 else BALLISTIC)
-            if after != b.mode[i]:
-                change(s, b, i, after)
     for i in range(s.nc):
         w.off[i], w.begins[i] = 0, 0
-    activate(s, m, w, b.mode)
     return 0
 
 
 @inlined
-def _mark(s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Mark the contact that has jammed, or all with friction, for the message; PAINLEVE or NO_CONSISTENT_MODES."""
+def _mark(s: Any, m: Model, w: Work) -> int:
+    """Mark in w.wants the contact that has jammed, or all with friction; PAINLEVE or NO_CONSISTENT_MODES."""
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
             _put(m, w, i, STICK if w.stands[i] else SLIP)
     _evaluate(s, m, w)
-    marks, jammed = b.history[len(b.history) - 1], _jammed(s, m, w)
-    marks[:] = 0
+    jammed = _jammed(s, m, w)
+    w.wants[:] = 0
     for j in range(s.na):
         i = w.idx[j]
-        marks[i] = i == jammed or (jammed < 0 and has_friction(m, i))
+        w.wants[i] = i == jammed or (jammed < 0 and has_friction(m, i))
     return int(PAINLEVE if jammed >= 0 else NO_CONSISTENT_MODES)
 
 
