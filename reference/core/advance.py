@@ -155,7 +155,7 @@ def _move(s: Any, w: Work, t: float) -> None:
         copy(w.z1, w.z)
 
 
-@inlined
+@compiled
 def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Apply the transitions that fired at the step's end and settle what follows from them."""
     nq = s.nq

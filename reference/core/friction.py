@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 from crossbody.reference.cache import compiled, inlined
-from crossbody.reference.core.layout import MODEL, SLIP, STATE, WORK, Model, Work
+from crossbody.reference.core.layout import SLIP, Model, Work
 from crossbody.reference.kinds import Array, Bytes
 
 SMALL_SLIP = 1e-9  # of the largest speed: a slip velocity below has no direction of its own,
@@ -28,23 +27,22 @@ SMALL_SLIP_STEPS = 10.0  # or below so many times the relative tolerance
 ) = np.arange(14)  # fmt: skip
 NOTHING = np.int64(0)  # beside what is asked of all rows together
 
-SIGNATURE = types.float64(types.int64, numba.typeof(np.zeros(1, STATE)).dtype, MODEL, WORK, types.int64)
-
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _call(typingctx: Any, address: Any, what: Any, state: Any, model: Any, work: Any, i: Any) -> Any:
     """Call the code at an address by the convention of compiled functions, and hand on what it raises."""
+    given = (what, state, model, work, i)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        convention, given = context.call_conv, SIGNATURE.args
-        kind = convention.get_function_type(SIGNATURE.return_type, given)
+        convention = context.call_conv
+        kind = convention.get_function_type(types.float64, given)
         function = builder.inttoptr(args[0], kind.as_pointer())
-        status, found = convention.call_function(builder, function, SIGNATURE.return_type, given, args[1:])
+        status, found = convention.call_function(builder, function, types.float64, given, args[1:])
         with cgutils.if_unlikely(builder, status.is_error):
             convention.return_status_propagate(builder, status)
         return found
 
-    return SIGNATURE.return_type(types.int64, *SIGNATURE.args), generate
+    return types.float64(address, *given), generate
 
 
 @compiled

@@ -71,7 +71,7 @@ def known(s: Any, w: Work) -> float:
     return float(largest)
 
 
-@inlined
+@compiled
 def active_mode(s: Any, m: Model, w: Work, i: int) -> int:
     """COLLISION where the row has fast constants and follows them in real time, else CONTACT.
 
@@ -163,7 +163,7 @@ def _spread_left_over(s: Any, w: Work) -> None:
         w.noise[w.idx[j]] += np.sqrt(size2 * inverse_diagonal(w.G, s.na, w.reach, j, w.scale))
 
 
-@inlined
+@compiled
 def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Everything a machine asks for at the present instant: gaps, rates, multipliers, their noise."""
     nq = s.nq

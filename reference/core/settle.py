@@ -127,7 +127,7 @@ def _keep(w: Work) -> None:
     copy(w.rate, w.rates[0])
 
 
-@inlined
+@compiled
 def _decide_friction(s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Put every contact with friction in the mode that the present instant asks for, after it was evaluated.
 
