@@ -35,6 +35,9 @@ Pose = tuple[Floats, Floats]
 """Rotation (3, 3) and origin (3,), m."""
 SAME_GAP = 1e-9
 """m, to which a bound's gap is that of two shapes: the places of bodies are rounded."""
+STEEPEST = 0.5
+"""Largest sine between the axes of capsules that lie along each other: where they stand as a T, no end of the one is
+that of the other."""
 LEVELLED = 1e-14
 """Sine of the angle between an axis and a plane below which it lies in it: rounding."""
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6

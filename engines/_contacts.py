@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Scene
-from crossbody.cases.scene_contacts import Contact, contacts
-from crossbody.engines.nearest import ROUND, Pose, corners, crossing, lying, meet, overlap, tilt
+from crossbody.cases.scene_contacts import STEEPEST, Contact, contacts
+from crossbody.engines.nearest import ROUND, Pose, aslant, corners, crossing, lying, meet, overlap, tilt
 
 FAR = 1.0
 """m: the gap of a row that is none as its shapes lie."""
@@ -176,14 +176,14 @@ class Contacts:
                 sharp = tilt(at, by)
             else:  # where they are not beside each other ends are nearest
                 beside = np.less_equal(*overlap(at, group.sizes[0][:, 1], by, group.sizes[1][:, 1]))
-                sharp = np.where(beside, crossing(at, by) ** 2, 1.0)
+                sharp = np.where(beside & (aslant(at, by) <= STEEPEST), crossing(at, by) ** 2, 1.0)
             least = min(least, float(sharp[~along].min(initial=1.0)))
         return found, TURN * min(1.0, SHARP * least)
 
     def recorded(self, poses: Poses, before: dict[int, bool]) -> Floats:
         """Return the gaps (m, n) of all rows at instants of a motion, one after the other.
 
-        How shapes lie to each other that are out of reach is not looked at: they lie as they did.
+        Out of reach shapes that are crossed stay so.
 
         Args:
             poses: of the bodies at all of them.
@@ -198,8 +198,8 @@ class Contacts:
             )
             kinds, sizes = (pair.first.type, pair.second.type), _sizes(pair)
             found = lying(kinds, sizes, at, by, np.array(pair.parallel))
-            last = np.maximum.accumulate(np.where(_within_reach(pair, at, by), np.arange(len(found)), -1))
-            along[k] = np.where(last < 0, before.get(k, found[0]), found[last])
+            seen = _last(_within_reach(pair, at, by))
+            along[k] = (_last(~found) < seen) | (found.cumprod() > 0) & before.get(k, True)
             before[k] = bool(along[k][-1])
         return self.touches(poses, None, along).gap
 
@@ -217,7 +217,8 @@ class Contacts:
                 continue
             half, other = np.array(pair.first.size[1]), np.array(pair.second.size[1])
             low, high = overlap(at, half, by, other)
-            found[i] = max(float(crossing(at, by)) / pair.parallel - 1.0, float(low - high) / pair.first.size[1])
+            steep = float(aslant(at, by)) - STEEPEST
+            found[i] = max(float(crossing(at, by)) / pair.parallel - 1.0, float(low - high) / pair.first.size[1], steep)
             ways[i] = np.cross(at[0][:, 2], by[0][:, 2]) @ (by[1] - at[1])
         return found, ways
 
@@ -372,6 +373,12 @@ class Flat:
 
 def _sizes(contact: Contact) -> tuple[Floats, Floats]:
     return contact.first.extents, contact.second.extents
+
+
+def _last(when: NDArray[np.bool_]) -> Indices:
+    """Return for every instant the last one so far of those marked (m,); -1 before all."""
+    found: Indices = np.maximum.accumulate(np.where(when, np.arange(len(when)), -1))
+    return found
 
 
 def _within_reach(contact: Contact, at: Pose, by: Pose) -> NDArray[np.bool_]:

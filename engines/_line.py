@@ -22,6 +22,9 @@ from crossbody.engines._real_time import in_real_time, one_set
 
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 
+ROUNDED = 64.0 * float(np.finfo(np.float64).eps)
+"""Part of the length of a scene that rounding of its places makes of a gap that is zero, and of how it moves."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Line:
@@ -90,10 +93,15 @@ class Line:
         found: Floats = self.reduced * (self.presses - self.a1 * self.rates(v) - self.a0 * h - self.a2 * h**3)
         return found
 
+    @cached_property
+    def _rounding(self) -> float:
+        """Gap that no engine tells from zero, m: shapes that touch there may be apart, or overlap and push, by it."""
+        return ROUNDED * float(np.abs(self.places).max() + np.abs(self.h0).max(initial=0.0))
+
     def gaps(self, q: Floats) -> Floats:
-        """Gaps (..., nc), m."""
+        """Gaps (..., nc), m; of what is apart by rounding, zero."""
         found: Floats = q @ self.H.T + self.h0
-        return found
+        return np.where(np.abs(found) <= self._rounding, 0.0, found)
 
     def rates(self, v: Floats) -> Floats:
         """H v (..., nc), m/s."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.scene_contacts import STEEPEST
 
 Pose = tuple[Floats, Floats]
 """Rotations (..., 3, 3) and positions (..., 3) in the world."""
@@ -64,13 +65,20 @@ def lying(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Po
     if kinds != ("capsule", "capsule"):
         return np.zeros(np.shape(sine), dtype=bool)
     low, high = overlap(at, sizes[0][..., 1], by, sizes[1][..., 1])
-    return np.asarray((low <= high) & (crossing(at, by) <= sine))
+    return np.asarray((low <= high) & (crossing(at, by) <= sine) & (aslant(at, by) <= STEEPEST))
 
 
 def tilt(floor: Pose, at: Pose) -> Floats:
     """Return the sine of the angle between a plane's normal and the axis of a cylinder over it (...)."""
     own = _inside(at[0], floor[0][..., 2])
     return np.hypot(own[..., 0], own[..., 1])
+
+
+def aslant(at: Pose, by: Pose) -> Floats:
+    """Return the sine of the angle between axes of two capsules (...)."""
+    across = cross(at[0][..., 2], by[0][..., 2])
+    sine: Floats = np.sqrt(_dot(across, across))
+    return sine
 
 
 def crossing(at: Pose, by: Pose) -> Floats:

@@ -15,7 +15,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import llvmlite
@@ -29,6 +29,7 @@ from numba.core.serialize import dumps
 
 from crossbody.reference import code_store
 from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values
+from crossbody.reference._parts import PartPasses, WholePasses
 
 _SETTINGS = (
     "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX", "DEBUGINFO_DEFAULT",
@@ -63,7 +64,7 @@ def embedding(function: Callable[..., Any], signature: Any = None, *, nogil: boo
     """
     if numba_config.DISABLE_JIT:
         return function
-    found = Lean(function, targetoptions={"nopython": True, "nogil": nogil})
+    found = Lean(function, targetoptions={"nopython": True, "nogil": nogil}, pipeline_class=WholePasses)
     if signature is not None:
         found.compile(signature)
         found.disable_compile()
@@ -84,7 +85,7 @@ class Compiled(Lean):
         self, function: Callable[..., Any], locals: Any = None, targetoptions: Any = None,
         *, declared: Sequence[Any] = (),
     ) -> None:  # fmt: skip
-        super().__init__(function, locals, {"nopython": True, **(targetoptions or {})})
+        super().__init__(function, locals, {"nopython": True, **(targetoptions or {})}, pipeline_class=WholePasses)
         self._cache = _Overloads(self)
         self.declared = {tuple(signature.args): signature for signature in declared}
         self.frozen_values: list[Any] | None = None
@@ -219,30 +220,53 @@ def machine() -> tuple[str, ...]:
     return (numba.__version__, llvmlite.__version__, platform.python_version(), str(target), *settings)
 
 
+class Part(Lean):
+    """A function that is part of the compiled ones that call it; a call from Python makes one of it alone."""
+
+    def __init__(self, function: Callable[..., Any], targetoptions: Any) -> None:
+        super().__init__(function, None, {"nopython": True, **targetoptions}, pipeline_class=PartPasses)
+        self.frozen_values: list[Any] | None = None
+
+    def compile(self, sig: Any) -> Any:
+        """Lower for a signature, with the values that are read now."""
+        if not self.overloads:
+            self.frozen_values = frozen_values(self.py_func)
+        return super().compile(sig)
+
+    def add_overload(self, cres: CompileResult) -> None:
+        """Take what was lowered: nothing that Python could call."""
+        entry = object()  # callers know the code by it
+        cres.library.environment = (cres.fndesc.env_name, cres.environment)
+        self.targetctx.insert_user_function(entry, cres.fndesc, [cres.library])
+        self.overloads[tuple(cres.signature.args)] = cres._replace(entry_point=entry, type_annotation="")
+
+    @cached_property
+    def alone(self) -> Compiled:
+        """The same function for callers in Python."""
+        return Compiled(self.py_func, targetoptions=self.targetoptions)
+
+    def __call__(self, *args: Any, **kws: Any) -> Any:
+        """Call it from Python."""
+        return self.alone(*args, **kws)
+
+
 def compiled(function: Callable[..., Any], signatures: Any = (), *, lazy: Any = (), nogil: bool = False) -> Any:
     """Compile a function and keep the code on disk.
 
     Args:
         function: in Python.
-        signatures: compiled for at once; without them the function is typed where it is used.
+        signatures: compiled for at once; without them the function is a part of those that call it.
         lazy: signatures that it is compiled for when they are first asked for.
         nogil: threads may run it side by side.
     """
     if numba_config.DISABLE_JIT:
         return function
     options = {"error_model": "numpy", "nogil": nogil} | ({"boundscheck": True} if debugging() else {})
+    if not signatures and not lazy:
+        return Part(function, options)
     found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy))
     for signature in signatures:
         found.compile(signature)
     if signatures and not lazy:
         found.disable_compile()  # numba converts arguments, such as functions, only where nothing is left to compile
     return found
-
-
-def inlined(function: Callable[..., Any]) -> Any:
-    """Make a function part of whatever compiled function calls it.
-
-    A compiled function carries all that it calls, optimised anew: what is called from one place, or is short, is
-    therefore written out there, and only the few parts that many places share are compiled on their own.
-    """
-    return numba.njit(inline="always", error_model="numpy")(function)

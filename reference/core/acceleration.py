@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
 from crossbody.reference.core.friction import FACTOR, NOTHING, SOLVE, ask, enter
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
@@ -23,13 +23,13 @@ from crossbody.reference.kinds import Array, Bytes, Floats
 OWN, GENERAL, SMOOTH = np.arange(3)
 
 
-@inlined
+@compiled
 def is_active(mode: int) -> bool:
     """Rows that are in contact, however, or always on carry a multiplier."""
     return bool(mode in (CONTACT, COLLISION) or mode >= BILATERAL)  # STICK and SLIP stand behind it
 
 
-@inlined
+@compiled
 def law_of(m: Model, mode: Bytes, i: int) -> tuple[float, float, float]:
     """a0, a1, a2 of row i: the fast constants in COLLISION if it has any (one that follows may not), else the slow."""
     if mode[i] == COLLISION and (m.beta[i, 0] > 0.0 or m.beta[i, 1] > 0.0):
@@ -37,7 +37,7 @@ def law_of(m: Model, mode: Bytes, i: int) -> tuple[float, float, float]:
     return m.alpha[i, 0], m.alpha[i, 1], m.alpha[i, 2]
 
 
-@inlined
+@compiled
 def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     """Write the constants of every row, by its mode. Nothing else may write them.
 
@@ -52,7 +52,7 @@ def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
         enter(s, m, w, mode)
 
 
-@inlined
+@compiled
 def clear(m: Model, w: Work, j: int) -> None:
     """Zero row j of H, so that kernels need not write its zeros."""
     i = w.idx[j]
@@ -97,7 +97,7 @@ def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     s.na, s.idle, s.dependent = na, idle, 0
 
 
-@inlined
+@compiled
 def scatter(s: Any, w: Work, lam: Array) -> None:
     """Lam of all rows from lam of the active ones."""
     la, idx = w.la, w.idx
@@ -107,7 +107,7 @@ def scatter(s: Any, w: Work, lam: Array) -> None:
         lam[idx[j]] = la[j]
 
 
-@inlined
+@compiled
 def free(dynamics: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array) -> int:
     """Vd = M^-1 f; leaves the factor of M. In an affine scene it is worked out once for every set of inputs."""
     if s.have_free:
@@ -127,7 +127,7 @@ def free(dynamics: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array)
     return 0
 
 
-@inlined
+@compiled
 def _rate_and_drive(s: Any, m: Model, w: Work, on: float, j: int, v: Array) -> None:
     """Rate h' of active row j, and the right-hand side of its multiplier with the size of its terms."""
     i = w.idx[j]
@@ -142,7 +142,7 @@ def _rate_and_drive(s: Any, m: Model, w: Work, on: float, j: int, v: Array) -> N
     w.scale[j] = abs(push) + abs(w.Hdv[j]) + abs(damping) + abs(spring)
 
 
-@inlined
+@compiled
 def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
     """Row j of M^-1 H^T and of G, as far as its band goes."""
     first, last = m.span[w.idx[j], 0], m.span[w.idx[j], 1]
@@ -174,7 +174,7 @@ def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array
     return int(s.dependent < 0)
 
 
-@inlined
+@compiled
 def push_rows(m: Model, w: Work, na: int, x: Array, factor: float, out: Array) -> None:
     """Out += factor M^-1 H^T x."""
     for j in range(na):
@@ -183,7 +183,7 @@ def push_rows(m: Model, w: Work, na: int, x: Array, factor: float, out: Array) -
             out[c] += factor * w.X[j, c] * x[j]
 
 
-@inlined
+@compiled
 def weigh(s: Any, m: Model, w: Work, x: Array) -> None:
     """Sum up the sizes of what multipliers x of the active rows do to every coordinate, in w.pull and w.shift."""
     for c in range(s.n):
@@ -195,7 +195,7 @@ def weigh(s: Any, m: Model, w: Work, x: Array) -> None:
             w.shift[c] += abs(w.X[j, c] * x[j])
 
 
-@inlined
+@compiled
 def pushed(m: Model, w: Work, j: int) -> float:
     """Size of the terms by which the multipliers that were weighed accelerate the row in place j.
 
@@ -207,7 +207,7 @@ def pushed(m: Model, w: Work, j: int) -> float:
     return float(total)
 
 
-@inlined
+@compiled
 def _scalar(dynamics: Any, rows: Any, s: Any, p: Floats, w: Work, on: float, t: float, q: Array, v: Array) -> int:
     """One coordinate and at most one active row: everything is scalar."""
     M, f = w.M, w.f

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import (
     audit,
     choice,
@@ -70,7 +70,7 @@ class Kernels(NamedTuple):
     switch: Any
 
 
-@inlined
+@compiled
 def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Put the inputs that hold from now on in force and find the next instant at which they change."""
     s.have_free = 0
@@ -110,7 +110,7 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return ILL_POSED if s.loops and folds.begin(K, s, m, w) != 0 else 0
 
 
-@inlined
+@compiled
 def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Go on after a change of the inputs, with the step that was good before."""
     if s.switching:
@@ -125,7 +125,7 @@ def _resume(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _land(K: Any, s: Any, m: Model, w: Work) -> None:
     """End the step where the first guard fired."""
     dense.state(s, m, w, s.theta, w.y1)
@@ -134,7 +134,7 @@ def _land(K: Any, s: Any, m: Model, w: Work) -> None:
         dense.ledger(s, w, s.theta, w.z1)
 
 
-@inlined
+@compiled
 def _take_over(s: Any, w: Work) -> None:
     """The end of the whole step becomes the start of the next."""
     last = NODES - 1
@@ -147,7 +147,7 @@ def _take_over(s: Any, w: Work) -> None:
     copy(w.guards[last], w.guards[0])
 
 
-@inlined
+@compiled
 def _move(s: Any, w: Work, t: float) -> None:
     s.t = t
     copy(w.y1, w.y)
@@ -197,7 +197,7 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return int(code)
 
 
-@inlined
+@compiled
 def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked."""
     slips = False
@@ -268,14 +268,14 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return code
 
 
-@inlined
+@compiled
 def _share_anew(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Ask anew which rows idle: they carry again where they would push, and must have followed their laws."""
     code = settle.share(K, s, m, w, b)
     return _restart(K, s, m, w, b) if code == MOVED else code
 
 
-@inlined
+@compiled
 def _remember_step(s: Any, method: int) -> None:
     """The step to start with when the same kind of motion begins again."""
     if method == EXPLICIT and s.method == EXPLICIT:
@@ -285,7 +285,7 @@ def _remember_step(s: Any, method: int) -> None:
             s.h_free = s.h
 
 
-@inlined
+@compiled
 def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Settle the start and write it down, or go on with an instant that found no room for its events."""
     lost = False
@@ -309,7 +309,7 @@ def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return LOST if lost else 0
 
 
-@inlined
+@compiled
 def _room(s: Any, b: Buffers) -> int:
     """Whether the next step finds room for all that it may write."""
     if s.natural and s.rows + record.ARC_POINTS + s.nc + 4 > len(b.out):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.kinds import Array, Bytes, Floats, Index
 
 ULP = 2.3e-16
@@ -18,14 +18,14 @@ RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
 DEPENDENT = 1e-10  # a pivot below it is that of a row which depends on the rows before, where that may be
 
 
-@inlined
+@compiled
 def copy(source: Array, target: Array) -> None:
     """Target := source, without the test for overlap that an assignment of slices makes."""
     for i in range(len(target)):
         target[i] = source[i]
 
 
-@inlined
+@compiled
 def all_finite(x: Array) -> bool:
     """Whether no entry is NaN or infinite: one such makes the sum of x - x, else 0, NaN."""
     total = 0.0

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, pushed, weigh
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.friction import is_shared
@@ -23,7 +23,7 @@ SELDOM = 64  # steps between two looks at a system that brings its own algebra: 
 OPEN = 30.0  # times what the tolerance may add to the energy of all steps: a first step can be fourteen of it off
 
 
-@inlined
+@compiled
 def _residual(s: Any, m: Model, w: Work, mode: Bytes, j: int, stage: int) -> tuple[float, float]:
     """H v' + H'v + a1 h' + a0 h + a2 h^3 of the active row in place j, and what rounding of the state makes of it."""
     nq, i = s.nq, w.idx[j]
@@ -40,7 +40,7 @@ def _residual(s: Any, m: Model, w: Work, mode: Bytes, j: int, stage: int) -> tup
     return abs(total), ULP * (a0 * position + a1 * speed)
 
 
-@inlined
+@compiled
 def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bool:
     """Whether the accelerations at the step's end, k[stage], are those of every active row's law.
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.dop853 import derivative, keep_velocity, watch_multipliers
 from crossbody.reference.core.layout import Model, Work
@@ -24,14 +24,14 @@ B = np.array([*_A[3], 0.0])
 _E = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
 
 
-@inlined
+@compiled
 def _advance(y: Array, k: Floats, stage: int, h: float, out: Array) -> None:
     """Out = y + h sum_j A[stage, j] k[j]."""
     for i in range(len(y)):
         out[i] = y[i] + h * (_A[stage, 0] * k[0, i] + _A[stage, 1] * k[1, i] + _A[stage, 2] * k[2, i])
 
 
-@inlined
+@compiled
 def _error(s: Any, w: Work, h: float) -> float:
     """Root mean square of the embedded estimate in units of the tolerance; NaN where a stage was NaN."""
     total = 0.0

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import dop853
 from crossbody.reference.core.dop853_table import STABILITY_LIMIT
 from crossbody.reference.core.friction import NOTHING, TURNING_RATE, ask
@@ -22,7 +22,7 @@ TRIAL_STEPS = 12  # implicit steps before the two are compared
 HOLD_STEPS = 400  # explicit steps after a trial that was lost
 
 
-@inlined
+@compiled
 def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
     """Hairer's guess for the first step from the sizes of y, y' and y''."""
     size = s.nq + s.n
@@ -44,7 +44,7 @@ def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
     return float(min(100.0 * h0, h1))
 
 
-@inlined
+@compiled
 def longest_step(s: Any, m: Model, w: Work) -> float:
     """The longest step that may be tried: an explicit one is stable for the active rows.
 
@@ -60,7 +60,7 @@ def longest_step(s: Any, m: Model, w: Work) -> float:
     return float(min(s.h_max, STABILITY_LIMIT / s.row_rate) if s.row_rate > 0.0 else s.h_max)
 
 
-@inlined
+@compiled
 def _row_rate(s: Any, w: Work) -> float:
     """Fastest pole of the active rows, 1/s."""
     fastest = 0.0
@@ -73,7 +73,7 @@ def _row_rate(s: Any, w: Work) -> float:
     return float(fastest)
 
 
-@inlined
+@compiled
 def choose_method(s: Any, w: Work) -> None:
     """Go implicit where the rows' stability, not accuracy, bounds the explicit step; the cheaper of the two stays."""
     if s.method == EXPLICIT:
@@ -94,7 +94,7 @@ def choose_method(s: Any, w: Work) -> None:
             s.trial_steps, s.trial_rhs, s.trial_t = 0, s.rhs, s.t
 
 
-@inlined
+@compiled
 def grow(s: Any, error: float) -> float:
     """Factor for the next step from the error of this one, by the order of the method that took it."""
     if s.method == EXPLICIT:

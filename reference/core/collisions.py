@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, add_row, assemble, is_active, push_rows
 from crossbody.reference.core.algebra import solve_schur
 from crossbody.reference.core.journal import full, move, write_event
@@ -56,12 +56,12 @@ def restitution(b0: float, b1: float) -> float:
     return float(np.exp(-2.0 * zeta * theta))
 
 
-@inlined
+@compiled
 def _touches(s: Any, m: Model, w: Work, b: Buffers, i: int) -> bool:
     return bool(m.beta[i, 0] > 0.0 and w.gap[i] <= s.touch and not is_active(b.mode[i]))
 
 
-@inlined
+@compiled
 def _choose(s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Mark the rows that take part in the next collision; the most approaching one, -1 if none approaches."""
     first, fastest = -1, -slow(s)
@@ -79,7 +79,7 @@ def _choose(s: Any, m: Model, w: Work, b: Buffers) -> int:
     return first
 
 
-@inlined
+@compiled
 def _list_rows(s: Any, m: Model, w: Work, b: Buffers) -> None:
     """The rows of the map: the held ones and those that take part."""
     na = 0
@@ -90,7 +90,7 @@ def _list_rows(s: Any, m: Model, w: Work, b: Buffers) -> None:
     s.na = na
 
 
-@inlined
+@compiled
 def _bounce(s: Any, m: Model, w: Work, j: int) -> float:
     """Restitution of the struck row in place j: 0 where it is captured, v < v* = press / (w e^(3/2))."""
     i = w.idx[j]
@@ -101,7 +101,7 @@ def _bounce(s: Any, m: Model, w: Work, j: int) -> float:
     return 0.0 if -w.hda[j] * np.sqrt(m.beta[i, 0]) * e * np.sqrt(e) < -fall else e
 
 
-@inlined
+@compiled
 def _impulses(K: Any, s: Any, m: Model, w: Work) -> int:
     """Solve the map for la, the impulses; leaves in ha the restitution of every row, -1 where it is not struck."""
     nq = s.nq
@@ -116,7 +116,7 @@ def _impulses(K: Any, s: Any, m: Model, w: Work) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _pulling(s: Any, m: Model, w: Work) -> int:
     """Place of the row that pulls most; -1 if all push. Rows that are always on, and those that follow, may pull."""
     worst, least, largest = -1, 0.0, 0.0
@@ -129,13 +129,13 @@ def _pulling(s: Any, m: Model, w: Work) -> int:
     return worst
 
 
-@inlined
+@compiled
 def _parted(w: Work, i: int) -> int:
     """The mode of a row that has let go."""
     return BALLISTIC if w.gap[i] < -DEEP else FREE
 
 
-@inlined
+@compiled
 def _let_go(s: Any, m: Model, w: Work, b: Buffers, i: int) -> None:
     """Take row i, and what follows it, out of the map."""
     if w.struck[i] != NOT:
@@ -149,7 +149,7 @@ def _let_go(s: Any, m: Model, w: Work, b: Buffers, i: int) -> None:
             b.mode[c] = b.mode[i]
 
 
-@inlined
+@compiled
 def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
     """The jump of v, its work in the ledger, and the end of the struck rows' collisions."""
     v = w.y[s.nq :]
@@ -167,7 +167,7 @@ def _apply(s: Any, m: Model, w: Work, b: Buffers) -> None:
             b.mode[i] = after_mode
 
 
-@inlined
+@compiled
 def _factor(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """M^-1 of the present state, and the free acceleration in vd, as the map asks for them; 1 if ill posed."""
     activate(s, m, w, b.mode)
@@ -199,7 +199,7 @@ def _one(K: Any, s: Any, m: Model, w: Work, b: Buffers, known: bool) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _endless(s: Any) -> bool:
     return bool(s.collisions_now > CEILING * (s.nc * s.nc + 16))
 
@@ -236,7 +236,7 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _name_touching(s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Mark the rows that collide for ever, for the message."""
     changed = b.history[len(b.history) - 1]

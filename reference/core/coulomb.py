@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.filters import STAGES_RANGE
 from crossbody.reference.core.friction import has_friction, is_tangent, slip_along, small_slip
 from crossbody.reference.core.guards import STOP
@@ -34,7 +34,7 @@ OPEN = 1e-8  # part of the terms of a change of v', squared, above which it is n
 SHARINGS = 3  # times that loads are shared anew: the normal ones follow from the tangential ones
 
 
-@inlined
+@compiled
 def begin(w: Work) -> None:
     """Forget what another run of the same workspace has left."""
     for left in (w.way, w.rest, w.tolerated):
@@ -42,13 +42,13 @@ def begin(w: Work) -> None:
     w.off[:], w.begins[:] = 0, 0
 
 
-@inlined
+@compiled
 def stopped_slip(s: Any) -> float:
     """The slip velocity below which a contact stands."""
     return float(STOPPED * small_slip(s))
 
 
-@inlined
+@compiled
 def slip_velocity(m: Model, i: int, rate: Array) -> float:
     """Size of the slip velocity of contact i, from the rates of all rows."""
     square = 0.0
@@ -57,7 +57,7 @@ def slip_velocity(m: Model, i: int, rate: Array) -> float:
     return float(np.sqrt(square))
 
 
-@inlined
+@compiled
 def face(m: Model, w: Work, i: int, rate: Array) -> None:
     """Take the direction of the present slip velocity of contact i for that of reference."""
     size = slip_velocity(m, i, rate)
@@ -65,7 +65,7 @@ def face(m: Model, w: Work, i: int, rate: Array) -> None:
         w.way[t], w.rest[t] = (rate[t] - m.drift[t]) / size, 0.0
 
 
-@inlined
+@compiled
 def note_speed(s: Any, m: Model, rate: Array) -> None:
     """Keep the largest speed seen at contacts with friction."""
     for i in range(s.nc):
@@ -73,7 +73,7 @@ def note_speed(s: Any, m: Model, rate: Array) -> None:
             s.slip_speed = max(s.slip_speed, slip_velocity(m, i, rate), abs(rate[i]))
 
 
-@inlined
+@compiled
 def follow_turns(s: Any, m: Model, w: Work) -> None:
     """Renew directions of slips that have turned by a right angle within a step, and do not stop; rates in w.rate."""
     for i in range(s.nc):
@@ -81,7 +81,7 @@ def follow_turns(s: Any, m: Model, w: Work) -> None:
             face(m, w, i, w.rate)
 
 
-@inlined
+@compiled
 def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
     """Take the directions of the present slip velocities for those of reference, where they are clear of zero."""
     note_speed(s, m, rate)
@@ -137,7 +137,7 @@ def undetermined(s: Any, m: Model, w: Work) -> bool:
     return False
 
 
-@inlined
+@compiled
 def _lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
     """Return the slip velocity (x, y) of contact i, one that is small lengthened along the direction of reference.
 
@@ -148,7 +148,7 @@ def _lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[
     return x + more * w.way[t], y + (more * w.way[t + 1] if m.tangents[i] > 1 else 0.0)
 
 
-@inlined
+@compiled
 def _directions(s: Any, m: Model, w: Work, turning: bool) -> None:
     """Leave in w.along the direction in which every sliding contact slides, or that of reference."""
     for j in range(s.na):
@@ -164,7 +164,7 @@ def _directions(s: Any, m: Model, w: Work, turning: bool) -> None:
             w.along[c + 1] = y / size if follows else w.way[t + 1]
 
 
-@inlined
+@compiled
 def _list_unknowns(s: Any, m: Model, w: Work) -> int:
     """List in w.unknown the places that are solved for, sticking tangential rows last; how many are not of those."""
     count = 0
@@ -182,7 +182,7 @@ def _list_unknowns(s: Any, m: Model, w: Work) -> int:
     return normals
 
 
-@inlined
+@compiled
 def _size(m: Model, w: Work, j: int) -> float:
     """Size of the row in place j, a tangential one by its normal row: it may be none that anything moves."""
     i = w.idx[j]
@@ -190,7 +190,7 @@ def _size(m: Model, w: Work, j: int) -> float:
     return float(np.sqrt(max(w.gram[normal, normal], w.gram[j, j])))
 
 
-@inlined
+@compiled
 def _fill(s: Any, m: Model, w: Work) -> None:
     """A of the unknowns in w.matrix, scaled by their sizes, which stand in w.size."""
     for a in range(s.unknowns):
@@ -248,7 +248,7 @@ def factor_complete(A: Floats, rows: int, columns: int, down: Index, across: Ind
     return min(rows, columns)
 
 
-@inlined
+@compiled
 def _solve_normal(B: Floats, n: int, x: Array) -> None:
     """X := B^-1 x of a symmetric positive definite B, which is overwritten by its Cholesky factor."""
     for i in range(n):
@@ -357,7 +357,7 @@ def factor_set(s: Any, m: Model, w: Work) -> None:
         _factor_in_turn(s, m, w)
 
 
-@inlined
+@compiled
 def _factor_in_turn(s: Any, m: Model, w: Work) -> None:
     """Factor the normal rows alone, and what they leave of the sticking ones."""
     count, total = s.normals, s.unknowns
@@ -406,7 +406,7 @@ def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
                 la[c] = -m.friction[i] * la[j] * w.along[c]
 
 
-@inlined
+@compiled
 def _solve_in_turn(s: Any, m: Model, w: Work) -> None:
     """Solve for w.found the normal rows, and in their null space the sticking ones, by loads that suit these."""
     count, sticking = s.normals, s.unknowns - s.normals
@@ -434,7 +434,7 @@ def _solve_in_turn(s: Any, m: Model, w: Work) -> None:
             w.found[a] = value
 
 
-@inlined
+@compiled
 def _weigh(s: Any, m: Model, w: Work) -> None:
     """Leave in w.weight the bound of every sticking row, mu lam_n, in the scale of its unknown."""
     count, most = s.normals, 0.0
@@ -487,14 +487,14 @@ def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
             out[i] = stiffness(s, m, w, j)
 
 
-@inlined
+@compiled
 def _across(m: Model, w: Work, i: int) -> tuple[float, float]:
     """Across the direction of slip of contact i: its part along both tangential rows."""
     first = w.listed[m.tangent[i]]
     return -w.along[first + 1], w.along[first]
 
 
-@inlined
+@compiled
 def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
     """Size of the slip velocity at the step's start by which contact i turns."""
     t = m.tangent[i]
@@ -503,7 +503,7 @@ def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
     return float(np.sqrt(x * x + y * y))
 
 
-@inlined
+@compiled
 def turning_rate(s: Any, m: Model, w: Work) -> float:
     """Fastest rate, 1/s, at which friction turns a slip into its own direction: mu lam_n / |v_t| over the mass there.
 
@@ -519,7 +519,7 @@ def turning_rate(s: Any, m: Model, w: Work) -> float:
     return float(fastest)
 
 
-@inlined
+@compiled
 def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
     """Fill w.la with what a turn of the slip of contact i by one radian makes of all multipliers; 1/|v_t|, or 0.
 
@@ -538,7 +538,7 @@ def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
     return float(1.0 / size)
 
 
-@inlined
+@compiled
 def _bound(m: Model, i: int, lam: Array) -> float:
     """Mu lam_n - |lam_t| of contact i, from the multipliers of all rows."""
     square = 0.0
@@ -547,7 +547,7 @@ def _bound(m: Model, i: int, lam: Array) -> float:
     return float(m.friction[i] * lam[i] - np.sqrt(square))
 
 
-@inlined
+@compiled
 def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
     """Whether a contact that sticks stays clear of its bound, as far as the stages tell."""
     low, high = np.inf, -np.inf
@@ -557,7 +557,7 @@ def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
     return bool(low > 0.0 and low > STAGES_RANGE * (high - low))
 
 
-@inlined
+@compiled
 def margin(m: Model, w: Work, i: int, la: Array) -> float:
     """Mu lam_n - |lam_t| of contact i."""
     square = 0.0

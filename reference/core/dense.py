@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import bogacki, dop853, esdirk, exact
 from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
 from crossbody.reference.core.algebra import solve_schur
@@ -30,7 +30,7 @@ def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _bend(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int, out: Array) -> None:
     """Out = q'' at an end y of the step: the difference of q' along k[stage]."""
     nq, short = s.nq, BEND_PART * s.hs
@@ -42,7 +42,7 @@ def _bend(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int, out
             out[i] = (w.turn[i] - out[i]) / (2.0 * short) if sign > 0 else w.turn[i]
 
 
-@inlined
+@compiled
 def _make_quintic(K: Any, s: Any, m: Model, w: Work) -> None:
     """What the interpolant asks for where q' is not v: q'' at both ends, and the integral of v over the step."""
     _bend(K, s, m, w, s.t_old, w.y, 0, w.bend[0])
@@ -58,7 +58,7 @@ def _make_quintic(K: Any, s: Any, m: Model, w: Work) -> None:
                 w.travel[i] += s.hs * bogacki.B[j] * w.stage_v[j, i]
 
 
-@inlined
+@compiled
 def _quintic(s: Any, w: Work, theta: float, h: float, out: Array) -> None:
     """Hermite interpolant of q, v and v' at both ends; its derivative is v.
 
@@ -101,13 +101,13 @@ def state(s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
         _quintic(s, w, theta, s.hs, out)
 
 
-@inlined
+@compiled
 def long_for_rows(s: Any) -> bool:
     """Whether the step is an implicit one, or an explicit one close to its limit of stability."""
     return bool(s.method == IMPLICIT or (s.method == EXPLICIT and s.hs * s.row_rate > RESOLVED))
 
 
-@inlined
+@compiled
 def _shift(K: Any, s: Any, m: Model, w: Work, t: float, q: Array) -> None:
     """Move q by what M^-1 H^T la is in positions: the change of q' with v."""
     w.slip[:] = 0.0
@@ -118,7 +118,7 @@ def _shift(K: Any, s: Any, m: Model, w: Work, t: float, q: Array) -> None:
         q[i] += w.turn[i] - w.place[i]
 
 
-@inlined
+@compiled
 def tolerated(s: Any) -> float:
     """What may be left of the rows' law where a motion is watched or written down."""
     return float(max(ARRIVED, ARRIVED_PART * s.rtol))
@@ -164,7 +164,7 @@ def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array, lef
     return False
 
 
-@inlined
+@compiled
 def ledger(s: Any, w: Work, theta: float, out: Array) -> None:
     """Out = the ledger at the part theta of the step."""
     if s.method == EXPLICIT:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import OWN, accelerate
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.dop853_table import DENSE_STAGES, E3, E5, STAGES, A, C, D
@@ -32,7 +32,7 @@ def derivative(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int
     return 0
 
 
-@inlined
+@compiled
 def keep(K: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array, stage: int) -> None:
     """k[stage] = (q', v') from the acceleration in the workspace, and the powers."""
     n, nq, k, vd = s.n, s.nq, w.k[stage], w.vd
@@ -48,7 +48,7 @@ def keep(K: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array, stage:
         powers(K, s, m, w, t, q, v, stage)
 
 
-@inlined
+@compiled
 def powers(K: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array, stage: int) -> None:
     """kz[stage] = power of every row's multiplier, of the inputs, of the damping."""
     nc, kz, idx, la, hda, e = s.nc, w.kz[stage], w.idx, w.la, w.hda, w.e
@@ -85,7 +85,7 @@ def _combine(base: Array, k: Floats, stage: int, h: float, out: Array) -> None:
         out[i] = base[i] + h * total
 
 
-@inlined
+@compiled
 def _error(s: Any, w: Work, h: float) -> float:
     """Hairer's norm of the two embedded estimates; 1 is the tolerance. NaN where a stage was NaN."""
     sum5, sum3 = 0.0, 0.0
@@ -103,13 +103,13 @@ def _error(s: Any, w: Work, h: float) -> float:
     return float(abs(h) * sum5 / np.sqrt((sum5 + 0.01 * sum3) * size))
 
 
-@inlined
+@compiled
 def watch_guards(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
     """Keep the discrete variables' guards at a stage."""
     K.watch(t, w.ys[: s.nq], w.ys[s.nq :], m.p, w.guard_at[place])
 
 
-@inlined
+@compiled
 def watch_multipliers(s: Any, w: Work, stage: int) -> None:
     """Keep the multipliers at a stage: a free filter for events."""
     lam_at, la, idx = w.lam_at, w.la, w.idx
@@ -117,14 +117,14 @@ def watch_multipliers(s: Any, w: Work, stage: int) -> None:
         lam_at[stage, idx[j]] = la[j]
 
 
-@inlined
+@compiled
 def keep_velocity(s: Any, w: Work, stage: int) -> None:
     """Keep v at a stage where k has q' instead: its integral over the step shapes the interpolant."""
     if s.has_velocity:
         copy(w.ys[s.nq :], w.stage_v[stage])
 
 
-@inlined
+@compiled
 def watch_gaps(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> None:
     """Keep the gaps at a stage."""
     s.guards += 1
@@ -165,7 +165,7 @@ def make_dense(K: Any, s: Any, m: Model, w: Work) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _polynomial(y: Array, y1: Array, k: Floats, h: float, F: Floats) -> None:
     for i in range(len(y)):
         delta = y1[i] - y[i]

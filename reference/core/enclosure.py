@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.layout import FUNCTIONS_MOST, NODES
 from crossbody.reference.kinds import Array
 
@@ -57,7 +57,7 @@ MEASURED = BOUNDS + FUNCTIONS_MOST  # the g that was measured at the line's new 
 BESIDE = MEASURED + FUNCTIONS_MOST  # and beside a gap its slopes, beside the rate of a catch the gap
 
 
-@inlined
+@compiled
 def sign(row: Array, j: int) -> int:
     """How function j of an interval lies to zero, as far as its bounds tell."""
     at = j * NODES
@@ -93,7 +93,7 @@ def judge(row: Array, count: int) -> int:
     return HERE if sure else HALVE
 
 
-@inlined
+@compiled
 def decay(row: Array, at: int) -> float:
     """A bound on g from the last two Chebyshev coefficients of P."""
     third, fourth = 0.0, 0.0
@@ -103,7 +103,7 @@ def decay(row: Array, at: int) -> float:
     return float(FIFTH * max(0.5 * abs(fourth), 0.125 * abs(third)))
 
 
-@inlined
+@compiled
 def from_slopes(row: Array) -> float:
     """A bound on g of a gap from its slopes at the five places."""
     most = 0.0
@@ -115,7 +115,7 @@ def from_slopes(row: Array) -> float:
     return float(SAFETY * most)
 
 
-@inlined
+@compiled
 def from_gaps(row: Array, rate: int, gap: int, width: float, band: float) -> float:
     """A bound on g of a rate that stands at `rate` from what the gap, which stands at `gap`, gains between places.
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, OWN, SMOOTH, accelerate, push_rows
 from crossbody.reference.core.algebra import ULP, factor_lu, solve_lu, solve_schur
 from crossbody.reference.core.dop853 import (
@@ -64,7 +64,7 @@ def jacobian(K: Any, s: Any, m: Model, w: Work, h: float) -> int:
     return _newton_matrix(s, w, h)
 
 
-@inlined
+@compiled
 def _tangent(K: Any, s: Any, m: Model, w: Work, q: Any) -> None:
     """Columns of N(q), from q' at unit velocities less q' at rest."""
     w.slip[:] = 0.0
@@ -77,7 +77,7 @@ def _tangent(K: Any, s: Any, m: Model, w: Work, q: Any) -> None:
             w.tangent[a, c] = w.turn[a] - w.place[a]
 
 
-@inlined
+@compiled
 def _displace(s: Any, w: Work, c: int, step: float) -> None:
     """Leave in ys the state moved by a step of position c, or of velocity c - n."""
     w.ys[:] = w.y
@@ -90,7 +90,7 @@ def _displace(s: Any, w: Work, c: int, step: float) -> None:
         w.ys[c] = w.y[c] + step
 
 
-@inlined
+@compiled
 def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
     """Subtract M^-1 H^T (G^-1)_.j (a0_j + 3 a2_j h_j^2, a1_j) H_j."""
     i = w.idx[j]
@@ -111,7 +111,7 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
             w.Jv[a, c] -= w.d[a] * w.law[i, 1] * w.H[j, c]
 
 
-@inlined
+@compiled
 def _slip_part(s: Any, m: Model, w: Work, i: int) -> None:
     """Add what follows from friction that turns with the slip of contact i."""
     turn = ask(TURN_PART, s, m, w, i)
@@ -125,7 +125,7 @@ def _slip_part(s: Any, m: Model, w: Work, i: int) -> None:
             w.Jv[a, b] += w.d[a] * turn * (w.along[c] * w.H[c + 1, b] - w.along[c + 1] * w.H[c, b])
 
 
-@inlined
+@compiled
 def _smooth_part(K: Any, s: Any, m: Model, w: Work) -> int:
     """Central differences of the acceleration without the rows' law, so that no stiff term is differenced."""
     n, nq = s.n, s.nq
@@ -146,7 +146,7 @@ def _smooth_part(K: Any, s: Any, m: Model, w: Work) -> int:
     return failed
 
 
-@inlined
+@compiled
 def _newton_matrix(s: Any, w: Work, h: float) -> int:
     g = h * GAMMA
     for a in range(s.n):
@@ -158,7 +158,7 @@ def _newton_matrix(s: Any, w: Work, h: float) -> int:
     return factor_lu(w.J, s.n, w.pivot)
 
 
-@inlined
+@compiled
 def _residual(s: Any, w: Work, g: float) -> None:
     """D = -(V - V* - g a) with V* kept in w.g."""
     n, nq = s.n, s.nq
@@ -166,7 +166,7 @@ def _residual(s: Any, w: Work, g: float) -> None:
         w.d[a] = w.g[a] + g * w.vd[a] - w.ys[nq + a]
 
 
-@inlined
+@compiled
 def _update(K: Any, s: Any, m: Model, w: Work, t: float, g: float) -> float:
     """Solve for the correction, apply it to V and Q; returns its size in units of the tolerance."""
     n, nq = s.n, s.nq
@@ -181,7 +181,7 @@ def _update(K: Any, s: Any, m: Model, w: Work, t: float, g: float) -> float:
     return max(size, _follow(K, s, m, w, t, g)) if s.has_velocity else size
 
 
-@inlined
+@compiled
 def _follow(K: Any, s: Any, m: Model, w: Work, t: float, g: float) -> float:
     """Move Q to where Q = Q* + g q'(Q, V), with Q* in w.place.
 
@@ -203,13 +203,13 @@ def _follow(K: Any, s: Any, m: Model, w: Work, t: float, g: float) -> float:
     return np.inf
 
 
-@inlined
+@compiled
 def _scale(s: Any, w: Work, i: int) -> float:
     """Tolerance of component i, floored where rounding of a stiff row's gap would drown it."""
     return float(max(w.atol[i] + s.rtol * abs(w.y[i]), 1e-15 * (1.0 + abs(w.y[i]))))
 
 
-@inlined
+@compiled
 def _predict(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> bool:
     """Q*, V* of the stage in ys and g, and a first V that continues the last acceleration; False if no Q follows."""
     nq, g = s.nq, h * GAMMA
@@ -231,7 +231,7 @@ def _predict(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> bool:
     return bool(not s.has_velocity or _follow(K, s, m, w, s.t + C[stage] * h, g) < np.inf)
 
 
-@inlined
+@compiled
 def _stage(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> int:
     """Newton for one stage; 0 done, 1 ill posed, 2 no convergence."""
     n, nq, g, t = s.n, s.nq, h * GAMMA, s.t + C[stage] * h
@@ -258,7 +258,7 @@ def _stage(K: Any, s: Any, m: Model, w: Work, stage: int, h: float) -> int:
     return 2
 
 
-@inlined
+@compiled
 def _error(s: Any, w: Work, h: float) -> float:
     """Embedded estimate, filtered by the Newton matrix so that decayed stiff modes do not count."""
     n, nq, g = s.n, s.nq, h * GAMMA
@@ -285,7 +285,7 @@ def _error(s: Any, w: Work, h: float) -> float:
     return float(np.sqrt(total / (nq + n)))
 
 
-@inlined
+@compiled
 def _slipped(s: Any, w: Work, c: int, h: float) -> float:
     """Embedded estimate of what v adds up to over the step: a position's, in the coordinates of v."""
     total = E[0] * w.y[s.nq + c]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
@@ -55,7 +55,7 @@ from crossbody.reference.core.search import first_below, opens
 from crossbody.reference.kinds import Bytes
 
 
-@inlined
+@compiled
 def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """Earliest switching of row i under the level and the memoryless machine; its guard in kind[i]."""
     other = NONE
@@ -93,7 +93,7 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     return place
 
 
-@inlined
+@compiled
 def _first_edge(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """The edge machine looks at the step's ends only, and only for what becomes true."""
     w.bands[:] = 0.0
@@ -114,7 +114,7 @@ def _first_edge(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float
     return NEVER
 
 
-@inlined
+@compiled
 def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     """Gaps and rates, and the multipliers if asked, at the inner nodes; at the end as well where the rows move it."""
     for node in range(1, NODES if s.method == EXPLICIT and dense.long_for_rows(s) else NODES - 1):
@@ -143,7 +143,7 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Take the discrete variables' guards into s.theta; 0 or a negative code."""
     watched = False
@@ -166,7 +166,7 @@ def _scan_switches(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _all_free(s: Any, m: Model, mode: Bytes) -> bool:
     """Whether nothing but free flight in closed form is under way."""
     if s.method != EXACT or s.na > 0 or s.fsm == EDGE:
@@ -222,7 +222,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _tie(s: Any, w: Work) -> None:
     """Rows that switch within rounding of the first switch together, at the last of them."""
     together = s.theta + 8.0 * ULP * max(abs(s.t_old) / s.hs, 1.0)
@@ -231,7 +231,7 @@ def _tie(s: Any, w: Work) -> None:
             s.theta = max(s.theta, w.hit[i])
 
 
-@inlined
+@compiled
 def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether row i touches with another that has just been found to: it closes, and is as near as positions are known.
 
@@ -243,7 +243,7 @@ def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     return bool(not collides and w.rate[i] < -slow(s) and abs(w.gap[i]) <= known(s, w))
 
 
-@inlined
+@compiled
 def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
     """The mode that the fired guard of row i leads to.
 

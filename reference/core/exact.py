@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
 from crossbody.reference.core.algebra import inverse_diagonal, solve_schur
 from crossbody.reference.core.layout import Model, Work
@@ -45,7 +45,7 @@ def linear_arc(a0: float, a1: float, h: float, hd: float, t: float) -> tuple[flo
     return decay * (h * even + (hd + sigma * h) * t * odd), decay * (hd * even - (sigma * hd + a0 * h) * t * odd)
 
 
-@inlined
+@compiled
 def _half_contact(a0: float, a1: float) -> float:
     """Half the duration of a contact that starts at h = 0 (spec 1.3): the natural length of an arc."""
     if a0 == 0.0:
@@ -74,7 +74,7 @@ def is_linear(s: Any, w: Work) -> bool:
     return True
 
 
-@inlined
+@compiled
 def _stays(s: Any, w: Work, unilateral: Bytes) -> bool:
     """Whether no active multiplier can vanish any more: its resting part exceeds all that the gaps still hold.
 
@@ -108,7 +108,7 @@ def plan(s: Any, w: Work, unilateral: Bytes) -> float:
     return length
 
 
-@inlined
+@compiled
 def begin(K: Any, s: Any, m: Model, w: Work) -> None:
     """Leave in g the acceleration that holds the active rows; k[0] must be that of the arc's start."""
     n = s.n
@@ -126,7 +126,7 @@ def begin(K: Any, s: Any, m: Model, w: Work) -> None:
     _push(s, m, w, -1.0, w.g)
 
 
-@inlined
+@compiled
 def _push(s: Any, m: Model, w: Work, sign: float, out: Array) -> None:
     """Out += sign M^-1 H^T G^-1 r."""
     solve_schur(w.G, s.na, w.reach, w.r, w.la)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import bogacki, dop853_table, esdirk
 from crossbody.reference.core.algebra import inverse_diagonal
 from crossbody.reference.core.friction import HOLDS_ON, ask
@@ -36,7 +36,7 @@ CLEAR = 5.5  # of five values: one whose least is so many times their range pass
 GAPS_OFF = 0.2  # twice the most that x^2 (1 - x)^2 times a parabola of 1 at the three stages comes to
 
 
-@inlined
+@compiled
 def _stays_clear(start: float, middle: float, end: float, place: float, off: float) -> bool:
     """Whether a function is positive in the step: the parabola through three of its values, less what it may be off."""
     turn = (middle - (1.0 - place) ** 2 * start - place**2 * end) / (2.0 * place * (1.0 - place))
@@ -46,7 +46,7 @@ def _stays_clear(start: float, middle: float, end: float, place: float, off: flo
     return bool(least > STAGES_OFF * off)
 
 
-@inlined
+@compiled
 def _multiplier_range(s: Any, w: Work, i: int) -> tuple[float, float]:
     """Least and largest multiplier of an active row at the stages and at both ends."""
     start, end = w.lams[0, i], w.lams[NODES - 1, i]
@@ -56,7 +56,7 @@ def _multiplier_range(s: Any, w: Work, i: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-@inlined
+@compiled
 def _presses_on(s: Any, w: Work, i: int) -> bool:
     """Whether the multiplier of an active row stays positive, as far as the stages tell."""
     last, middle = NODES - 1, 9 if s.method == EXPLICIT else 1
@@ -71,7 +71,7 @@ def _presses_on(s: Any, w: Work, i: int) -> bool:
     return _stays_clear(start, half, end, stage_place(s, middle), off)
 
 
-@inlined
+@compiled
 def _stays_elastic(s: Any, w: Work, i: int) -> bool:
     """Whether a COLLISION cannot hand over in the step: what moves its gap outweighs its multiplier at the step's end.
 
@@ -90,7 +90,7 @@ def _stays_elastic(s: Any, w: Work, i: int) -> bool:
     return False
 
 
-@inlined
+@compiled
 def _parabola(start: float, middle: float, end: float, place: float, c: float) -> float:
     """Value at c of the parabola through three values, of which the second stands at `place`."""
     return float(
@@ -100,7 +100,7 @@ def _parabola(start: float, middle: float, end: float, place: float, c: float) -
     )
 
 
-@inlined
+@compiled
 def stage_place(s: Any, stage: int) -> float:
     """Where a stage of the method stands in the step."""
     if s.method == EXPLICIT:
@@ -108,7 +108,7 @@ def stage_place(s: Any, stage: int) -> float:
     return float(esdirk.C[stage]) if s.method == IMPLICIT else float(bogacki.C[stage])
 
 
-@inlined
+@compiled
 def _between(s: Any, place: int) -> float:
     """Where the stage stands at which gaps and guards were looked at."""
     if s.method == EXPLICIT:
@@ -116,7 +116,7 @@ def _between(s: Any, place: int) -> float:
     return stage_place(s, place + 2)
 
 
-@inlined
+@compiled
 def _stays_open(s: Any, w: Work, i: int) -> bool:
     """Whether a gap stays positive: the cubic through its ends and slopes, less what three stages are off it.
 
@@ -137,7 +137,7 @@ def _stays_open(s: Any, w: Work, i: int) -> bool:
     return bool(low > GAPS_OFF * off)
 
 
-@inlined
+@compiled
 def row_may_switch(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether a row may switch in this step, by bounds from what the stages have evaluated anyway."""
     if s.method == EXACT or s.fsm != LEVEL:
@@ -151,7 +151,7 @@ def row_may_switch(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     return mode[i] != CONTACT or not _presses_on(s, w, i)
 
 
-@inlined
+@compiled
 def switch_may_fire(s: Any, w: Work, i: int) -> bool:
     """Whether the guard of a discrete variable may fire in this step."""
     if s.method == EXACT:

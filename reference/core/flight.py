@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.guards import TOUCH, TOUCH_INSIDE
 from crossbody.reference.core.layout import NEVER, NODES, Work
 from crossbody.reference.core.machine import slow
 
 
-@inlined
+@compiled
 def _fall(h: float, rate: float, a: float) -> float:
     """Last time at which h + rate t + a t^2/2 falls to zero; 0 if it is below all along, infinite if it never falls."""
     square = rate * rate - 2.0 * a * h
@@ -23,7 +23,7 @@ def _fall(h: float, rate: float, a: float) -> float:
     return float((rate + np.sqrt(square)) / -a) if a < 0.0 else np.inf
 
 
-@inlined
+@compiled
 def free_flight(s: Any, w: Work, i: int) -> float:
     """First touch of a FREE row in free flight, where its gap is a parabola: in closed form."""
     h, rate, end = w.gaps[0, i], w.rates[0, i], w.rates[NODES - 1, i]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate
 from crossbody.reference.core.algebra import factor_lu
 from crossbody.reference.core.layout import ILL_POSED, Buffers, Model, Work
@@ -23,7 +23,7 @@ FLAT = 1e-3  # part of its value at the start below which a pivot has vanished
 LEANING = 0.5  # part of it above which no step can have passed through a fold
 
 
-@inlined
+@compiled
 def _keep_rows(s: Any, m: Model, w: Work) -> None:
     """Remember M^-1 H^T for the step that begins here."""
     for j in range(s.na):
@@ -70,7 +70,7 @@ def _turned_over(s: Any, m: Model, w: Work) -> bool:
     return bool(sign < 0.0)
 
 
-@inlined
+@compiled
 def passed(s: Any, m: Model, w: Work, b: Buffers) -> int:
     """ILL_POSED if the rows at the step's end, just evaluated, have lost rank on the way; 0 if not.
 

@@ -14,7 +14,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.layout import SLIP, Model, Work
 from crossbody.reference.kinds import Array, Bytes
 
@@ -51,19 +51,19 @@ def ask(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     return _call(s.friction_code, what, s, m, w, i)  # type: ignore[no-any-return]
 
 
-@inlined
+@compiled
 def has_friction(m: Model, i: int) -> bool:
     """Whether row i is the normal row of a contact with friction."""
     return bool(m.tangents[i] > 0)
 
 
-@inlined
+@compiled
 def small_slip(s: Any) -> float:
     """The slip velocity below which the direction of the last step's start holds."""
     return float(max(SMALL_SLIP, SMALL_SLIP_STEPS * s.rtol) * s.slip_speed + s.atol)
 
 
-@inlined
+@compiled
 def slip_along(m: Model, w: Work, i: int, rate: Array) -> float:
     """Slip velocity of contact i along its direction of reference, against that with which it began."""
     total = 0.0
@@ -72,7 +72,7 @@ def slip_along(m: Model, w: Work, i: int, rate: Array) -> float:
     return float(total)
 
 
-@inlined
+@compiled
 def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     """Write which rows slide: a normal row whose tangential ones are not solved for, and these; they have no law."""
     for i in range(s.nc):
@@ -85,13 +85,13 @@ def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
                 w.law[t, 0], w.law[t, 1], w.law[t, 2] = 0.0, 0.0, 0.0
 
 
-@inlined
+@compiled
 def is_tangent(m: Model, i: int) -> bool:
     """Whether row i is a tangential row of a contact with friction."""
     return bool(m.follows[i] >= 0 and m.tangents[m.follows[i]] > 0)
 
 
-@inlined
+@compiled
 def is_shared(s: Any, m: Model, w: Work, i: int) -> bool:
     """Whether row i has no law of its own to follow: it slides, or it sticks with others that it depends on."""
     return bool(is_tangent(m, i) and (w.slides[i] or s.dependent_rows > 0))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
@@ -23,7 +23,7 @@ ON_BOUND = 1e-9  # part of the bound of a contact's friction below which one tha
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 
 
-@inlined
+@compiled
 def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float, known: bool) -> float:
     """Lam of the active row i at the state in ys; `known` if it is there already."""
     if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN) != 0:
@@ -34,7 +34,7 @@ def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, t: float, known: bool
     return np.nan
 
 
-@inlined
+@compiled
 def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float, known: bool) -> None:
     """Elastic part c |h'| + b0 |h| less eps lam_i / (G^-1)_ii: positive while the elastic part of lam still counts.
 
@@ -53,13 +53,13 @@ def _handover(K: Any, s: Any, m: Model, w: Work, i: int, t: float, known: bool) 
     w.parts[2], w.parts[3] = spring - elastic - inertial, -elastic - spring - inertial
 
 
-@inlined
+@compiled
 def rise(s: Any) -> float:
     """How far a gap must open before a row is FREE: one without memory, held at the surface, rounds to either side."""
     return float(s.touch) if s.fsm == MEMORYLESS else 0.0
 
 
-@inlined
+@compiled
 def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
     """Where the functions of a guard count as zero: at zero if they start clearly off it, else beyond what is noise.
 
@@ -82,7 +82,7 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
             w.bands[0] = 2.0 * begun
 
 
-@inlined
+@compiled
 def _of_friction(K: Any, s: Any, m: Model, w: Work, what: int, i: int, t: float, y: Array) -> None:
     """Leave in w.parts how far contact i is from sliding (MARGIN), or from a jam (STIFFNESS)."""
     w.parts[0] = np.nan
@@ -133,14 +133,14 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
         w.parts[j] += w.bands[j]
 
 
-@inlined
+@compiled
 def guard(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, theta: float) -> float:
     """Value of one guard at the part theta of the step: positive until it fires."""
     functions(K, s, m, w, mode, kind, i, theta)
     return largest(w, FUNCTIONS[kind])
 
 
-@inlined
+@compiled
 def largest(w: Work, count: int) -> float:
     """The largest of a guard's functions."""
     value = w.parts[0]
@@ -149,7 +149,7 @@ def largest(w: Work, count: int) -> float:
     return float(value)
 
 
-@inlined
+@compiled
 def _rounding(s: Any, w: Work) -> float:
     """What rounding of the positions makes of a gap."""
     largest = 0.0
@@ -158,7 +158,7 @@ def _rounding(s: Any, w: Work) -> float:
     return 8.0 * ULP * largest
 
 
-@inlined
+@compiled
 def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, row: Array) -> float:
     """A guard's functions at the nodes, and in w.tiny what rounding makes of them.
 
@@ -198,7 +198,7 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     return float(scale)
 
 
-@inlined
+@compiled
 def _lift(row: Array, count: int) -> None:
     """Let a guard that starts below zero start at zero: it fires if it falls from there."""
     most = 0
@@ -207,7 +207,7 @@ def _lift(row: Array, count: int) -> None:
     row[most * NODES] = max(row[most * NODES], 0.0)
 
 
-@inlined
+@compiled
 def at_node(node: int) -> float:
     """Place of a node in the step, 0 to 1."""
     return node / (NODES - 1.0)
@@ -239,7 +239,7 @@ def root(
     return x2 if f1 > 0.0 else x1
 
 
-@inlined
+@compiled
 def _next_part(x1: float, f1: float, x2: float, f2: float, x3: float, f3: float) -> float:
     """Part of the way from x1 to x2: inverse quadratic interpolation where it is safe, bisection where not."""
     if x3 in (x1, x2) or f3 in (f1, f2):

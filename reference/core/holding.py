@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import (
     GENERAL,
     accelerate,
@@ -40,7 +40,7 @@ DOUBT = 1e-4  # part of a row's diagonal below which a pivot may have lost what 
 CHANGES = 64  # times the number of rows: changes of the set that carries; more never end
 
 
-@inlined
+@compiled
 def _evaluate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Evaluate all rows in contact: w.gram, w.r, w.allowed; False if in this order they are ill posed."""
     q, v = w.y[: s.nq], w.y[s.nq :]
@@ -71,7 +71,7 @@ def doubtful(s: Any, w: Work) -> bool:
     return bool(s.dependent > 0)
 
 
-@inlined
+@compiled
 def _order_by_pivots(s: Any, w: Work) -> int:
     """List the rows in contact by pivots of w.gram, those that are always on first; return their rank."""
     L, rank = w.part, 0
@@ -105,7 +105,7 @@ def _order_by_pivots(s: Any, w: Work) -> int:
     return rank
 
 
-@inlined
+@compiled
 def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Evaluate all rows in contact, the most independent ones first; their rank, -1 if ill posed."""
     w.idle_rows[:] = 0
@@ -114,7 +114,7 @@ def _look(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return rank if _evaluate(K, s, m, w, b) else -1
 
 
-@inlined
+@compiled
 def _factor(s: Any, w: Work) -> bool:
     """Cholesky factor of w.gram of the rows that carry, in w.part; False if they depend on each other."""
     L = w.part
@@ -131,7 +131,7 @@ def _factor(s: Any, w: Work) -> bool:
     return True
 
 
-@inlined
+@compiled
 def _solve(s: Any, w: Work, x: Any) -> None:
     """X := w.gram^-1 x of the rows that carry, in place, from the factor in w.part."""
     L = w.part
@@ -147,7 +147,7 @@ def _solve(s: Any, w: Work, x: Any) -> None:
                 x[c] -= L[i, c] * x[i] if w.carries[c] else 0.0
 
 
-@inlined
+@compiled
 def _go(s: Any, w: Work, part: float) -> None:
     """Move w.share towards w.trial; rows that arrive at zero carry no longer."""
     for j in range(s.na):
@@ -157,7 +157,7 @@ def _go(s: Any, w: Work, part: float) -> None:
             w.carries[j] = not falls
 
 
-@inlined
+@compiled
 def _settle_shares(s: Any, w: Work) -> bool:
     """Let the rows that carry keep their laws, less those that would have to pull; False if they are dependent."""
     while True:
@@ -175,7 +175,7 @@ def _settle_shares(s: Any, w: Work) -> bool:
             return True
 
 
-@inlined
+@compiled
 def _excess(s: Any, w: Work, j: int) -> float:
     """A of the row in place j: by how much faster than its law its gap opens."""
     total = -w.r[j]
@@ -184,13 +184,13 @@ def _excess(s: Any, w: Work, j: int) -> float:
     return float(total)
 
 
-@inlined
+@compiled
 def _allowed(m: Model, w: Work, j: int) -> float:
     """By how much the row in place j may be off its law under the shares that were weighed."""
     return float(w.allowed[j] + ROUNDING * pushed(m, w, j))
 
 
-@inlined
+@compiled
 def _most_pressed(s: Any, m: Model, w: Work) -> int:
     """Place of the row that is furthest below its law, -1 for none; of those that were let go just now at last."""
     weigh(s, m, w, w.share)
@@ -207,7 +207,7 @@ def _most_pressed(s: Any, m: Model, w: Work) -> int:
     return -1
 
 
-@inlined
+@compiled
 def _exchange(s: Any, w: Work, j: int) -> bool:
     """Let row j carry; one that depends on those that do takes the place of one. False if none can give way."""
     left = w.gram[j, j]
@@ -248,7 +248,7 @@ def _carry(s: Any, m: Model, w: Work) -> bool:
     return False
 
 
-@inlined
+@compiled
 def _let_go(s: Any, w: Work, b: Buffers, i: int) -> None:
     """Release row i."""
     w.let_go[i] = s.t
@@ -256,7 +256,7 @@ def _let_go(s: Any, w: Work, b: Buffers, i: int) -> None:
     b.history[len(b.history) - 1, i] = 1
 
 
-@inlined
+@compiled
 def _lift(s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Release the rows whose gaps open faster than their law; whether there were any."""
     lifted = False
@@ -270,7 +270,7 @@ def _lift(s: Any, m: Model, w: Work, b: Buffers) -> bool:
     return lifted
 
 
-@inlined
+@compiled
 def _rank(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Rank of the rows in contact that are not idle, evaluated with their multipliers; -1 if ill posed."""
     activate(s, m, w, b.mode)
@@ -279,7 +279,7 @@ def _rank(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return int(s.na - s.dependent)
 
 
-@inlined
+@compiled
 def _rest_the_spent(K: Any, s: Any, m: Model, w: Work, b: Buffers, rank: int) -> bool:
     """Let rows whose multipliers vanished idle; whether one that none can replace was released instead."""
     moved = False
@@ -293,7 +293,7 @@ def _rest_the_spent(K: Any, s: Any, m: Model, w: Work, b: Buffers, rank: int) ->
     return moved
 
 
-@inlined
+@compiled
 def _most_pulling(s: Any, w: Work) -> int:
     """The row that pulls most beyond its noise; -1 if none does."""
     found, least = -1, 0.0
@@ -304,7 +304,7 @@ def _most_pulling(s: Any, w: Work) -> int:
     return found
 
 
-@inlined
+@compiled
 def _all_push(s: Any, m: Model, w: Work) -> bool:
     """Whether the multipliers of least norm push, so that no row has to let go.
 
@@ -317,7 +317,7 @@ def _all_push(s: Any, m: Model, w: Work) -> bool:
     return bool(_most_pulling(s, w) < 0)
 
 
-@inlined
+@compiled
 def _fewest(K: Any, s: Any, m: Model, w: Work, b: Buffers, rank: int) -> None:
     """Let all rows idle but the smallest set that carries, and what it lacks to hold the others."""
     for i in range(s.nc):
@@ -331,7 +331,7 @@ def _fewest(K: Any, s: Any, m: Model, w: Work, b: Buffers, rank: int) -> None:
             known = max(found, known)
 
 
-@inlined
+@compiled
 def _share(K: Any, s: Any, m: Model, w: Work, b: Buffers, rank: int) -> int:
     """Let rows that would pull idle as long as the others hold them."""
     for _ in range(s.nc + 1):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.layout import Buffers, Model, Work
 from crossbody.reference.kinds import Bytes
 
 
-@inlined
+@compiled
 def write_event(s: Any, b: Buffers, i: int, before: int, after: int, impulse: float) -> None:
     """Note one transition."""
     e = s.events
@@ -21,7 +21,7 @@ def write_event(s: Any, b: Buffers, i: int, before: int, after: int, impulse: fl
         s.events = e + 1
 
 
-@inlined
+@compiled
 def move(s: Any, b: Buffers, i: int, after: int) -> None:
     """Put row i in another mode, and note it."""
     write_event(s, b, i, b.mode[i], after, 0.0)
@@ -56,7 +56,7 @@ def remember(s: Any, b: Buffers) -> bool:
     return True
 
 
-@inlined
+@compiled
 def _same(one: Bytes, other: Bytes) -> bool:
     """Whether two mode sets are equal."""
     differing = 0
@@ -65,7 +65,7 @@ def _same(one: Bytes, other: Bytes) -> bool:
     return differing == 0
 
 
-@inlined
+@compiled
 def keep_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Copy the modes and the discrete variables, to see afterwards what a switch changed."""
     first = len(m.p) - s.latched - s.nd
@@ -75,7 +75,7 @@ def keep_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
         w.before[i] = b.mode[i]
 
 
-@inlined
+@compiled
 def write_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Note what a switch changed."""
     first = len(m.p) - s.latched - s.nd
@@ -91,7 +91,7 @@ def write_discrete(s: Any, m: Model, w: Work, b: Buffers) -> None:
             write_event(s, b, i, w.before[i], b.mode[i], 0.0)
 
 
-@inlined
+@compiled
 def full(s: Any, b: Buffers) -> bool:
     """Whether the next instant may not find room for its events; those not to be kept are counted and dropped."""
     room = 16 * s.nc + 16

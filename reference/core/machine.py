@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import (
     GENERAL,
     accelerate,
@@ -56,13 +56,13 @@ TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is c
 LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 
 
-@inlined
+@compiled
 def slow(s: Any) -> float:
     """The rate below which a gap is taken to stand still."""
     return float(SLOW * s.speed)
 
 
-@inlined
+@compiled
 def known(s: Any, w: Work) -> float:
     """To what a gap is known, as far as the tolerance of the positions tells."""
     largest = 0.0
@@ -82,7 +82,7 @@ def active_mode(s: Any, m: Model, w: Work, i: int) -> int:
     return COLLISION if m.beta[i, 0] > 0.0 and not s.frozen else CONTACT
 
 
-@inlined
+@compiled
 def released_mode(mode: int, h: float) -> int:
     """Where a row goes whose multiplier vanished."""
     if h > 0.0:
@@ -90,7 +90,7 @@ def released_mode(mode: int, h: float) -> int:
     return COLLISION_SEPARATION if mode == COLLISION else BALLISTIC
 
 
-@inlined
+@compiled
 def _from_state(s: Any, w: Work, i: int) -> float:
     """What rounding of the state makes of row i's law."""
     position, speed = 0.0, 0.0
@@ -101,7 +101,7 @@ def _from_state(s: Any, w: Work, i: int) -> float:
     return float(8.0 * ULP * (w.law[i, 0] * position + w.law[i, 1] * speed))
 
 
-@inlined
+@compiled
 def touching(s: Any, w: Work) -> float:
     """How large a gap rounding alone can make of a touch."""
     largest = 1.0
@@ -110,7 +110,7 @@ def touching(s: Any, w: Work) -> float:
     return float(TOUCHING * largest)
 
 
-@inlined
+@compiled
 def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
     """What the law of a row that came to rest makes of a gap that counts as closed and a rate that counts as none.
 
@@ -121,7 +121,7 @@ def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
     return float(w.law[i, 0] * s.touch + w.law[i, 1] * slow(s))
 
 
-@inlined
+@compiled
 def noise(s: Any, m: Model, w: Work) -> None:
     """What rounding of the state and of the sums, and what collisions left, can make of each multiplier.
 
@@ -152,7 +152,7 @@ def noise(s: Any, m: Model, w: Work) -> None:
         _spread_left_over(s, w)
 
 
-@inlined
+@compiled
 def _spread_left_over(s: Any, w: Work) -> None:
     """Add to every row's noise the most that G^-1 r can be in it, whatever the signs: r in w.r; Cauchy and Schwarz."""
     solve_schur(w.G, s.na, w.reach, w.r, w.Hdv)
@@ -210,7 +210,7 @@ def multiplier_if_active(
     return float(lam)
 
 
-@inlined
+@compiled
 def _off_law(m: Model, w: Work, j: int, i: int, on: float, v: Any, vd: Any) -> tuple[float, float]:
     """H'' and on (1 or 0) times a1 h' + a0 h + a2 h^3 of row i, evaluated in place j, and the size of the terms."""
     push, size, rate = w.Hdv[j], abs(w.Hdv[j]), 0.0
@@ -223,7 +223,7 @@ def _off_law(m: Model, w: Work, j: int, i: int, on: float, v: Any, vd: Any) -> t
     return push + on * (a1 * rate + spring), size + on * (a1 * abs(rate) + abs(spring))
 
 
-@inlined
+@compiled
 def _alone(K: Any, m: Model, w: Work, j: int, i: int, t: float, q: Any, v: Any) -> None:
     """Evaluate row i in place j, behind the active ones."""
     w.idx[j] = i
@@ -231,7 +231,7 @@ def _alone(K: Any, m: Model, w: Work, j: int, i: int, t: float, q: Any, v: Any) 
     K.rows(t, q, v, m.p, w.w, w.idx[j:], 1, w.H[j:], w.ha[j:], w.Hdv[j:])
 
 
-@inlined
+@compiled
 def _stirred(s: Any, m: Model, w: Work, j: int) -> float:
     """What rounding of the active rows' multipliers makes of the law of the row in place j, behind them."""
     if s.na == 0:
@@ -249,7 +249,7 @@ def _stirred(s: Any, m: Model, w: Work, j: int) -> float:
     return float(ROUNDING * pushed(m, w, j) + np.sqrt(G) * s.unsure)
 
 
-@inlined
+@compiled
 def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float, t: float, q: Any, v: Any) -> float:
     """What row i lacks beside the active rows: its multiplier, or if it depends on them by how much it is off its law.
 
@@ -271,7 +271,7 @@ def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float
     return float(-off + band if open_for > LIFTED else -off - band)
 
 
-@inlined
+@compiled
 def off_law(K: Any, s: Any, m: Model, w: Work, i: int, t: float, q: Any, v: Any) -> float:
     """By how much row i, not active, moves faster than its law, the others following theirs; NaN if ill posed."""
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) != 0:
@@ -301,7 +301,7 @@ def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: in
     return float(size)
 
 
-@inlined
+@compiled
 def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool:
     """Whether lam of row i would be positive: the rest of its law is negative with the others as they are.
 
@@ -315,7 +315,7 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
     return bool(-off > rounding + _left_over(s, m, w, i))
 
 
-@inlined
+@compiled
 def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest: bool) -> bool:
     """Whether row i would push if it were active now; the acceleration of the present modes stands in k[0]."""
     if at_rest or (not s.has_solve and active_mode(s, m, w, i) != COLLISION):
@@ -324,7 +324,7 @@ def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest
     return bool(lam > w.noise[i])
 
 
-@inlined
+@compiled
 def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether row i, below the surface, depends on the active rows and follows its law with them."""
     if not w.shares[i] or s.na == 0:
@@ -333,7 +333,7 @@ def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     return bool(w.tied[i] and lam > 0.0)
 
 
-@inlined
+@compiled
 def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the level machine puts row i at this instant."""
     h, rate = w.gap[i], w.rate[i]
@@ -358,7 +358,7 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     return FREE
 
 
-@inlined
+@compiled
 def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the complementarity problem's next pivot puts row i; below the surface it is CONTACT or BALLISTIC."""
     if mode[i] == FREE and not (w.gap[i] <= s.touch and (w.rate[i] <= slow(s) or w.gap[i] < -DEEP)):
@@ -370,7 +370,7 @@ def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> 
     return CONTACT if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
 
 
-@inlined
+@compiled
 def next_mode(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the machine in force puts row i at this instant."""
     if s.fsm == LEVEL:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active
 from crossbody.reference.core.dop853 import START
@@ -28,7 +28,7 @@ NOISE = 2.0  # times by which the stages may be farther off than the last of the
 MARGIN = 4.0  # on what a turn between the last stage and the end can come to
 
 
-@inlined
+@compiled
 def forget(s: Any, w: Work, mode: Bytes) -> None:
     """Let every row that is not active begin anew: its next contact has a peak of its own."""
     for i in range(s.nc):
@@ -36,13 +36,13 @@ def forget(s: Any, w: Work, mode: Bytes) -> None:
             w.highest[i] = -np.inf
 
 
-@inlined
+@compiled
 def _least(s: Any, value: float) -> float:
     """What a multiplier must exceed to be larger than `value` as far as the tolerance tells."""
     return float(value + s.rtol * abs(value))
 
 
-@inlined
+@compiled
 def _slopes(K: Any, s: Any, m: Model, w: Work, at_end: bool) -> bool:
     """Leave in w.la the change of the active multipliers along the motion at an end of the step; False if ill posed."""
     step, y, k = NUDGE * s.hs, w.y1 if at_end else w.y, w.k[s.end if at_end else START]
@@ -56,13 +56,13 @@ def _slopes(K: Any, s: Any, m: Model, w: Work, at_end: bool) -> bool:
     return True
 
 
-@inlined
+@compiled
 def _off(s: Any, w: Work, i: int) -> float:
     """How far the last stage, which stands at the step's end, is off the multiplier of row i there."""
     return float(abs(w.lam_at[s.end - 1 if s.method == EXPLICIT else s.end, i] - w.lams[NODES - 1, i]))
 
 
-@inlined
+@compiled
 def _inside(s: Any, w: Work, i: int, end: float) -> float:
     """Place of the stage before `end` with the largest multiplier of row i, if that is a peak; else NEVER.
 
@@ -82,7 +82,7 @@ def _inside(s: Any, w: Work, i: int, end: float) -> float:
     return 0.0 if place < NEVER and start == top else NEVER
 
 
-@inlined
+@compiled
 def _may_turn(s: Any, w: Work, i: int) -> bool:
     """Whether the multiplier of row i, the largest of its contact at the step's end, may have a peak just before it.
 
@@ -99,7 +99,7 @@ def _may_turn(s: Any, w: Work, i: int) -> bool:
     return bool(not rises and MARGIN * abs(bend) * reach * reach > max(s.rtol * abs(end), _off(s, w, i)))
 
 
-@inlined
+@compiled
 def _suspect(K: Any, s: Any, m: Model, w: Work, end: float) -> bool:
     """Leave in w.peak where to look for the peak of every active row, NEVER where there can be none; whether any."""
     found, starting, turning = False, False, False
@@ -119,7 +119,7 @@ def _suspect(K: Any, s: Any, m: Model, w: Work, end: float) -> bool:
     return found
 
 
-@inlined
+@compiled
 def _turns(K: Any, s: Any, m: Model, w: Work, at_end: bool, asked: float, place: float) -> bool:
     """Move the peaks suspected at an end of the step inside it where the slope there says so; whether any."""
     sound, found = _slopes(K, s, m, w, at_end), False
@@ -132,7 +132,7 @@ def _turns(K: Any, s: Any, m: Model, w: Work, at_end: bool, asked: float, place:
     return found
 
 
-@inlined
+@compiled
 def _multiplier(K: Any, s: Any, m: Model, w: Work, i: int, theta: float) -> float:
     """Lam of row i at a place in the step; -inf if ill posed. All others are left in w.la."""
     if theta == 0.0:
@@ -182,7 +182,7 @@ def _peak(K: Any, s: Any, m: Model, w: Work, i: int, end: float) -> float:
     return float(x1)
 
 
-@inlined
+@compiled
 def _close_in(
     K: Any, s: Any, m: Model, w: Work, i: int, x0: float, x1: float, x2: float, f0: float, f1: float, f2: float
 ) -> tuple[float, float]:  # fmt: skip
@@ -230,7 +230,7 @@ def find(K: Any, s: Any, m: Model, w: Work, end: float) -> None:
             w.highest[i] = max(w.highest[i], w.lams[NODES - 1, i])
 
 
-@inlined
+@compiled
 def first(s: Any, w: Work) -> float:
     """Place of the first peak that is left; NEVER if none."""
     place = NEVER
@@ -239,7 +239,7 @@ def first(s: Any, w: Work) -> float:
     return place
 
 
-@inlined
+@compiled
 def drop(s: Any, w: Work, place: float) -> None:
     """Take the peaks at this place, and before it, off the list."""
     for i in range(s.nc):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense, peaks
 from crossbody.reference.core.acceleration import OWN, accelerate, scatter
 from crossbody.reference.core.algebra import copy
@@ -42,14 +42,14 @@ def write_row(
         s.spoilt = 1
 
 
-@inlined
+@compiled
 def _put(row: Array, at: int, x: Array) -> None:
     """Write x into a row from place `at` on."""
     for i in range(len(x)):
         row[at + i] = x[i]
 
 
-@inlined
+@compiled
 def here(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Bytes, judged: bool) -> None:
     """Append the present state with its gaps, in w.gap, and multipliers; `judged` if its energies have just been."""
     if s.natural:
@@ -58,7 +58,7 @@ def here(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Byt
         write_row(s, w, mode, s.t, w.y, w.lam0, w.z, out, modes)
 
 
-@inlined
+@compiled
 def step_end(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Bytes) -> None:
     """Append the end of a step in which nothing happened: its last node knows the gaps, its account the energies."""
     if s.natural and dense.long_for_rows(s):  # the node may have been moved onto the rows
@@ -87,7 +87,7 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     write_row(s, w, mode, t, w.ys, w.lam, z, out, modes)
 
 
-@inlined
+@compiled
 def _points(s: Any, length: float) -> int:
     """Intervals into which rows cut an arc in closed form: all while a contact lasts, of a flight by its length."""
     if s.na > 0:
@@ -96,7 +96,7 @@ def _points(s: Any, length: float) -> int:
     return max(LEAST_POINTS, int(np.ceil(ARC_POINTS * length / s.longest_flight)))
 
 
-@inlined
+@compiled
 def _shape(K: Any, s: Any, m: Model, w: Work, mode: Bytes, until: float, out: Floats, modes: Bytes) -> None:
     """Append the peaks of multipliers in the step, and the shape of an arc, in the order of time."""
     length = until - s.t_old
@@ -113,7 +113,7 @@ def _shape(K: Any, s: Any, m: Model, w: Work, mode: Bytes, until: float, out: Fl
             _inside(K, s, m, w, mode, t, out, modes)
 
 
-@inlined
+@compiled
 def within_step(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, samples: Floats, until: float, out: Floats, modes: Bytes
 ) -> None:  # fmt: skip

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import ULP, all_finite
 from crossbody.reference.core.enclosure import (
     ABOVE,
@@ -56,13 +56,13 @@ GAP_LEVELS = 4  # halvings down to which a rate is held against its gap; below, 
 INTERVALS = 2000  # of one search; then halving ends, and places decide
 
 
-@inlined
+@compiled
 def _bound(w: Work, row: Array, j: int, g: float) -> None:
     """Keep the bound on g of function j; none where it is rounding."""
     row[BOUNDS + j] = 0.0 if g * W_MOST <= w.tiny[j] else g
 
 
-@inlined
+@compiled
 def _from_its_gap(w: Work, row: Array, kind: int, j: int, width: float) -> float:
     """A bound on g of function j if it is the rate of a gap that stands in the line as well, else 0."""
     if kind == CATCH and j == 0:
@@ -70,7 +70,7 @@ def _from_its_gap(w: Work, row: Array, kind: int, j: int, width: float) -> float
     return from_gaps(row, NODES, 0, width, w.bands[1]) if kind == TOUCH_INSIDE and j == 1 else 0.0
 
 
-@inlined
+@compiled
 def _highest(row: Array, count: int) -> int:
     """The function whose least value at the places is the largest: the first that may be bounded from below by zero."""
     best, most = 0, -np.inf
@@ -83,7 +83,7 @@ def _highest(row: Array, count: int) -> int:
     return best
 
 
-@inlined
+@compiled
 def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int) -> tuple[float, bool]:
     """The whole step: values at its nodes, bounds on g, what is taken for zero.
 
@@ -110,7 +110,7 @@ def _start(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, co
     return scale, False
 
 
-@inlined
+@compiled
 def opens(s: Any, w: Work, i: int, until: float) -> bool:
     """Whether a gap opens up to a place of the step, so that it cannot be caught before: known from the nodes alone.
 
@@ -132,7 +132,7 @@ def opens(s: Any, w: Work, i: int, until: float) -> bool:
     return True
 
 
-@inlined
+@compiled
 def _inherit(parent: Array, row: Array, half: int, count: int, slopes: bool) -> bool:
     """Take over what the interval around knows of a half; whether its polynomials are the functions."""
     known = True
@@ -146,7 +146,7 @@ def _inherit(parent: Array, row: Array, half: int, count: int, slopes: bool) -> 
     return known
 
 
-@inlined
+@compiled
 def _halve(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, level: int, place: int, scale: float
 ) -> None:  # fmt: skip
@@ -180,7 +180,7 @@ def _halve(
         _bound(w, row, j, 0.0 if known else g)
 
 
-@inlined
+@compiled
 def _value(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, level: int, place: float, kept: float
 ) -> float:  # fmt: skip
@@ -194,7 +194,7 @@ def _value(
     return largest(w, count)
 
 
-@inlined
+@compiled
 def _locate(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, level: int, place: int, above: bool
 ) -> float:  # fmt: skip
@@ -222,7 +222,7 @@ def _locate(
     return NEVER
 
 
-@inlined
+@compiled
 def _at_zero(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int, count: int, found: float) -> float:
     """Where a guard that left the band of what counts as zero passed its true zero, if it came from above."""
     widest = max(w.bands[0], w.bands[1])

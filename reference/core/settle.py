@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.collisions import collide
@@ -35,7 +35,7 @@ ALONE = np.int64(2)  # of one_by_one: rows join one after another, however alike
 SWITCH_ROUNDS = 32  # switches that follow one another at one instant
 
 
-@inlined
+@compiled
 def _want(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Where every row belongs by the mode set as it stands, into w.struck; of a machine that pivots, the first alone.
 
@@ -56,7 +56,7 @@ def _want(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
                     return
 
 
-@inlined
+@compiled
 def _keep_strongest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Of the rows that want to switch let those that only change their name, else those that change v' most.
 
@@ -78,7 +78,7 @@ def _keep_strongest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
                 most = np.inf
 
 
-@inlined
+@compiled
 def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Switch every row that wants to (only the strongest once all together repeated); how many did.
 
@@ -97,7 +97,7 @@ def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return count
 
 
-@inlined
+@compiled
 def _consistent(K: Any, s: Any, m: Model, w: Work) -> None:
     """What a machine asks for besides `evaluate`: the general algebra's rows and the noise of the multipliers."""
     if s.fsm != EDGE and s.na > 0:
@@ -119,7 +119,7 @@ def share(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return int(code)
 
 
-@inlined
+@compiled
 def _keep(w: Work) -> None:
     """Take multipliers, gaps and rates of the present instant for the start of the next step."""
     copy(w.lam, w.lam0)
@@ -191,7 +191,7 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             changed[:] = 0
 
 
-@inlined
+@compiled
 def begin(s: Any, m: Model, w: Work) -> None:
     """Note whether rows switch, and which of them may share a load with rows that they depend on.
 
@@ -213,7 +213,7 @@ def begin(s: Any, m: Model, w: Work) -> None:
         s.sharing |= w.shares[i]
 
 
-@inlined
+@compiled
 def switch(K: Any, s: Any, m: Model, w: Work, b: Buffers, fired: int) -> int:
     """Let the mechanism change its discrete variables; UNCHANGED, CHANGED or LOST of the kernels."""
     keep_discrete(s, m, w, b)
@@ -223,7 +223,7 @@ def switch(K: Any, s: Any, m: Model, w: Work, b: Buffers, fired: int) -> int:
     return int(result)
 
 
-@inlined
+@compiled
 def begin_watch(K: Any, s: Any, m: Model, w: Work) -> None:
     """Guards of the discrete variables at the start of the next step."""
     if s.ng > 0:

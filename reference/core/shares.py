@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import ULP, solve_schur
 from crossbody.reference.core.layout import Work
 from crossbody.reference.kinds import Array
@@ -19,7 +19,7 @@ CONSISTENT = 1e-9  # part of its terms by which a row that depends on others may
 STATE = 64.0 * ULP  # part of the coordinates that rounding moves a gap by
 
 
-@inlined
+@compiled
 def allow(s: Any, w: Work, q: Array, v: Array) -> None:
     """Leave in w.allowed by how much each active row may be off its law."""
     position, speed = 0.0, 0.0
@@ -33,7 +33,7 @@ def allow(s: Any, w: Work, q: Array, v: Array) -> None:
         w.allowed[j] = part * w.scale[j] + STATE * (w.law[i, 0] * position + w.law[i, 1] * speed)
 
 
-@inlined
+@compiled
 def _null_vector(s: Any, w: Work, d: int, z: Array) -> bool:
     """Z = e_d - c with row d = sum of c_j times row j; whether their right-hand sides agree as much."""
     G = w.G
@@ -51,7 +51,7 @@ def _null_vector(s: Any, w: Work, d: int, z: Array) -> bool:
     return bool(abs(total) <= most)
 
 
-@inlined
+@compiled
 def _without(na: int, x: Array, z: Array) -> None:
     """Take from x its part along the unit vector z."""
     along = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.cache import inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import audit, bogacki, choice, dense, dop853, esdirk, exact, folds
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
@@ -31,7 +31,7 @@ SHORT_PART = 0.2  # ticks closer than this part of a high-order step are taken b
 HOLD_SHORT = 16  # ticks by the high-order method after one that was not good enough
 
 
-@inlined
+@compiled
 def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
     """Go to the next tick by the low-order method, if the tick is short against the motion and the error allows."""
     h = s.stop - s.t
@@ -47,7 +47,7 @@ def _short_step(K: Any, s: Any, m: Model, w: Work) -> bool:
     return True
 
 
-@inlined
+@compiled
 def _finite_mass(s: Any, w: Work) -> bool:
     """Whether M is finite where nothing reads it too: above the diagonal, and between branches."""
     total = 0.0
@@ -57,7 +57,7 @@ def _finite_mass(s: Any, w: Work) -> bool:
     return total == 0.0
 
 
-@inlined
+@compiled
 def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Evaluate the end of the step, derivative, multipliers, gaps, and check it."""
     nq = s.nq
@@ -94,7 +94,7 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return 0
 
 
-@inlined
+@compiled
 def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Take one step of the present method within the tolerance; y1 and the end's derivative are there afterwards."""
     s.have_dense = 0
@@ -135,7 +135,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     return NOT_FINITE if ill == 2 else STEP_TOO_SMALL
 
 
-@inlined
+@compiled
 def take_arc(K: Any, s: Any, m: Model, w: Work, b: Buffers, length: float) -> int:
     """One step in closed form."""
     s.method, s.end = EXACT, STAGES

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import factor_lu, solve_lu
 from crossbody.reference.core.coulomb import factor_set, note_speed, solve, stiffness, stopped_slip, without_pull
 from crossbody.reference.core.friction import has_friction
@@ -38,13 +38,13 @@ WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 DIFFERENT = 1e-6  # part of the largest acceleration by which motions differ
 
 
-@inlined
+@compiled
 def _first(m: Model, w: Work, i: int) -> int:
     """Place of the first tangential row of contact i."""
     return int(w.listed[m.tangent[i]])
 
 
-@inlined
+@compiled
 def _look(s: Any, m: Model, w: Work) -> None:
     """Leave the right-hand sides of the rows in contact without what pulls sticking ones back in w.bare.
 
@@ -71,7 +71,7 @@ def _look(s: Any, m: Model, w: Work) -> None:
             _put(m, w, i, STICK if w.stands[i] and not w.begins[i] else SLIP)
 
 
-@inlined
+@compiled
 def _put(m: Model, w: Work, i: int, state: int) -> None:
     """Let contact i stick, slide along its direction of reference, or be off (FREE)."""
     w.state[i] = state
@@ -81,7 +81,7 @@ def _put(m: Model, w: Work, i: int, state: int) -> None:
         w.off[w.idx[c]], w.slides[w.idx[c]], w.along[c] = state == FREE, state == SLIP, w.way[w.idx[c]]
 
 
-@inlined
+@compiled
 def _evaluate(s: Any, m: Model, w: Work) -> None:
     """Multipliers of the set as it stands in w.la, and in w.excess by how much faster than its law each row moves.
 
@@ -108,7 +108,7 @@ def _evaluate(s: Any, m: Model, w: Work) -> None:
             w.excess[j] = w.kept_excess[j]
 
 
-@inlined
+@compiled
 def _exceed(s: Any, w: Work, r: Array, la: Array) -> None:
     """Leave in w.excess by how much faster than r rows move under the multipliers la."""
     for j in range(s.na):
@@ -118,7 +118,7 @@ def _exceed(s: Any, w: Work, r: Array, la: Array) -> None:
         w.excess[j] = total
 
 
-@inlined
+@compiled
 def _size(m: Model, w: Work, i: int, x: Array) -> float:
     """Size of the tangential part of contact i of x."""
     square = 0.0
@@ -127,7 +127,7 @@ def _size(m: Model, w: Work, i: int, x: Array) -> float:
     return float(np.sqrt(square))
 
 
-@inlined
+@compiled
 def _ahead(m: Model, w: Work, i: int) -> float:
     """Tangential acceleration of contact i along its direction."""
     total = 0.0
@@ -136,7 +136,7 @@ def _ahead(m: Model, w: Work, i: int) -> float:
     return float(total)
 
 
-@inlined
+@compiled
 def _aside(m: Model, w: Work, i: int) -> float:
     """Tangential acceleration of contact i across its direction; 0 of one that has a single tangential row."""
     if m.tangents[i] < 2:
@@ -145,7 +145,7 @@ def _aside(m: Model, w: Work, i: int) -> float:
     return float(w.along[c] * w.excess[c + 1] - w.along[c + 1] * w.excess[c])
 
 
-@inlined
+@compiled
 def _turned_force(s: Any, m: Model, w: Work, j: int) -> None:
     """Fill w.trial with what a turn by one radian of the slip at the normal row in place j makes of all multipliers."""
     i = w.idx[j]
@@ -158,7 +158,7 @@ def _turned_force(s: Any, m: Model, w: Work, j: int) -> None:
     w.trial[c + 1] += force * y
 
 
-@inlined
+@compiled
 def _fill_turns(s: Any, m: Model, w: Work) -> int:
     """How the accelerations across contacts that begin to slide change with their directions, in w.turns; how many."""
     count = 0
@@ -207,7 +207,7 @@ def _turn(s: Any, m: Model, w: Work) -> float:
     return float(most)
 
 
-@inlined
+@compiled
 def _worst(s: Any, m: Model, w: Work) -> int:
     """The contact that violates its mode most, -1 if none does; w.wants has the modes that all would rather have."""
     found, most = -1, TOLERATED * s.push_scale
@@ -234,7 +234,7 @@ def _worst(s: Any, m: Model, w: Work) -> int:
     return found
 
 
-@inlined
+@compiled
 def _change(m: Model, w: Work, i: int, becomes: int) -> None:
     """Put contact i in another mode; one that begins to slide does so against the force that held it."""
     if becomes == SLIP and w.stands[i]:
@@ -244,7 +244,7 @@ def _change(m: Model, w: Work, i: int, becomes: int) -> None:
     _put(m, w, i, becomes)
 
 
-@inlined
+@compiled
 def _seen(s: Any, m: Model, w: Work) -> bool:
     """Whether the set stood before since s.sets was set to 0; note it."""
     for r in range(s.sets):
@@ -261,7 +261,7 @@ def _seen(s: Any, m: Model, w: Work) -> bool:
     return False
 
 
-@inlined
+@compiled
 def _face(s: Any, m: Model, w: Work, i: int, angle: float) -> float:
     """Let contact i begin to slide at an angle; its acceleration across that."""
     first = _first(m, w, i)
@@ -322,7 +322,7 @@ def _iterate(s: Any, m: Model, w: Work, together: int) -> bool:
     return False
 
 
-@inlined
+@compiled
 def _relax(s: Any, m: Model, w: Work, j: int) -> None:
     """One projected step of the row in place j."""
     if not w.gram[j, j] > 0.0:
@@ -333,7 +333,7 @@ def _relax(s: Any, m: Model, w: Work, j: int) -> None:
     w.la[j] += total / w.gram[j, j]
 
 
-@inlined
+@compiled
 def _aim(m: Model, w: Work, i: int) -> None:
     """Take the direction against its force for that in which contact i would slide, or that in which it is driven."""
     force, drive = _size(m, w, i, w.la), _size(m, w, i, w.bare)
@@ -380,14 +380,14 @@ def _sweep(s: Any, m: Model, w: Work) -> None:
                 _put(m, w, i, SLIP)
 
 
-@inlined
+@compiled
 def _swept(s: Any, m: Model, w: Work, together: int) -> bool:
     """Whether a consistent set is found from what sweeps give."""
     _sweep(s, m, w)
     return bool(_iterate(s, m, w, together))
 
 
-@inlined
+@compiled
 def _vary(s: Any, m: Model, w: Work, number: int) -> int:
     """Put contacts in the modes that a number says digit by digit, 0 for that of w.sets[0]; how many differ.
 
@@ -410,7 +410,7 @@ def _vary(s: Any, m: Model, w: Work, number: int) -> int:
     return changed
 
 
-@inlined
+@compiled
 def start_digit(state: int) -> int:
     """The digit that would name the mode in which a contact is already: it stands for being off."""
     return 1 if state == STICK else (2 if state == SLIP else 0)
@@ -447,7 +447,7 @@ def _near_sets(s: Any, m: Model, w: Work) -> bool:
     return False
 
 
-@inlined
+@compiled
 def begin_slip(s: Any, m: Model, w: Work) -> None:
     """Let contacts that have reached their bounds begin to slide against the forces that held them, as evaluated."""
     without_pull(s, m, w)
@@ -459,7 +459,7 @@ def begin_slip(s: Any, m: Model, w: Work) -> None:
                 w.way[w.idx[c]] = -w.la[c] / size if size > 0.0 else 0.0
 
 
-@inlined
+@compiled
 def _count_others(s: Any, m: Model, w: Work) -> None:
     """Note whether another set is consistent as well and leads to another motion, where there are few to try."""
     contacts, standing = 0, 0
@@ -518,7 +518,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     return 0
 
 
-@inlined
+@compiled
 def _mark(s: Any, m: Model, w: Work) -> int:
     """Mark in w.wants the contact that has jammed, or all with friction; PAINLEVE or NO_CONSISTENT_MODES."""
     for j in range(s.na):

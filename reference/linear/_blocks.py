@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crossbody.reference.cache import compiled, inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.kinds import Array, Floats
 
 RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
@@ -46,7 +46,7 @@ def invert_mass(M: Array, W: Floats, k: int) -> int:
     return 0
 
 
-@inlined
+@compiled
 def add(factor: float, x: Floats, out: Floats) -> None:
     """Out += factor x, without temporaries."""
     for j in range(len(x)):

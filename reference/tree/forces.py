@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference import kernels
-from crossbody.reference.cache import inlined
+from crossbody.reference.cache import compiled
 from crossbody.reference.kinds import Array
 from crossbody.reference.tree import layout, strings
 
@@ -20,14 +20,14 @@ def clamped(x: Any, low: Any, high: Any) -> Any:
     return high + 0.0 * x if x.real > high.real else x
 
 
-@inlined
+@compiled
 def side(p: Array, bend: int) -> int:
     """Return on which side of the kink whose number stands at p[bend] a run is."""
     k = int(p[bend].real)
     return int(p[int(p[layout.AT_BEND].real) + k].real) if k >= 0 else layout.OPEN
 
 
-@inlined
+@compiled
 def held(x: Any, p: Array, o: int) -> Any:
     """Return x within the bounds at p[o:], as it is on the side of its kink that holds."""
     now = side(p, o + layout.BOUNDS_BEND)
@@ -217,7 +217,7 @@ def moved(q: Array, v: Array, p: Array, w: Array, o: int) -> tuple[Any, Any]:
     return p[o + layout.GEAR] * q[int(p[o + layout.ANGLE].real)] if width == 1 else 0.0 * speed, speed
 
 
-@inlined
+@compiled
 def unheld(t: float, u: Array, p: Array, o: int, i: int) -> Any:
     """Return what drives actuator i at p[o:], but for the range of an activation, which follows from an instant on."""
     c = clamped(u[i], p[o + layout.CONTROL], p[o + layout.CONTROL + 1])

@@ -6,16 +6,20 @@ the second derivative of the gap in closed form along the motion with which the 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from crossbody.cases.scene_contacts import STEEPEST
 from crossbody.reference import kernels
 from crossbody.reference.kinds import Array
 from crossbody.reference.pairs import layout, planes, solids
 from crossbody.reference.pairs.jets import apart, dot, moved, shifted, value
 from crossbody.reference.tree import layout as tree
 from crossbody.reference.tree.points import direction, point, pull
+
+LEAST_COSINE = math.sqrt(1.0 - STEEPEST**2)
 
 
 @kernels.helper
@@ -114,7 +118,8 @@ def _crossed(p: Array, w: Array, o: int) -> float:
     M, A, a = _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1].real
     N, B, b = _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1].real
     sine, beside = solids.crossing(A, B, apart(N, M)), solids.overlap(M, A, a, N, B, b)
-    return float(max(sine / p[o + layout.SINE].real - 1.0, -beside / a))
+    steep = LEAST_COSINE - abs(dot(A, B)[0].real)
+    return float(max(sine / p[o + layout.SINE].real - 1.0, -beside / a, steep))
 
 
 @kernels.helper
@@ -144,7 +149,12 @@ def lies(p: Array, w: Array, o: int) -> int:
 
 @kernels.helper
 def turn(p: Array, w: Array, o: int, now: int) -> float:
-    """Return how far shapes are from lying to each other otherwise than now, below 0 if they do; 1 out of reach."""
+    """Return how far shapes are from lying to each other otherwise than now, below 0 if they do.
+
+    It is 1 of ones that are crossed out of reach; those that lie along each other leave that anywhere.
+    """
+    if now != layout.CROSSED:
+        return float(layout.BAND - _crossed(p, w, o))
     one, two = o + layout.FIRST, o + layout.SECOND
     D, plane = apart(_point(p, w, two), _point(p, w, one)), int(p[one].real) == layout.PLANE
     reach = 2.0 * (p[two + layout.SIZE] + p[o + layout.MARGIN]).real + p[two + layout.SIZE + 1].real
@@ -153,8 +163,7 @@ def turn(p: Array, w: Array, o: int, now: int) -> float:
     reach += 2.0 * p[one + layout.SIZE].real + p[one + layout.SIZE + 1].real
     if not plane and dot(D, D)[0].real > reach * reach:
         return 1.0
-    crossed = _crossed(p, w, o)
-    return float(crossed if now == layout.CROSSED else layout.BAND - crossed)
+    return float(_crossed(p, w, o))
 
 
 @kernels.helper

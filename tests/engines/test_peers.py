@@ -100,6 +100,20 @@ def test_momentum_of_a_cradle_is_kept(name: str) -> None:
         np.testing.assert_allclose(run.v @ [1.0, 2.0, 4.0], 1.0, rtol=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("name", LAW)
+def test_balls_that_touch_close_once_each(name: str, seed: int) -> None:
+    """A chain of springs is pressed from end to end and opens again: rounding of places is no gap and no touch."""
+    rng = np.random.default_rng(seed)
+    sizes = {"n": int(rng.integers(3, 8)), "radius": float(10 ** rng.uniform(-2.0, 0.0))} if seed else {}
+    case = cases.load("newtons_cradle", "sliders", **sizes)
+    for profile in ("continuous", "default", "matched"):
+        if profile in peer(name).profiles and (name, profile) != ("drake", "default"):
+            run = peer(name).prepare(case, profile).run()
+            closed = [e.contact for e in run.events if e.before == Mode.FREE]
+            assert sorted(closed) == list(range(len(case.q0) - 1))
+
+
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("name", STEPPED)
 def test_restitution_of_an_impact(name: str, e: float) -> None:

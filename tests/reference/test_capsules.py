@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from resting import LAW, apart, quaternion, run
+from scipy.optimize import lsq_linear
 
 from crossbody import cases, engines
 from crossbody.cases import Case
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import SAG
+from crossbody.engines._contacts import FAR
 
 ALONG_X = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
 RADIUS, HALF, WEIGHT = 0.02, 0.2, 9.81
@@ -58,6 +60,22 @@ def test_axes_that_meet_outside_have_the_gap_of_their_segments(seed: int) -> Non
     for found in seen:
         assert 0.0 <= distance - found.gap[0].min() + 1e-9 < 1e-4
     assert seen[0].gap[0] == pytest.approx(seen[1].gap[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("height", [0.6, 0.3], ids=["out of reach", "within reach"])
+@pytest.mark.parametrize("spin", [(0.0, 8.0, 0.0), (0.0, 0.0, 8.0), (3.0, 5.0, 4.0)], ids=["T", "cross", "any"])
+def test_records_of_capsules_that_turn_tell_their_distance(height: float, spin: Any) -> None:
+    """They begin along each other and turn through a T or a cross: in their plane no end is ever the other's."""
+    case = rods(height=height, v=[0.0, 0.0, 2.5, *spin], t_end=0.3)
+    runs = [run(case), run(case, "cvode"), run(case, "law", "pinocchio"), run(case, "matched", "mujoco", dt=1e-3)]
+    assert runs[0].switches[0].after == 2
+    for found in runs:
+        assert (found.gap[found.t > 0.1, 1] == FAR).all()
+        for q, gap in zip(found.q, found.gap, strict=True):
+            turned = matrices(q[3:]) @ [1.0, 0.0, 0.0]
+            A = np.column_stack([[1.0, 0.0, 0.0], -turned])
+            reach = lsq_linear(A, q[:3], (-HALF, HALF), method="bvls")
+            assert gap.min() == pytest.approx(np.sqrt(2.0 * reach.cost) - 2.0 * RADIUS, abs=SAG * 2.0 * RADIUS + 1e-12)
 
 
 def test_a_capsule_rests_on_another_at_both_ends() -> None:

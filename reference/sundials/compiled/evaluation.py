@@ -21,7 +21,7 @@ from numba import types
 from crossbody.reference import kernels
 from crossbody.reference._program import Address, addresses, kept_with_kernels
 from crossbody.reference._system import System
-from crossbody.reference.cache import compiled, embedding, inlined
+from crossbody.reference.cache import compiled, embedding
 from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
 from crossbody.reference.kinds import Array, Floats, Floats2, Index
 
@@ -124,7 +124,7 @@ WORKSPACE = bundle_type(Workspace)
 open_work = opener(WORKSPACE)
 
 
-@inlined
+@compiled
 def _eliminate(A: Floats2, x: Floats2, size: int, sides: int) -> int:
     """Solve A[:, :size] x = A[:, size:] by Gaussian elimination with partial pivoting; zeros are passed over."""
     end = size + sides
@@ -172,7 +172,7 @@ def linear_arc(a0: float, a1: float, h: float, rate: float, t: float) -> tuple[f
     return float((h * e1 + c * divided).real), float((p1 * h * e1 + c * (e1 + p2 * divided)).real)
 
 
-@inlined
+@compiled
 def _assemble(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, idx: Index, na: int) -> None:
     """The matrix of M and of the rows in idx, and zero right-hand sides; f, H, h, Hdv as the kernels leave them."""
     n, k, A = s.size[0], s.size[2], s.matrix
@@ -192,7 +192,7 @@ def _assemble(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Fl
             A[c, n + j] = -s.H[j, c]
 
 
-@inlined
+@compiled
 def _by_law(s: Workspace, law: Floats2, i: int, t: float) -> tuple[float, float]:
     """Gap and rate of a row that has followed its linear law since a known instant."""
     h, rate = linear_arc(law[i, 0], law[i, 1], s.arc[i, 1], s.arc[i, 2], t - s.arc[i, 0])
@@ -258,7 +258,7 @@ def _put_on_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: 
     return GOOD
 
 
-@inlined
+@compiled
 def _share(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats) -> int:
     """Let the rows beside the active ones bear their share of `lam`: the least multipliers that exert the same forces.
 
@@ -304,7 +304,7 @@ def _accelerate(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: 
     return int(code)
 
 
-@inlined
+@compiled
 def _tick(s: Workspace, t: float) -> None:
     """Count a step tried, and how many of them in a row stability binds."""
     if t != s.clock[0]:
@@ -313,7 +313,7 @@ def _tick(s: Workspace, t: float) -> None:
         s.clock[0] = t
 
 
-@inlined
+@compiled
 def _take(s: Workspace, y: Any) -> None:
     """Q and v of the solver's vector."""
     nq = s.size[7]
@@ -323,7 +323,7 @@ def _take(s: Workspace, y: Any) -> None:
         s.v[i] = y[nq + i]
 
 
-@inlined
+@compiled
 def _rates(velocity: Any, s: Workspace, t: float) -> None:
     """Q' at the state taken."""
     if s.size[8]:
@@ -333,7 +333,7 @@ def _rates(velocity: Any, s: Workspace, t: float) -> None:
             s.qd[i] = s.v[i]
 
 
-@inlined
+@compiled
 def _derivative(
     dynamics: Any, gaps: Any, rows: Any, power: Any, velocity: Any, s: Workspace, t: float, y: Any, yp: Any
 ) -> int:
@@ -360,7 +360,7 @@ def _derivative(
     return int(code)
 
 
-@inlined
+@compiled
 def _residual(
     dynamics: Any, gaps: Any, rows: Any, power: Any, velocity: Any, s: Workspace, t: float, y: Any, out: Any
 ) -> int:
@@ -424,7 +424,7 @@ def _residual(
     return GOOD
 
 
-@inlined
+@compiled
 def _below_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, i: int) -> float:
     """By how much row i is below its law under the active rows; one that they hold at its law counts as below."""
     na, n, law = s.size[4], s.size[0], s.law_if
@@ -445,7 +445,7 @@ def _below_law(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: F
     return float(band - (push + s.Hdv[0] + law[i, 1] * rate + spring))
 
 
-@inlined
+@compiled
 def _would_press(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, i: int) -> float:
     """Multiplier of the inactive row i if it were active now; -inf where that is ill posed.
 
@@ -467,7 +467,7 @@ def _would_press(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v:
     return float(s.solution[s.size[0] + na, 0])
 
 
-@inlined
+@compiled
 def _spent(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Floats, e: int) -> float:
     """One side of the hand-over: +-c h' +- b0 h - eps lam_i / (G^-1)_ii, with c = max(b1, sqrt(b0))."""
     i = s.row[e]
@@ -526,7 +526,7 @@ def _terms(
     return GOOD
 
 
-@inlined
+@compiled
 def _hermite(s: Workspace, theta: float, length: float) -> None:
     """Quintic through q, v and v' at both ends of the step, and its derivatives, into q, v and `curve`."""
     n = s.size[0]
@@ -544,7 +544,7 @@ def _hermite(s: Workspace, theta: float, length: float) -> None:
         s.curve[i] = curve / (length * length)
 
 
-@inlined
+@compiled
 def _doubt(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float) -> int:
     """Terms on the quintic of the step that ends at t, and with its error taken off, at two places.
 
@@ -574,7 +574,7 @@ def _doubt(dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: flo
     return GOOD
 
 
-@inlined
+@compiled
 def _decide(s: Workspace) -> int:
     """Mark the guards that may fire inside the step: none of their terms is positive beyond its error throughout."""
     guards = s.size[6]
@@ -603,7 +603,7 @@ def _decide(s: Workspace) -> int:
     return int(left)
 
 
-@inlined
+@compiled
 def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
     """The end of the step becomes the start of the next one."""
     n = s.size[0]
@@ -617,7 +617,7 @@ def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
     return int(code)
 
 
-@inlined
+@compiled
 def _move_on(s: Workspace, t: float, y: Any) -> None:
     """The last step ends at t; what was its end is its start."""
     s.clock[3], s.clock[2] = s.clock[2], t

@@ -1,0 +1,87 @@
+"""Functions that are parts of compiled ones: typed and lowered once, optimised only where the whole is put together.
+
+numba optimises every function on its own, with all that it calls, and once more in each function that calls it: for
+a program of three hundred short functions that is most of the time. A part is kept as it was lowered. The function
+that is called from outside takes all its parts at once, makes them private, and is optimised once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+
+
+class _Library(JITCodeLibrary):  # type: ignore[misc]
+    """Code of one function, and what it calls by name."""
+
+    environment: tuple[str, Any] | None = None  # of a part: where its constants are, and under which name
+
+    def finalize(self) -> None:
+        """Put the whole together, optimise it and make it callable."""
+        parts = list(_parts_of(self, {self}))
+        for part in parts:
+            self._final_module.link_in(part.module(), preserve=True)
+            self._reload_init.update(part._reload_init)
+        for part in parts:
+            part.make_private(self._final_module)
+        own = [self, *parts]
+        others: list[Any] = [library for one in own for library in one._linking_libraries]
+        self._linking_libraries = [library for library in others if not isinstance(library, _Part)]
+        super().finalize()
+        for part in parts:
+            if part.environment is not None:
+                self._codegen.set_env(*part.environment)
+
+
+class _Part(_Library):
+    """Code of a part, which is never made callable on its own."""
+
+    def finalize(self) -> None:
+        """Leave everything to the whole."""
+        self._raise_if_finalized()
+        self._finalized = True
+
+    def module(self) -> Any:
+        """The code as it was lowered."""
+        self._ensure_finalized()
+        return self._final_module
+
+    def make_private(self, whole: Any) -> None:
+        """Let nothing outside the whole call this, so that it goes where it is written out."""
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage.name == "external":
+                whole.get_function(function.name).linkage = "internal"
+
+
+def _parts_of(library: _Library, met: set[Any]) -> Iterator[_Part]:
+    for part in library._linking_libraries:
+        if isinstance(part, _Part) and part not in met:
+            met.add(part)
+            yield part
+            yield from _parts_of(part, met)
+
+
+class WholePasses(Compiler):  # type: ignore[misc]
+    """numba's passes for a function that is called from outside."""
+
+    library = _Library
+
+    def _compile_core(self) -> Any:
+        state = self.state
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super()._compile_core()
+
+
+class PartPasses(WholePasses):
+    """The same for a part."""
+
+    library = _Part
+
+    def _compile_core(self) -> Any:
+        flags = self.state.flags
+        flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        return super()._compile_core()
