@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.trajectory import Event, Mode, Trajectory
 
-CLOSED = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
+CLOSED = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
 AT_REST = 1e-10
 """Gap, m or rad (relative to positions above 1), within which a row is at its surface: what errors make of it."""
 LIGHT = 1e-12

@@ -19,6 +19,8 @@ class Outcome(StrEnum):
     LOST = "lost"
     INCONSISTENT = "inconsistent"
     INTERRUPTED = "interrupted"
+    PAINLEVE = "painleve"
+    NO_CONSISTENT_MODES = "no_consistent_modes"
 
     @property
     def advice(self) -> str:
@@ -42,5 +44,7 @@ _ADVICE = {
     Outcome.MODE_CYCLE: "The contacts named beside this outcome switch for ever at one instant: their laws contradict.",
     Outcome.LOST: "The motion left the region in which its controller holds: start closer, or change the controller.",
     Outcome.INCONSISTENT: "What was computed contradicts the model in what is named beside this outcome.",
+    Outcome.PAINLEVE: "No force of its own holds a sliding contact open (Painleve): rigid bodies have no motion.",
+    Outcome.NO_CONSISTENT_MODES: "No set of sticking and sliding contacts agrees with the forces that it leads to.",
     Outcome.INTERRUPTED: "The run was interrupted; what was computed until then is kept.",
 }

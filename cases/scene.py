@@ -229,6 +229,10 @@ def _thickness(points: tuple[Vector, ...]) -> float:
     return float(values[2] / values[0]) if len(points) > 3 and values[0] > 0.0 else 0.0
 
 
+DIMENSIONS = (1, 3, 4, 6)
+"""Of pairs: without friction, with sliding, torsional, rolling friction."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair(_Named):
     """Two shapes that may touch; their rows push only.
@@ -248,6 +252,14 @@ class Pair(_Named):
     dimension: int = 1
     law: RowLaw = STIFF
     sizes: ClassVar[dict[str, int]] = {"friction": 5}
+
+    def __post_init__(self) -> None:
+        """Check the friction."""
+        _Named.__post_init__(self)
+        if self.dimension not in DIMENSIONS:
+            raise SceneError(f"Pair {self.name!r}: dimension is {shown(self.dimension)}; valid: {DIMENSIONS}.")
+        if not all(0.0 <= mu < math.inf for mu in self.friction):
+            raise SceneError(f"Pair {self.name!r}: friction is {self.friction}; it must be at least 0 and finite.")
 
 
 ROWS = {"connect": 3, "weld": 6, "joint": 1, "tendon": 1}
@@ -420,6 +432,7 @@ class Scene:
         joints: those of one body stand together, in the order of the bodies.
         shapes, pairs, loops, tendons, actuators, pushes: what else there is.
         gravity: m/s^2.
+        friction: whether pairs with friction have rows; a motion in which they meet is else not the scene's.
     """
 
     bodies: tuple[Body, ...] = ()
@@ -431,6 +444,7 @@ class Scene:
     actuators: tuple[Actuator, ...] = ()
     pushes: tuple[Push, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
+    friction: bool = True
 
     def __post_init__(self) -> None:
         """Check that names are unique, that every name which is spoken of is there, and the order of the parts."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.errors import SceneError
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import UNBOUNDED, Joint, Pair, Scene, Shape, Tendon, Vector
 
@@ -23,6 +24,13 @@ PLACES = {
 """Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull, lowest and
 highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end
 if they lie along each other. Of a hull it is the most: each has as many as corners."""
+WAYS = ("t1", "t2")
+"""Directions across the normal: over a plane its x and y, else those of `crossbody.reference.tree.pair_slip`."""
+ROUND = (
+    ("plane", "sphere"), ("plane", "capsule"), ("plane", "box"), ("plane", "ellipsoid"), ("plane", "hull"),
+    ("sphere", "sphere"),
+)  # fmt: skip
+"""Pairs that may have friction."""
 Pose = tuple[Floats, Floats]
 """Rotation (3, 3) and origin (3,), m."""
 SAME_GAP = 1e-9
@@ -44,7 +52,7 @@ class Contact:
     Attributes:
         pair: whose.
         first, second: its shapes, in the order in which the rows are written: the normal leads from first to second.
-        places: number of its rows.
+        places: number of its normal rows.
     """
 
     pair: Pair
@@ -58,9 +66,24 @@ class Contact:
         return parallel(self.first, self.second)
 
     @property
-    def rows(self) -> tuple[str, ...]:
-        """Names of its rows."""
+    def friction(self) -> float:
+        """Coefficient of its Coulomb friction; 0 without."""
+        return self.pair.friction[0] if self.pair.dimension > 1 else 0.0
+
+    @property
+    def normals(self) -> tuple[str, ...]:
+        """Names of its normal rows."""
         return (self.pair.name,) if self.places == 1 else tuple(f"{self.pair.name} {k}" for k in range(self.places))
+
+    @property
+    def tangents(self) -> tuple[str, ...]:
+        """Names of its tangential rows, two for every normal one; they stand behind the normal rows of all contacts."""
+        return tuple(f"{name} {way}" for name in self.normals for way in WAYS) if self.friction > 0.0 else ()
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of all its rows."""
+        return (*self.normals, *self.tangents)
 
 
 def parallel(first: Shape, second: Shape) -> float:
@@ -78,8 +101,22 @@ def parallel(first: Shape, second: Shape) -> float:
 
 
 def contacts(scene: Scene) -> tuple[Contact, ...]:
-    """Return the pairs that have rows: without friction, of shapes whose gap is known in closed form, and that move."""
+    """Return the pairs that have rows: of shapes whose gap is known in closed form, and that move.
+
+    Those with friction have if the scene asks for it and it is of the kind that is known.
+    """
     return tuple(found for found in _all(scene) if isinstance(found, Contact))
+
+
+def frictional(scene: Scene) -> str | None:
+    """Return why an engine that has no rows with friction cannot run a scene; None if it can."""
+    first = next((one for one in contacts(scene) if one.friction > 0.0), None)
+    if first is None:
+        return None
+    return (
+        f"Pair {first.pair.name!r} has friction, which the profile 'compiled' of the reference alone follows; "
+        "without=friction leaves that of a file out of every engine."
+    )
 
 
 def inert(scene: Scene) -> tuple[Pair, ...]:
@@ -217,7 +254,42 @@ def _all(scene: Scene) -> Iterator[Contact | Pair]:
         if (one.type, two.type) not in PLACES:
             one, two = two, one
         places = _places(one, two)
-        yield Contact(pair=pair, first=one, second=two, places=places) if places and pair.dimension == 1 else pair
+        known = places > 0 and not _unknown_friction(scene, pair, one, two)
+        yield Contact(pair=pair, first=one, second=two, places=places) if known else pair
+
+
+def check_pairs(scene: Scene) -> None:
+    """Refuse pairs that have no rows though their shapes may meet.
+
+    Raises:
+        SceneError: naming the first one, what is wrong with it, and what would be valid.
+    """
+    inert_, shapes = inert(scene), {shape.name: shape for shape in scene.shapes}
+    for pair in (found for found in _all(scene) if isinstance(found, Pair) and found not in inert_):
+        one, two = sorted((shapes[pair.first], shapes[pair.second]), key=lambda shape: shape.type != "plane")
+        if (one.type, two.type) not in PLACES:
+            one, two = two, one
+        reason = _unknown_friction(scene, pair, one, two) if _places(one, two) else "their gap is not known"
+        raise SceneError(
+            f"Pair {pair.name!r} of a {one.type} and a {two.type} has no rows: {reason}. Valid are pairs of "
+            f"{', '.join(map(' and '.join, PLACES))}; with friction (dimension=3) of "
+            f"{', '.join(map(' and '.join, ROUND))}."
+        )
+
+
+def _unknown_friction(scene: Scene, pair: Pair, one: Shape, two: Shape) -> str:
+    """Return why the machine does not know the friction of a pair; empty if it has none or slides alike all ways."""
+    if pair.dimension == 1:
+        return ""
+    if not scene.friction:
+        return "it has friction, and Scene.friction is False (without=friction, or dimension=1, leaves it out)"
+    if (one.type, two.type) not in ROUND:
+        return "friction of such shapes is not done"
+    if pair.dimension != 3:
+        return f"friction that spins or rolls (dimension={pair.dimension}) is not done; it may be 3"
+    if pair.friction[0] != pair.friction[1]:
+        return f"friction that differs by direction ({pair.friction[0]} and {pair.friction[1]}) is not done"
+    return ""
 
 
 def _places(one: Shape, two: Shape) -> int:

@@ -36,7 +36,7 @@ def scene_from(values: Any) -> Scene:
     groups = _parts()
     try:
         parts = {name: tuple(map(kind, values.get(name, ()))) for name, kind in groups.items()}
-        return Scene(gravity=values["gravity"], **parts)
+        return Scene(gravity=values["gravity"], friction=bool(values.get("friction", False)), **parts)
     except (TypeError, KeyError, AttributeError) as error:
         raise SceneError(f"This is no scene: {error}.") from None
 
@@ -47,7 +47,7 @@ def _parts() -> dict[str, Any]:
     return {
         field.name: _maker(typing.get_args(hints[field.name])[0])
         for field in dataclasses.fields(Scene)
-        if field.name != "gravity"
+        if field.name not in ("gravity", "friction")
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,21 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
                 names.append(f"{part.name} {side}")
                 laws.append(part.law)
                 unilateral.append(True)
-    for contact in contacts(scene):
-        names += contact.rows
+    met = contacts(scene)
+    for contact in met:
+        names += contact.normals
         laws += [contact.pair.law] * contact.places
         unilateral += [True] * contact.places
+    for contact in met:
+        names += contact.tangents
+        laws += [_held_back(contact.pair.law)] * len(contact.tangents)
+        unilateral += [True] * len(contact.tangents)
     return names, laws, unilateral
+
+
+def _held_back(law: RowLaw) -> RowLaw:
+    """Return the law of a contact's tangential rows: a slip velocity decays as fast as a gap does."""
+    return RowLaw(a0=0.0, a1=law.a1 or math.sqrt(law.a0))
 
 
 def law_of(scene: Scene) -> Law:

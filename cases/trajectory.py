@@ -29,6 +29,10 @@ class Mode(IntEnum):
     COLLISION_SEPARATION = 4
     BILATERAL = 5
     """Always on."""
+    STICK = 6
+    """In contact with friction, and held by it."""
+    SLIP = 7
+    """In contact with friction, and sliding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

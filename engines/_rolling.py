@@ -34,7 +34,7 @@ def _cylinders(scene: Scene, nc: int) -> list[tuple[int, int, str]]:
     """Return of every cylinder over a plane its variable, its first row, and the name of the pair."""
     met = contacts(scene)
     variable = sum(joint.type == "ball" and joint.limited for joint in scene.joints)
-    row, found = nc - sum(contact.places for contact in met), []
+    row, found = nc - sum(len(contact.rows) for contact in met), []
     for contact in met:
         if contact.second.type == "cylinder" and contact.first.type == "plane":
             found.append((variable, row, contact.pair.name))

@@ -12,6 +12,7 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, SceneError, Trajectory
 from crossbody.cases.arrays import is_number
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
 from crossbody.engines._reference_audit import audit, listed
 from crossbody.engines._rolling import determined
@@ -111,7 +112,7 @@ class Reference(Engine):
             return (
                 f"The reference has no rule {case.collisions!r} for several contacts; it has: {', '.join(COLLISIONS)}."
             )
-        return None
+        return _no_friction(case, solver)
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> ReferenceRun:
         """Build the mechanism of a case and everything that does not depend on time.
@@ -147,6 +148,19 @@ class Reference(Engine):
             raise SceneError(_off(case, error)) if case.file else error from None
         inner.warm()
         return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
+
+
+def _no_friction(case: Case, solver: str) -> str | None:
+    """Return why a scene's friction cannot be followed; None if there is none, or it can."""
+    found = frictional(case.scene) if case.general and case.scene is not None else None
+    if found is None or solver != "compiled":
+        return found
+    if case.scene is not None and case.scene.loops:
+        return (
+            f"The scene has the loop {case.scene.loops[0].name!r} beside contacts with friction: that is not done. "
+            "without=loops, or without=friction, leaves either out of every engine."
+        )
+    return None
 
 
 def _known(case: Case, solver: str) -> dict[str, Parameter]:

@@ -93,6 +93,7 @@ def ensemble(
     count = len(os.sched_getaffinity(0)) if threads is None else threads
     if not 1 <= count <= 1024:
         raise InvalidValue(f"threads is {threads}; valid: 1 to 1024.")
+    settings.check_friction(system)
     check_once(system, job.starts[0, : system.nq], job.starts[0, system.nq :], t_end)
     check_starts(system, job.starts, job.p, settings)
     spaces: SimpleQueue[CompiledRun] = SimpleQueue()

@@ -18,6 +18,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
     """Code of one function, and what it calls by name."""
 
     environment: tuple[str, Any] | None = None  # of a part: where its constants are, and under which name
+    _linking_libraries: list[Any]
 
     def finalize(self) -> None:
         """Put the whole together, optimise it and make it callable."""

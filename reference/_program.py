@@ -14,8 +14,9 @@ from numba import types
 from crossbody.reference import kernels
 from crossbody.reference.cache import compiled, embedding
 from crossbody.reference.core import advance as core
+from crossbody.reference.core import friction_answers
 from crossbody.reference.core._struct import TABLE
-from crossbody.reference.core.layout import STATE
+from crossbody.reference.core.layout import MODEL, STATE, WORK
 
 
 def _state() -> Any:
@@ -31,6 +32,21 @@ def _signature() -> Any:
 def program() -> Any:
     """The function `advance`, from the cache or compiled (once per installation)."""
     return compiled(core.advance, [_signature()])
+
+
+_FRICTION = types.float64(types.int64, _state().dtype, MODEL, WORK, types.int64)
+
+
+@cache
+def _friction() -> Any:
+    """What answers for contacts with friction, from the cache or compiled once a scene has some."""
+    return compiled(friction_answers.answer, [_FRICTION])
+
+
+def friction_code() -> int:
+    """Where that stands, callable by the convention of compiled functions."""
+    found = _friction().overloads[_FRICTION.args]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
 class Address(types.WrapperAddressProtocol):  # type: ignore[misc]

@@ -81,7 +81,8 @@ def recheck(
 
     Returns:
         The worst place of each row, mode and reason. Where a controller acts, `switch` keeps numbers that a motion
-        does not record, q' is not v, or there is one row alone, only the motion's own rows are looked at.
+        does not record, q' is not v, contacts have friction, or there is one row alone, only the motion's own rows are
+        looked at.
     """
     rtol = arguments.real("rtol", rtol)
     rows = np.flatnonzero(np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
@@ -89,7 +90,7 @@ def recheck(
         return ()
     told = system.control is None or (isinstance(system.control, Control) and inputs is not None)
     bands = system.kinks + 1 + system.inputs if system.kinks else 0  # they are of no motion
-    known = told and system.latched == bands and system.velocity is None and len(run.t) > 1
+    known = told and not system.frictional and system.latched == bands and system.velocity is None and len(run.t) > 1
     found = _Recheck(system, run, rows, rtol, inputs, collisions).between() if known else _recorded(run, rows, rtol)
     worst: dict[tuple[int, Mode, str], Violation] = {}
     for one in found:
@@ -125,7 +126,7 @@ def _recorded(run: Trajectory, rows: list[int], rtol: float) -> Iterator[Violati
                 yield from _worst(run.t[here], -gap - near, i, mode, "below the surface")
             elif mode in PASSING:
                 yield from _worst(run.t[here], gap - near, i, mode, "above the surface")
-            elif mode in ACTIVE:
+            elif mode in (*ACTIVE, Mode.STICK, Mode.SLIP):
                 yield from _worst(run.t[here], -lam - force, i, mode, "pulls")
 
 

@@ -19,7 +19,7 @@ from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._dense import Marks, Motion
 from crossbody.reference._interrupt import LONG_S, Interrupts
-from crossbody.reference._program import entry, program
+from crossbody.reference._program import entry, friction_code, program
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
@@ -41,9 +41,17 @@ OUTCOMES = {
     layout.DIVERGED: Outcome.DIVERGED,
     layout.LOST: Outcome.LOST,
     layout.INCONSISTENT: Outcome.INCONSISTENT,
+    layout.PAINLEVE: Outcome.PAINLEVE,
+    layout.NO_CONSISTENT_MODES: Outcome.NO_CONSISTENT_MODES,
 }
-_ACTIVE = (layout.CONTACT, layout.COLLISION, layout.BILATERAL)
+_ACTIVE = (layout.CONTACT, layout.COLLISION, layout.BILATERAL, layout.STICK, layout.SLIP)
 _COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions", "guards")
+_NOTES = {
+    "indeterminate": "indeterminate: how contacts that slid shared their load, which no law says, moved the bodies; it "
+    "was taken of least norm.",
+    "not_unique": "modes_not_unique: more than one set of sticking and sliding contacts was consistent at an instant; "
+    "the one that was reached first was taken.",
+}
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
 
@@ -72,7 +80,7 @@ class CompiledRun:
         self.work = layout.workspace(
             n, nq, system.velocity is not None, nc, system.inputs,
             system.mass_block, self.nz, system.memory, system.scratch, system.guards,
-            len(np.atleast_1d(system.discrete)),
+            len(np.atleast_1d(system.discrete)), system.frictional,
         )  # fmt: skip
         self.work["atol"][:] = options.absolute(system)
         natural = options.samples is None
@@ -106,8 +114,10 @@ class CompiledRun:
             "ng": system.guards, "nd": np.size(system.discrete), "latched": system.latched,
             "kinks": system.kinks,
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
-            "affine": system.affine and options.shortcuts, "implicit": options.implicit, "natural": natural,
+            "affine": system.affine and options.shortcuts and not system.frictional,
+            "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
+            "frictional": system.frictional, "friction_code": friction_code() if system.frictional else 0,
             "loops": system.solve is None and bool(np.any(system.held)),
             "keep_events": options.events, "has_energy": system.energy is not _none.energy,
             "has_control": system.control is not None,
@@ -255,7 +265,7 @@ class CompiledRun:
             counts=MappingProxyType(
                 {name: int(state[name]) for name in _COUNTERS}
                 | {"events": int(state["events"] + state["dropped"])}
-                | ({"redundant": int(state["redundant"])} if state["redundant"] else {})
+                | {name: int(state[name]) for name in ("redundant", *_NOTES) if state[name]}
             ),
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
             if self.nz
@@ -291,7 +301,7 @@ class CompiledRun:
 
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
-            return ""
+            return " ".join(text for name, text in _NOTES.items() if self.state[name][0])
         q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
         return f"{outcome.advice} {self._cause(outcome, q, v)}{where}."
@@ -303,7 +313,7 @@ class CompiledRun:
             return f"{self.callback.failure} "
         if outcome is Outcome.NOT_FINITE:
             return self._blamed(q, v)
-        if outcome is Outcome.MODE_CYCLE:
+        if outcome in (Outcome.MODE_CYCLE, Outcome.PAINLEVE, Outcome.NO_CONSISTENT_MODES):
             return f"Rows {marked} at "
         if outcome is Outcome.ILL_POSED:
             rows = self._vanished() or np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))

@@ -44,6 +44,7 @@ def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> A
     if numba_config.DISABLE_JIT:
         raise InvalidValue("A run needs compiled kernels; NUMBA_DISABLE_JIT in the environment leaves them Python.")
     start = system.checked_state("q0", q0), system.checked_state("v0", v0)
+    options.check_friction(system)
     check_once(system, *start, options.t_end)
     check_start(system, *start, options)
     if options.solver == "compiled":

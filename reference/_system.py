@@ -50,6 +50,12 @@ class System:
         loose: of each of these the part of it that does not follow, 0 if not given: so far its gap may open.
         findings: sentences on what was decided when the system was made; they stand in the message of every run.
         follows (nc,): index of the row whose activity this one shares (a slip row follows its normal row); -1 none.
+        mu (nc,): of a row that follows: coefficient of Coulomb friction. It is a tangential row, one of at most two
+            of its normal row that stand one behind the other, with H v the velocity along an orthonormal direction:
+            |lam_t| <= mu lam_n, and lam_t = -mu lam_n v_t/|v_t| where it slides. While it sticks it has its own law
+            with a0 = 0: a1, or sqrt(a0) of the normal row, pulls a slip velocity back. Infinite, if not given, for a
+            row that never slides.
+        drift (nc,): velocity of the surface along a tangential row, m/s: v_t = H v - drift.
         mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
         inputs: nu, length of u.
         scratch: length of w.
@@ -96,6 +102,8 @@ class System:
     loose: ArrayLike = ()
     findings: tuple[str, ...] = ()
     follows: ArrayLike = -1
+    mu: ArrayLike = np.inf
+    drift: ArrayLike = 0.0
     nq: int = 0
     quaternions: ArrayLike = ()
     mass_block: int = 0
@@ -113,6 +121,9 @@ class System:
     affine: bool = False
     activations: Activations | None = None
     p: Floats = field(init=False)
+    friction: Floats = field(init=False)
+    tangent: Index = field(init=False)
+    tangents: Index = field(init=False)
     alpha: Floats = field(init=False)
     beta: Floats = field(init=False)
 
@@ -136,6 +147,7 @@ class System:
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         put(self, "redundant", different("System.redundant", wholes("System.redundant", self.redundant), nc))
+        self._put_friction(nc)
         self._check_told()
         if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
             raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
@@ -164,6 +176,11 @@ class System:
         return self.switch is not None and np.size(self.discrete) > self.kinks
 
     @property
+    def frictional(self) -> bool:
+        """Whether a contact has friction."""
+        return bool(np.any(np.asarray(self.tangents) > 0))
+
+    @property
     def held(self) -> NDArray[np.bool_]:
         """Which rows (nc,) are always on, without those that follow from them."""
         held: NDArray[np.bool_] = np.asarray(self.unilateral) == 0
@@ -185,6 +202,35 @@ class System:
 
             given["control"] = control
         return {name: getattr(_none, name, None) if kernel is None else kernel for name, kernel in given.items()}
+
+    def _put_friction(self, nc: int) -> None:
+        """Find the tangential rows of every normal row and check that the machine can do what they ask."""
+        put, follows = object.__setattr__, np.asarray(self.follows)
+        given, drift = self._row_field("mu", nc, np.float64), self._row_field("drift", nc, np.float64)
+        if np.any(np.isnan(given)) or np.any(given < 0.0):
+            raise SceneError(
+                f"System.mu is {given.tolist()}; it must be at least 0, infinite where a row never slides."
+            )
+        slides = np.isfinite(given) & (follows >= 0)
+        first, count, mu = np.full(nc, -1), np.zeros(nc, np.int64), np.zeros(nc)
+        for normal in np.unique(follows[slides]).tolist():
+            rows = np.flatnonzero(slides & (follows == normal))
+            if len(rows) > 2 or rows[-1] - rows[0] != len(rows) - 1 or len(set(given[rows].tolist())) > 1:
+                raise SceneError(
+                    f"Rows {rows.tolist()} follow row {normal} with mu = {given[rows].tolist()}; it has one or two "
+                    "tangential rows, one behind the other, of one mu."
+                )
+            if follows[normal] >= 0 or not np.asarray(self.unilateral)[normal]:
+                raise SceneError(f"Row {normal} has friction; it must be able to open and follow no other.")
+            if given[rows[0]] > 0.0:
+                first[normal], count[normal], mu[normal] = rows[0], len(rows), given[rows[0]]
+        if not np.all(np.isfinite(drift)) or np.any(drift[~slides] != 0.0):
+            raise SceneError(f"System.drift is {drift.tolist()}; it must be finite, and 0 but of rows with friction.")
+        put(self, "mu", frozen("System", "mu", given, (nc,)))
+        put(self, "friction", frozen("System", "friction", mu, (nc,)))
+        put(self, "drift", frozen("System", "drift", drift, (nc,)))
+        put(self, "tangent", frozen("System", "tangent", first, (nc,), np.int64))
+        put(self, "tangents", frozen("System", "tangents", count, (nc,), np.int64))
 
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
         return full("System", name, getattr(self, name), nc, dtype)

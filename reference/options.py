@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from crossbody.cases import InvalidValue, UnknownName
+from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases.arguments import flag, real, shown
 from crossbody.cases.arrays import frozen
 from crossbody.cases.control import Control
@@ -170,6 +170,28 @@ class Options:
                 f"{asked} maps a collision by a linear law, but row {cubic[0]} has b2 > 0; valid: b2 = 0 or 'resolved'."
             )
         return True
+
+    def check_friction(self, system: System) -> None:
+        """Refuse what contacts with friction do not have.
+
+        Raises:
+            InvalidValue: for another machine or solver.
+            SceneError: for a system with loops, fast constants or an algebra of its own.
+        """
+        if not system.frictional:
+            return
+        why = "the system has contacts with friction (System.mu)"
+        if self.fsm != "level":
+            raise InvalidValue(f"fsm is {self.fsm!r}, and {why}; valid: 'level'.")
+        if self.solver != "compiled":
+            raise InvalidValue(f"solver is {self.solver!r}, and {why}; valid: 'compiled'.")
+        rows = np.flatnonzero(system.held)
+        if len(rows):
+            raise SceneError(f"Row {rows[0]} is always on, and {why}: loops beside friction are not done.")
+        if np.any(np.asarray(system.b0) > 0.0) or np.any(np.asarray(system.b1) > 0.0):
+            raise SceneError(f"System.b0, b1 are given, and {why}: collisions with friction are not done.")
+        if system.solve is not None:
+            raise SceneError(f"System.solve is given, and {why}: they are solved for by the general algebra.")
 
     def schedule(self, system: System, *, played: bool = False) -> tuple[Floats, Floats]:
         """Times (m,) and values (m, nu) of the inputs, checked, with those that stand for activations.

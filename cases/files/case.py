@@ -21,6 +21,7 @@ from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
+from crossbody.cases.scene_contacts import check_pairs
 from crossbody.cases.scene_rows import law_of, rows_of
 
 REFERENCE_POSE, UNNAMED = "reference", "scene"
@@ -34,6 +35,9 @@ PARAMETERS = {
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
+    "friction": Parameter(
+        default=False, doc="contacts that slide have rows: the reference alone runs it", low=0, high=1
+    ),
     "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
     "rank": Parameter(default=-1, doc="rows of the loops that hold; -1: those that surely do", low=-1, high=1e6),
     "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
@@ -75,7 +79,8 @@ class FileCase:
             q0, v0 = assembled(model, q0, v0)
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         act0 = np.zeros(self.model.na) if index < 0 else self.model.key_act[index]
-        scene = overruled(scene_of(self.path, model), float(p["a0"]), float(p["a1"]))
+        scene = scene_of(self.path, model).replace(friction=bool(p["friction"]))
+        scene = overruled(scene, float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
         case = case_of(
@@ -166,6 +171,8 @@ def case_of(
         SceneError: for a scene that no engine here can run, naming what stands against it.
     """
     check_runnable(scene)
+    if not file:  # of a file's the run tells whether they meet
+        check_pairs(scene)
     if rank >= 0 and not scene.loops:
         raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))

@@ -59,6 +59,12 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
     return ""
 
 
+_FRICTION = (
+    "they have friction (without=friction leaves it out of every engine; friction=1 has it in the reference, where "
+    "shapes that slide and neither spin nor roll meet planes, or spheres each other)"
+)
+
+
 def _why(model: Any, pair: tuple[int, ...]) -> str:
     """Return why such shapes have no row."""
     import mujoco
@@ -67,7 +73,7 @@ def _why(model: Any, pair: tuple[int, ...]) -> str:
     one, two = ("hull" if kind == "mesh" else kind for kind in types)
     if not {(one, two), (two, one)} & PLACES.keys():
         return f"no gap of a {one} and a {two} is known"
-    reasons = ["they have friction (without=friction leaves it out of every engine)"] * _rubs(model, pair)
+    reasons = [_FRICTION] * _rubs(model, pair)
     if "hull" in (one, two):
         most = PLACES["plane", "hull"]
         reasons.append(f"the hull has more than {most} corners (a mesh of a file has at most its maxhullvert)")

@@ -89,6 +89,7 @@ def scene_of(model: mujoco.MjModel) -> Scene:
         tendons=tuple(_tendon(model, i) for i in range(model.ntendon)),
         actuators=tuple(_actuator(model, i) for i in range(model.nu)),
         gravity=tuple(model.opt.gravity) if not model.opt.disableflags & _disabled("GRAVITY") else (0.0, 0.0, 0.0),
+        friction=False,  # a file runs in every engine unless it is asked for
     )
 
 

@@ -18,6 +18,7 @@ from pydrake.systems.framework import BasicVector, DiagramBuilder, LeafSystem
 from crossbody.cases import Case, CaseUnsupported, Mode, Outcome, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene, Tendon
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Log
@@ -41,6 +42,8 @@ def hidden(profile: str) -> dict[str, str]:
 
 def why_not(scene: Scene) -> str | None:
     """Return why a scene has no motion in a plant without rows; None if it has one."""
+    if found := frictional(scene):
+        return found
     if scene.loops:
         return f"The loop {scene.loops[0].name!r} is a row, and {NO_ROWS}"
     forces = Forces(scene)

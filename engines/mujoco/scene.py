@@ -18,6 +18,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
+from crossbody.cases.scene_contacts import frictional
 from crossbody.cases.scene_rows import rows_of, under_law
 from crossbody.engines._acting import Acting
 from crossbody.engines._real_time import followed as real_time
@@ -64,6 +65,8 @@ def why_not(case: Case, profile: str) -> str | None:
         return (
             "What MuJoCo makes of a robot file by itself is the profile as_is; default is that of scenes without one."
         )
+    if case.scene is not None and (found := frictional(case.scene)):
+        return found
     if profile != "as_is":
         return None
     if not case.file:

@@ -13,6 +13,7 @@ import pinocchio as pin
 from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
 from crossbody.engines._real_time import followed as real_time
@@ -44,6 +45,8 @@ Placed = dict[str, tuple[int, Any]]
 
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: bounds and loops follow the law alone."""
+    if case.scene is not None and (found := frictional(case.scene)):
+        return found
     if profile != "law" and case.general:
         return "The rows of a scene follow the law: impacts in no time and time stepping have none."
     return None

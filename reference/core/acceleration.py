@@ -14,6 +14,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import copy, factor_mass, factor_schur, solve_mass, solve_schur
+from crossbody.reference.core.friction import FACTOR, NOTHING, SOLVE, ask, enter
 from crossbody.reference.core.layout import BILATERAL, COLLISION, CONTACT, Model, Work
 from crossbody.reference.core.shares import solve_dependent
 from crossbody.reference.kinds import Array, Bytes, Floats
@@ -24,8 +25,8 @@ OWN, GENERAL, SMOOTH = np.arange(3)
 
 @compiled
 def is_active(mode: int) -> bool:
-    """CONTACT, COLLISION and BILATERAL rows carry a multiplier."""
-    return bool(mode in (CONTACT, COLLISION, BILATERAL))
+    """Rows that are in contact, however, or always on carry a multiplier."""
+    return bool(mode in (CONTACT, COLLISION) or mode >= BILATERAL)  # STICK and SLIP stand behind it
 
 
 @compiled
@@ -47,6 +48,8 @@ def laws_in_force(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     s.have_laws = 1
     for i in range(s.nc):
         w.law[i, 0], w.law[i, 1], w.law[i, 2] = law_of(m, mode, i)
+    if s.frictional:
+        enter(s, m, w, mode)
 
 
 @compiled
@@ -165,6 +168,8 @@ def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array
     for j in range(na):
         _rate_and_drive(s, m, w, on, j, v)
         _schur_row(s, m, w, j)
+    if s.frictional:
+        return int(ask(FACTOR, s, m, w, np.int64(on > 0.0)))
     s.dependent = factor_schur(w.G, na, w.reach, w.idx, w.shares)
     return int(s.dependent < 0)
 
@@ -243,7 +248,7 @@ def accelerate(
     on = 0.0 if general == SMOOTH else 1.0
     if s.has_solve and general == OWN:
         return int(solve(t, q, v, w.u, m.p, w.w, w.law, w.idx, na, w.vd, w.la, w.hda))
-    if s.n == 1 and na <= 1:
+    if s.n == 1 and na <= 1 and not s.frictional:
         return _scalar(dynamics, rows, s, m.p, w, on, t, q, v)
     if free(dynamics, s, m, w, t, q, v) != 0:
         return 1
@@ -251,7 +256,9 @@ def accelerate(
         return 0
     if assemble(rows, s, m, w, on, t, q, v) != 0:
         return 1
-    if s.dependent == 0:
+    if s.frictional:
+        ask(SOLVE, s, m, w, NOTHING)
+    elif s.dependent == 0:
         solve_schur(w.G, na, w.reach, w.r, w.la)
     elif not solve_dependent(s, w, q, v):
         return 1

@@ -15,14 +15,16 @@ from crossbody.reference.core import (
     events,
     exact,
     folds,
+    guards,
     journal,
     peaks,
     record,
     settle,
     stepping,
 )
-from crossbody.reference.core.acceleration import scatter
+from crossbody.reference.core.acceleration import GENERAL, accelerate, scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
+from crossbody.reference.core.friction import BEGIN_SLIP, FOLLOW_TURNS, NOTHING, RENEW, ask
 from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
     DONE,
@@ -37,6 +39,7 @@ from crossbody.reference.core.layout import (
     MORE,
     NODES,
     NOT_FINITE,
+    PAINLEVE,
     ROWS_FULL,
     SHORT,
     Buffers,
@@ -156,6 +159,9 @@ def _move(s: Any, w: Work, t: float) -> None:
 def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Apply the transitions that fired at the step's end and settle what follows from them."""
     nq = s.nq
+    if s.frictional:
+        K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
+        ask(FOLLOW_TURNS, s, m, w, NOTHING)
     if s.natural:
         if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
             return ILL_POSED
@@ -164,6 +170,8 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
     moved, touched = False, False
+    if s.frictional and _slip_or_jam(K, s, m, w, b):
+        return PAINLEVE
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
@@ -173,7 +181,7 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
                 moved = True
     for i in range(s.nc if touched else 0):
         if events.touches_too(s, m, w, b.mode, i):
-            journal.move(s, b, i, active_mode(s, m, i))
+            journal.move(s, b, i, active_mode(s, m, w, i))
     if moved and journal.remember(s, b):
         if s.one_by_one:
             return MODE_CYCLE
@@ -187,6 +195,23 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if code == 0:
         record.here(K, s, m, w, b.mode, b.out, b.modes, s.audited)
     return int(code)
+
+
+@compiled
+def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked."""
+    slips = False
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta and w.kind[i] == guards.JAM:
+            marks = b.history[len(b.history) - 1]
+            marks[:] = 0
+            marks[i] = 1
+            return True
+        slips = slips or (w.hit[i] <= s.theta and w.kind[i] == guards.CONE)
+    nq = s.nq
+    if slips and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
+        ask(BEGIN_SLIP, s, m, w, NOTHING)
+    return False
 
 
 @compiled
@@ -224,6 +249,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)
+    if s.frictional:
+        ask(RENEW, s, m, w, NOTHING)
     if s.audited:
         code = audit.account(K, s, m, w)
         if code != 0:

@@ -13,6 +13,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, pushed, weigh
 from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.friction import is_shared
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
 from crossbody.reference.kinds import Bytes
 
@@ -55,6 +56,8 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
         if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t + s.hs, q, v, GENERAL) != 0:
             return True  # redundant for the general algebra: nothing to compare with
     for j in range(s.na):
+        if s.frictional and is_shared(s, m, w, w.idx[j]):
+            continue
         missing, rounding = _residual(s, m, w, b.mode, j, stage)
         if missing <= CLOSE * w.scale[j] + rounding:
             continue

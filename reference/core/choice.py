@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import dop853
 from crossbody.reference.core.dop853_table import STABILITY_LIMIT
+from crossbody.reference.core.friction import NOTHING, TURNING_RATE, ask
 from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work
 
 SAFETY = 0.9
@@ -44,7 +45,7 @@ def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
 
 
 @compiled
-def longest_step(s: Any, w: Work) -> float:
+def longest_step(s: Any, m: Model, w: Work) -> float:
     """The longest step that may be tried: an explicit one is stable for the active rows.
 
     Beyond that what the error estimate lets pass is far larger inside the step, where events are located: the dense
@@ -54,6 +55,8 @@ def longest_step(s: Any, w: Work) -> float:
     if s.method != EXPLICIT or s.na == 0:
         return float(s.h_max)
     s.row_rate = _row_rate(s, w)
+    if s.frictional:
+        s.turning_rate = ask(TURNING_RATE, s, m, w, NOTHING)
     return float(min(s.h_max, STABILITY_LIMIT / s.row_rate) if s.row_rate > 0.0 else s.h_max)
 
 
@@ -76,7 +79,8 @@ def choose_method(s: Any, w: Work) -> None:
     if s.method == EXPLICIT:
         if s.hold > 0:
             s.hold -= 1
-        s.stalled = s.stalled + 1 if s.hs * s.row_rate > STALLED_PART * STABILITY_LIMIT else 0
+        rate = max(s.row_rate, s.turning_rate) if s.frictional else s.row_rate
+        s.stalled = s.stalled + 1 if s.hs * rate > STALLED_PART * STABILITY_LIMIT else 0
         if s.implicit and s.hold == 0 and s.stalled >= STALLED_STEPS:
             s.method, s.have_jacobian = IMPLICIT, 0
             s.explicit_rate = s.hs / EXPLICIT_COST

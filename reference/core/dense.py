@@ -137,7 +137,7 @@ def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array, lef
     Returns:
         Whether the workspace holds the acceleration and the multipliers there, so that they need not be evaluated.
     """
-    if theta == 0.0 or not long_for_rows(s) or s.na == 0 or not exact.is_linear(s, w):
+    if theta == 0.0 or not long_for_rows(s) or s.na == 0 or s.frictional or not exact.is_linear(s, w):
         return False
     q, v = out[: s.nq], out[s.nq :]
     t = theta * s.hs

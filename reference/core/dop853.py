@@ -56,6 +56,9 @@ def powers(K: Any, s: Any, m: Model, w: Work, t: float, q: Array, v: Array, stag
         kz[i] = 0.0
     for j in range(s.na):
         kz[idx[j]] = la[j] * hda[j]
+    if s.frictional:
+        for j in range(s.na):  # what a surface does that moves by itself is work as well
+            kz[idx[j]] += la[j] * m.drift[idx[j]]
     K.power(t, q, v, w.u, m.p, e)
     kz[nc] = e[0]
     kz[nc + 1] = e[1]

@@ -25,6 +25,7 @@ from crossbody.reference.core.dop853 import (
     watch_guards,
     watch_multipliers,
 )
+from crossbody.reference.core.friction import NOTHING, SOLVE, TURN_PART, ask, has_friction
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -57,6 +58,8 @@ def jacobian(K: Any, s: Any, m: Model, w: Work, h: float) -> int:
         return 1
     for j in range(s.na):
         _row_part(s, m, w, j)
+        if s.frictional and has_friction(m, w.idx[j]):
+            _slip_part(s, m, w, w.idx[j])
     s.have_jacobian = 1
     return _newton_matrix(s, w, h)
 
@@ -91,9 +94,14 @@ def _displace(s: Any, w: Work, c: int, step: float) -> None:
 def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
     """Subtract M^-1 H^T (G^-1)_.j (a0_j + 3 a2_j h_j^2, a1_j) H_j."""
     i = w.idx[j]
+    if s.frictional and w.slides[i] and not has_friction(m, i):
+        return  # what slides has no law of its own
     w.r[: s.na] = 0.0
     w.r[j] = 1.0
-    solve_schur(w.G, s.na, w.reach, w.r, w.la)
+    if s.frictional:
+        ask(SOLVE, s, m, w, NOTHING)
+    else:
+        solve_schur(w.G, s.na, w.reach, w.r, w.la)
     spring = w.law[i, 0] + 3.0 * w.law[i, 2] * w.ha[j] ** 2
     w.d[:] = 0.0
     push_rows(m, w, s.na, w.la, 1.0, w.d)
@@ -101,6 +109,20 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
         for c in range(m.span[i, 0], m.span[i, 1]):
             w.Jq[a, c] -= w.d[a] * spring * w.H[j, c]
             w.Jv[a, c] -= w.d[a] * w.law[i, 1] * w.H[j, c]
+
+
+@compiled
+def _slip_part(s: Any, m: Model, w: Work, i: int) -> None:
+    """Add what follows from friction that turns with the slip of contact i."""
+    turn = ask(TURN_PART, s, m, w, i)
+    if turn == 0.0:
+        return
+    c, t = w.listed[m.tangent[i]], m.tangent[i]
+    w.d[:] = 0.0
+    push_rows(m, w, s.na, w.la, 1.0, w.d)
+    for a in range(s.n):
+        for b in range(m.span[t, 0], m.span[t, 1]):
+            w.Jv[a, b] += w.d[a] * turn * (w.along[c] * w.H[c + 1, b] - w.along[c + 1] * w.H[c, b])
 
 
 @compiled

@@ -15,13 +15,17 @@ from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
+from crossbody.reference.core.friction import WATCH, ask
 from crossbody.reference.core.guards import (
     CATCH,
+    CONE,
     HANDOVER,
+    JAM,
     LEAVE,
     NONE,
     PRESS,
     RELEASE,
+    STOP,
     SWITCH,
     TOUCH,
     TOUCH_INSIDE,
@@ -41,6 +45,8 @@ from crossbody.reference.core.layout import (
     NEVER,
     NODES,
     NOT_FINITE,
+    SLIP,
+    STICK,
     Model,
     Work,
 )
@@ -61,6 +67,10 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
             other = LEAVE
         elif mode[i] == COLLISION:
             other = HANDOVER
+        elif mode[i] == STICK:
+            other = CONE
+        elif mode[i] == SLIP:
+            other = STOP
     else:
         kind = LEAVE
         other = CATCH if s.fsm == LEVEL else PRESS
@@ -74,6 +84,11 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
         second = first_below(K, s, m, w, mode, other, i)
         if not second >= place:  # NaN too
             w.kind[i] = other
+            place = second
+    if other == STOP:
+        second = first_below(K, s, m, w, mode, JAM, i)
+        if not second >= place:
+            w.kind[i] = JAM
             return second
     return place
 
@@ -113,6 +128,18 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
             if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
                 return 1
             scatter(s, w, w.lams[node])
+            if s.frictional:
+                ask(WATCH, s, m, w, node)
+    for node in range(0, NODES if s.frictional and multipliers else 0, NODES - 1):
+        dense.state(s, m, w, at_node(node), w.ys)
+        if (
+            accelerate(
+                K.dynamics, K.rows, K.solve, s, m, w, s.t_old + at_node(node) * s.hs, w.ys[: s.nq], w.ys[s.nq :], OWN
+            )
+            != 0
+        ):
+            return 1
+        ask(WATCH, s, m, w, node)
     return 0
 
 
@@ -163,7 +190,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     for i in range(s.nc):
         hit[i] = NEVER
         kind[i] = NONE
-        if unilateral[i] and follows[i] < 0 and not w.idle_rows[i] and filters.row_may_switch(s, w, mode, i):
+        if unilateral[i] and follows[i] < 0 and not w.idle_rows[i] and filters.row_may_switch(s, m, w, mode, i):
             hit[i] = 1.0
             any_gap = True
             any_multiplier = any_multiplier or is_active(mode[i])
@@ -233,8 +260,12 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return FREE
     if kind == HANDOVER:
         return CONTACT
+    if kind == CONE:
+        return SLIP
+    if kind == STOP:  # else it has turned by more than a right angle within a step
+        return STICK if active_mode(s, m, w, i) == STICK else int(mode[i])
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
         return int(mode[i])
     if s.frozen and m.beta[i, 0] > 0.0:
         return int(mode[i])  # a frozen collision settles it
-    return active_mode(s, m, i)
+    return active_mode(s, m, w, i)

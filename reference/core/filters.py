@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import bogacki, dop853_table, esdirk
 from crossbody.reference.core.algebra import inverse_diagonal
+from crossbody.reference.core.friction import HOLDS_ON, ask
 from crossbody.reference.core.layout import (
     BETWEEN,
     COLLISION,
@@ -21,6 +22,8 @@ from crossbody.reference.core.layout import (
     LEVEL,
     NODES,
     SHORT,
+    STICK,
+    Model,
     Work,
 )
 from crossbody.reference.kinds import Bytes
@@ -135,7 +138,7 @@ def _stays_open(s: Any, w: Work, i: int) -> bool:
 
 
 @compiled
-def row_may_switch(s: Any, w: Work, mode: Bytes, i: int) -> bool:
+def row_may_switch(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether a row may switch in this step, by bounds from what the stages have evaluated anyway."""
     if s.method == EXACT or s.fsm != LEVEL:
         return True
@@ -143,6 +146,8 @@ def row_may_switch(s: Any, w: Work, mode: Bytes, i: int) -> bool:
         return not _stays_open(s, w, i)
     if mode[i] == COLLISION:
         return not (_presses_on(s, w, i) and _stays_elastic(s, w, i))
+    if mode[i] == STICK:
+        return not (_presses_on(s, w, i) and ask(HOLDS_ON, s, m, w, i) > 0.0)
     return mode[i] != CONTACT or not _presses_on(s, w, i)
 
 

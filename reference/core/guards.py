@@ -10,13 +10,16 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
+from crossbody.reference.core.friction import MARGIN, STIFFNESS, ask, has_friction, slip_along, small_slip
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
-from crossbody.reference.core.machine import multiplier_if_active, slow
+from crossbody.reference.core.machine import multiplier_if_active, off_law, slow
 from crossbody.reference.kinds import Array, Bytes
 
 # Guards: each fires where all of its functions are below zero.
-NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH = np.arange(9)
-FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1])
+NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH, CONE, STOP, JAM = np.arange(12)
+FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1, 1, 1, 1])
+GRAZE = 0.1  # part of the slip velocity without a direction of its own, by which one may pass zero
+ON_BOUND = 1e-9  # part of the bound of a contact's friction below which one that sticks has only begun to
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 
 
@@ -57,7 +60,7 @@ def rise(s: Any) -> float:
 
 
 @compiled
-def arm(s: Any, w: Work, kind: int, i: int) -> None:
+def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
     """Where the functions of a guard count as zero: at zero if they start clearly off it, else beyond what is noise.
 
     A rate, or a multiplier, that starts as zero but for rounding would fire on it. One that was clear of it is located
@@ -70,6 +73,21 @@ def arm(s: Any, w: Work, kind: int, i: int) -> None:
         w.bands[1] = slow(s)
     elif kind == CATCH and abs(w.rates[0, i]) <= slow(s):
         w.bands[0] = slow(s)
+    elif kind == STOP:
+        # A slip that grazes zero goes on, and one that begins does not stop.
+        w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + GRAZE * small_slip(s)
+    elif kind == CONE:
+        begun = max(ON_BOUND * m.friction[i] * abs(w.lams[0, i]), w.tolerated[i])
+        if w.cones[0, i] <= begun:
+            w.bands[0] = 2.0 * begun
+
+
+@compiled
+def _of_friction(K: Any, s: Any, m: Model, w: Work, what: int, i: int, t: float, y: Array) -> None:
+    """Leave in w.parts how far contact i is from sliding (MARGIN), or from a jam (STIFFNESS)."""
+    w.parts[0] = np.nan
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], GENERAL) == 0:
+        w.parts[0] = ask(what, s, m, w, i)
 
 
 @compiled
@@ -90,6 +108,11 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     elif kind == PRESS:
         lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
         w.parts[0] = w.noise[i] - lam if lam > -np.inf else REDUNDANT
+    elif kind in (CONE, JAM):
+        _of_friction(K, s, m, w, MARGIN if kind == CONE else STIFFNESS, i, t, w.ys)
+    elif kind == STOP:
+        K.gaps(t, q, v, m.p, w.gap, w.rate)
+        w.parts[0] = slip_along(m, w, i, w.rate)
     else:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         h, rate = w.gap[i], w.rate[i]
@@ -101,8 +124,11 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
             w.parts[0], w.parts[1] = h - s.touch, rate
         else:
             w.parts[0] = rate
-            lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
-            w.parts[1] = -lam if lam > -np.inf else REDUNDANT
+            if s.frictional and has_friction(m, i):  # its multiplier is infinite where it would jam
+                w.parts[1] = off_law(K, s, m, w, i, t, q, v)
+            else:
+                lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
+                w.parts[1] = -lam if lam > -np.inf else REDUNDANT
     for j in range(FUNCTIONS[kind]):
         w.parts[j] += w.bands[j]
 
@@ -139,7 +165,7 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     Returns:
         The first function's derivative over the rate of the gap; 0 if it is none of the gap.
     """
-    arm(s, w, kind, i)
+    arm(s, m, w, kind, i)
     w.tiny[:] = 0.0
     scale = 0.0
     if kind in (TOUCH, TOUCH_INSIDE, LEAVE):
@@ -159,6 +185,10 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
             row[node] = w.lams[node, i] + w.bands[0]
         elif kind == SWITCH:
             row[node] = w.guards[node, i]
+        elif kind == STOP:
+            row[node] = slip_along(m, w, i, w.rates[node]) + w.bands[0]
+        elif kind in (CONE, JAM):
+            row[node] = w.cones[node, i] + w.bands[0]
         else:
             functions(K, s, m, w, mode, kind, i, at_node(node))
             for j in range(FUNCTIONS[kind]):

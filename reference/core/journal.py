@@ -29,6 +29,19 @@ def move(s: Any, b: Buffers, i: int, after: int) -> None:
 
 
 @compiled
+def change(s: Any, b: Buffers, i: int, after: int) -> None:
+    """Put row i in another mode; where it has just been moved, at this instant, it was moved there at once."""
+    e = s.events - 1
+    while e >= 0 and b.events_t[e] == s.t:
+        if b.events[e, 0] == i:
+            b.events[e, 2] = after
+            b.mode[i] = after
+            return
+        e -= 1
+    move(s, b, i, after)
+
+
+@compiled
 def remember(s: Any, b: Buffers) -> bool:
     """Note the mode set; whether it stood here at this instant before."""
     if abs(s.t - s.history_t) > 8.0 * ULP * abs(s.t):

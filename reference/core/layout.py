@@ -13,6 +13,7 @@ from crossbody.reference.kinds import Bytes, Bytes2, Floats, Floats2, Index, Ind
 # Return codes of `advance`; the Python side turns them into outcomes.
 DONE, MORE, ROWS_FULL, EVENTS_FULL = 0, 1, 2, 3
 STEP_TOO_SMALL, NOT_FINITE, ILL_POSED, MODE_CYCLE, DIVERGED, LOST, INCONSISTENT = -1, -2, -3, -4, -5, -6, -7
+PAINLEVE, NO_CONSISTENT_MODES = -8, -9
 
 # Machines, rules for several contacts, methods.
 LEVEL, EDGE, MEMORYLESS = 0, 1, 2
@@ -20,7 +21,7 @@ SEQUENTIAL, SIMULTANEOUS, RESOLVED = 0, 1, 2
 EXPLICIT, IMPLICIT, EXACT, SHORT = 0, 1, 2, 3
 
 # Modes, as in crossbody.cases.Mode.
-FREE, CONTACT, BALLISTIC, COLLISION, COLLISION_SEPARATION, BILATERAL = 0, 1, 2, 3, 4, 5
+FREE, CONTACT, BALLISTIC, COLLISION, COLLISION_SEPARATION, BILATERAL, STICK, SLIP = 0, 1, 2, 3, 4, 5, 6, 7
 
 NODES = 5  # a step is watched at its ends and at three points between
 STAGES_MOST = 12  # of any method, the start counted
@@ -28,6 +29,12 @@ BETWEEN = 3  # stages at which gaps and guards are looked at
 WINDOW_LEVELS = 26  # times that a step is halved in search of an event, and once: a dip as narrow is rounding
 FUNCTIONS_MOST = 4  # that make up one guard
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
+SETS = 64  # of modes that are remembered while those of friction are decided
+OF_FRICTION = (
+    "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
+    "wants", "begins", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight", "found",
+    "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
+)  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
 STATE = np.dtype(
@@ -60,6 +67,8 @@ STATE = np.dtype(
         ("has_energy", "i8"),
         ("has_control", "i8"),
         ("has_switch", "i8"),
+        ("frictional", "i8"),  # some rows in contact have friction
+        ("friction_code", "i8"),  # where the code stands that answers for them
         ("rtol", "f8"),
         ("atol", "f8"),
         ("t_end", "f8"),
@@ -115,6 +124,18 @@ STATE = np.dtype(
         ("spoilt", "i8"),  # a row holds what is not finite
         ("events", "i8"),
         ("switches", "i8"),
+        ("turning_rate", "f8"),  # fastest at which friction turns a slip, at a step's start
+        ("slip_speed", "f8"),  # largest speed seen at contacts with friction
+        ("unknowns", "i8"),  # of the algebra of friction: how many,
+        ("normals", "i8"),  # and how many are no sticking rows
+        ("rank", "i8"),
+        ("dependent_rows", "i8"),
+        ("rank_first", "i8"),
+        ("rank_second", "i8"),
+        ("sets", "i8"),  # of modes that were tried
+        ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters
+        ("not_unique", "i8"),  # instants at which more than one set of modes was consistent
+        ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("energy_start", "f8"),
         ("energy_unit", "f8"),  # kinetic energy of unit velocities
         ("energy_size", "f8"),
@@ -144,6 +165,10 @@ class Model:
     follows: Index  # the row whose activity this row shares; -1 for none
     span: Index2  # (nc, 2) first column, and one past the last, of each row of H
     above: Index  # nearest lower coordinate that M couples each one to; -1 for none
+    friction: Floats  # (nc,) coefficient of each normal row
+    tangent: Index  # (nc,) its first tangential row,
+    tangents: Index  # and how many there are, one behind the other; 0 without friction
+    drift: Floats  # (nc,) velocity of a surface along a tangential row
 
 
 class Buffers:
@@ -257,6 +282,50 @@ class Work:
     place: Floats  # (nq,) a stage's position without its own part; scratch
     turn: Floats  # (nq,) scratch
     slip: Floats  # (n,) scratch
+    # Where contacts have friction, and empty elsewhere:
+    way: Floats  # (nc,) by tangential row: direction of slip of reference
+    rest: Floats  # (nc,) slip velocity with which one began that counted as none
+    kept_way: Floats
+    kept_other: Floats
+    kept_excess: Floats
+    along: Floats  # (nc,) by place: direction of slip
+    slides: Bytes  # rows of contacts that slide
+    off: Bytes  # rows that are left out while modes are decided
+    listed: Index  # where each row stands among those in contact
+    stands: Bytes  # contacts without a slip velocity
+    state: Bytes  # mode that is tried
+    wants: Bytes  # mode that each contact would rather have
+    sets: Bytes2  # (64, nc) sets that were tried
+    begins: Bytes  # contacts that have begun to slide at this instant
+    cones: Floats2  # (5, nc) at the nodes of the step: how far a contact is from sliding, or one that slides from a jam
+    bare: Floats  # (nc,) right-hand sides without what pulls sticking rows back
+    excess: Floats  # (nc,) by how much faster than its law each row moves
+    unknown: Index  # places that are solved for, sticking rows last
+    size: Floats  # their sizes
+    matrix: Floats2  # the system that is solved, and its factors
+    down: Index
+    across: Index
+    first: Floats2  # the same of the normal rows alone,
+    second: Floats2  # and of what they leave of the sticking ones
+    down2: Index
+    across2: Index
+    held: Floats2  # what couples both
+    square: Floats2  # scratch
+    weight: Floats
+    found: Floats
+    beside: Floats
+    left: Floats
+    press: Floats
+    full: Floats  # (nc,) right-hand sides with what pulls back those that are tried to stick,
+    load: Floats  # and their multipliers
+    chosen: Floats  # excess of the set that was found first
+    tolerated: Floats  # by how much a force may be beyond its bound where modes are decided
+    turns: (
+        Floats2  # how accelerations across contacts that begin to slide change with their directions, and its factors
+    )
+    turn_by: Floats  # by how much each turns
+    turning: Index  # their places
+    turned: Index  # pivots
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)
@@ -264,10 +333,11 @@ open_model, open_buffers, open_work = opener(MODEL), opener(BUFFERS), opener(WOR
 
 
 def workspace(
-    n: int, nq: int, has_velocity: bool, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: int, nd: int
-) -> dict[str, Any]:
+    n: int, nq: int, has_velocity: bool, nc: int, nu: int, k: int, nz: int, ns: int, nw: int, ng: int, nd: int,
+    frictional: bool = False,
+) -> dict[str, Any]:  # fmt: skip
     """Allocate the workspace: one array a field of `Work`, in its order."""
-    ny, turns = nq + n, int(has_velocity)
+    ny, turns, sliding = nq + n, int(has_velocity), nc * frictional
     shapes: dict[str, tuple[int, ...]] = {
         **dict.fromkeys(("y", "y1", "ys", "atol"), (ny,)), "k": (DENSE_STAGES, ny), "F": (DENSE_TERMS, ny),
         "tangent": (turns * nq, n), "stage_v": (6 * turns, n), "bend": (2 * turns, nq),
@@ -283,7 +353,9 @@ def workspace(
         "window": (WINDOW_LEVELS, FUNCTIONS_MOST * (NODES + 2) + NODES),
         **dict.fromkeys(("parts", "bands", "tiny"), (FUNCTIONS_MOST,)),
         **dict.fromkeys(("guard", "guard_hit"), (ng,)),
-        "guards": (NODES, ng), "discrete": (nd,),
+        "guards": (NODES, ng), "discrete": (nd,), "sets": (SETS * frictional, nc), "cones": (NODES * frictional, nc),
+        **dict.fromkeys(OF_FRICTION, (sliding,)),
+        **dict.fromkeys(("matrix", "first", "second", "held", "square", "turns"), (sliding, sliding)),
     }  # fmt: skip
     types = {"Index": np.int64, "Bytes": np.int8}
     return {

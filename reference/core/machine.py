@@ -29,6 +29,7 @@ from crossbody.reference.core.acceleration import (
 )
 from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_mass, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
+from crossbody.reference.core.friction import STANDS, ask, has_friction
 from crossbody.reference.core.layout import (
     BALLISTIC,
     COLLISION,
@@ -40,6 +41,8 @@ from crossbody.reference.core.layout import (
     ILL_POSED,
     LEVEL,
     NOT_FINITE,
+    SLIP,
+    STICK,
     Model,
     Work,
 )
@@ -69,8 +72,13 @@ def known(s: Any, w: Work) -> float:
 
 
 @compiled
-def active_mode(s: Any, m: Model, i: int) -> int:
-    """COLLISION where the row has fast constants and follows them in real time, else CONTACT."""
+def active_mode(s: Any, m: Model, w: Work, i: int) -> int:
+    """COLLISION where the row has fast constants and follows them in real time, else CONTACT.
+
+    With friction SLIP or STICK by the rates in w.rate; whether the latter holds is decided with all others that stand.
+    """
+    if s.frictional and has_friction(m, i):
+        return STICK if ask(STANDS, s, m, w, i) > 0.0 else SLIP
     return COLLISION if m.beta[i, 0] > 0.0 and not s.frozen else CONTACT
 
 
@@ -123,7 +131,10 @@ def noise(s: Any, m: Model, w: Work) -> None:
     touch, spread = touching(s, w), 0.0
     weigh(s, m, w, w.la)
     for j in range(s.na):
-        w.trial[j] = inverse_diagonal(w.G, s.na, w.reach, j, w.r)
+        if s.frictional:  # w.G has no factor, and what slides makes no symmetric matrix: by each row alone
+            w.trial[j] = 1.0 / w.gram[j, j] if w.gram[j, j] > 0.0 else 0.0
+        else:
+            w.trial[j] = inverse_diagonal(w.G, s.na, w.reach, j, w.r)
         spread = max(spread, w.trial[j])
     largest, s.unsure = 0.0, 0.0
     for j in range(s.na):
@@ -180,7 +191,7 @@ def multiplier_if_active(
 ) -> float:
     """Lam of row i if it were active now, from the same equations that the row would use; noise[i] beside it."""
     before = mode[i]
-    mode[i] = active_mode(s, m, i)
+    mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, mode)
     lam, dependent = -np.inf, -1
     w.tied[i] = 0
@@ -261,18 +272,30 @@ def _lacks(K: Any, s: Any, m: Model, w: Work, i: int, dependent: int, lam: float
 
 
 @compiled
+def off_law(K: Any, s: Any, m: Model, w: Work, i: int, t: float, q: Any, v: Any) -> float:
+    """By how much row i, not active, moves faster than its law, the others following theirs; NaN if ill posed."""
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL) != 0:
+        return np.nan
+    _alone(K, m, w, s.na, i, t, q, v)
+    return _off_law(m, w, s.na, i, 1.0, v, w.vd)[0]
+
+
+@compiled
 def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
     """Square of what row i's joining or leaving the active rows changes v' by, in the norm of M: lam^2 / (G^-1)_ii."""
     before = mode[i]
     if not is_active(before):
-        mode[i] = active_mode(s, m, i)
+        mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, mode)
     size = 0.0
     found = accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) == 0
     if found and s.dependent == 0:  # a row that depends on the others changes nothing
         for j in range(s.na):
             if w.idx[j] == i:
-                size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
+                if s.frictional:
+                    size = w.la[j] ** 2 * w.gram[j, j]
+                else:
+                    size = w.la[j] ** 2 / inverse_diagonal(w.G, s.na, w.reach, j, w.scale)
     mode[i] = before
     activate(s, m, w, mode)
     return float(size)
@@ -295,7 +318,7 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
 @compiled
 def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest: bool) -> bool:
     """Whether row i would push if it were active now; the acceleration of the present modes stands in k[0]."""
-    if at_rest or (not s.has_solve and active_mode(s, m, i) == CONTACT):
+    if at_rest or (not s.has_solve and active_mode(s, m, w, i) != COLLISION):
         return _own_press(K, s, m, w, i, at_rest)
     lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.nq], w.y[s.nq :])
     return bool(lam > w.noise[i])
@@ -324,14 +347,14 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     if mode[i] != FREE:
         closing = rate < -slow(s)
         if closing and (_would_press(K, s, m, w, mode, i, False) or _is_held(K, s, m, w, mode, i)):
-            return active_mode(s, m, i)
+            return active_mode(s, m, w, i)
         return int(mode[i])
     if rate < -slow(s):
-        return active_mode(s, m, i)
+        return active_mode(s, m, w, i)
     if h < -max(DEEP, known(s, w)):
-        return active_mode(s, m, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
+        return active_mode(s, m, w, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
     if rate <= slow(s) and _would_press(K, s, m, w, mode, i, collides):
-        return active_mode(s, m, i)
+        return active_mode(s, m, w, i)
     return FREE
 
 

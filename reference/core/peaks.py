@@ -105,7 +105,7 @@ def _suspect(K: Any, s: Any, m: Model, w: Work, end: float) -> bool:
     found, starting, turning = False, False, False
     for j in range(s.na):
         i = w.idx[j]
-        if m.unilateral[i]:
+        if m.unilateral[i] and not (s.frictional and m.follows[i] >= 0):
             place = _inside(s, w, i, end)
             if place == NEVER and end == 1.0 and _may_turn(s, w, i):
                 place = 1.0

@@ -10,9 +10,11 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.collisions import collide
+from crossbody.reference.core.friction import BEGIN, DECIDE, NOTHING, ask, has_friction
 from crossbody.reference.core.holding import MOVED, doubtful, hold
-from crossbody.reference.core.journal import keep_discrete, move, remember, write_discrete
+from crossbody.reference.core.journal import change, keep_discrete, move, remember, write_discrete
 from crossbody.reference.core.layout import (
+    BALLISTIC,
     EDGE,
     FREE,
     ILL_POSED,
@@ -126,6 +128,26 @@ def _keep(w: Work) -> None:
 
 
 @compiled
+def _decide_friction(s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Put every contact with friction in the mode that the present instant asks for, after it was evaluated.
+
+    Returns:
+        0, or NO_CONSISTENT_MODES or PAINLEVE; with one of these the last line of the history marks contacts.
+    """
+    code = int(ask(DECIDE, s, m, w, NOTHING))
+    for i in range(s.nc):
+        if code != 0:
+            b.history[len(b.history) - 1, i] = w.wants[i]
+        elif has_friction(m, i) and is_active(b.mode[i]):
+            after = w.state[i]
+            if after == FREE and w.gap[i] <= 0.0:
+                after = BALLISTIC
+            if after != b.mode[i]:
+                change(s, b, i, after)
+    return code
+
+
+@compiled
 def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Collide and switch until the mode set is consistent; 0 or a code."""
     changed = b.history[len(b.history) - 1]
@@ -134,6 +156,10 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     events, joined = s.events, False
     while True:
         code = evaluate(K, s, m, w, b.mode)
+        if s.frictional and code == 0:
+            code = _decide_friction(s, m, w, b)
+            if code == 0:
+                code = evaluate(K, s, m, w, b.mode)
         if s.sharing and (code == ILL_POSED or s.idle > 0 or (s.na > 1 and doubtful(s, w))):
             code = share(K, s, m, w, b)
             if code == MOVED:
@@ -173,7 +199,9 @@ def begin(s: Any, m: Model, w: Work) -> None:
     level one, collisions that take no time, and systems with an algebra of their own.
     """
     w.idle_rows[:], w.spent[:], w.let_go[:] = 0, 0, -np.inf
-    may = s.fsm == LEVEL and not s.frozen and not s.has_solve
+    if s.frictional:
+        ask(BEGIN, s, m, w, NOTHING)
+    may = s.fsm == LEVEL and not s.frozen and not s.has_solve and not s.frictional
     for i in range(s.nc):
         w.order[i] = i
         s.switching |= m.unilateral[i]

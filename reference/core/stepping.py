@@ -106,7 +106,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     clipped = False
     rejected = False
     ill = 0
-    longest = choice.longest_step(s, w)
+    longest = choice.longest_step(s, m, w)
     for _ in range(MAX_REJECTIONS):
         h = min(s.h, longest)
         left = s.stop - s.t

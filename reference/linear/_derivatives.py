@@ -47,6 +47,10 @@ class Point:
     p: Array | None = None
     alpha: Array | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse what has no derivatives here."""
+        check_frictionless(self.system)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Derivatives:
@@ -71,12 +75,23 @@ class Derivatives:
     size: Floats
 
 
+def check_frictionless(system: System) -> None:
+    """Refuse contacts with friction.
+
+    Raises:
+        SceneError: if there are any.
+    """
+    if system.frictional:
+        raise SceneError("The system has contacts with friction (System.mu), whose derivatives are not done.")
+
+
 def check_held(system: System, *, driven: bool = False) -> None:
     """Refuse a system whose inputs follow from its state in a way that has no derivative.
 
     Raises:
         SceneError: if a controller in Python gives its inputs, or some of them are activations.
     """
+    check_frictionless(system)
     if system.activations is not None and not driven:
         raise SceneError("Actuators with an activation have a state beside q and v: only linearise knows it.")
     if isinstance(system.control, Control):

@@ -15,6 +15,8 @@ BENDING = {CAPSULE: 1, CYLINDER: 2, BOX: 3}
 # A contact row, in the columns behind its kind: which pair, and which of its places; over a plane the
 # point that the second shape is round there, in its node's frame, and at what radius (0: a corner).
 WHICH, PLACE, POINT, RADIUS = 1, 2, 3, 6
+ACROSS = 7
+"""Of a tangential row, which has those of its contact besides: 0 or 1, by the direction."""
 # How two shapes lie to each other: not yet decided, at an angle, or along each other; a cylinder on the one cap or the
 # other.
 UNDECIDED, CROSSED, ALONG, UPSIDE_DOWN = range(4)

@@ -11,6 +11,7 @@ from crossbody.reference.kinds import Array, Index
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.pairs.jets import value
 from crossbody.reference.tree import balls, forces, layout, loops, strings, sweeps, traced
+from crossbody.reference.tree import pair_slip as slip
 from crossbody.reference.tree.pair_rows import gradient, touch
 from crossbody.reference.tree.points import point, pull
 
@@ -123,6 +124,16 @@ def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
     return at, touch(p, w, at, o)
 
 
+@kernels.helper
+def _slip(p: Array, w: Array, i: int) -> Any:
+    """Return of the tangential row i where its shapes meet, its direction, the velocity along it and H'v."""
+    at, row = slip.place_of(p, i)
+    x, one, other = slip.meeting(p, w, at, row)
+    way = one if p[row + pairs.ACROSS].real == 0.0 else other
+    rate, turned = slip.velocity(p, w, at, x, way)
+    return x, way, rate, turned
+
+
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
     """Of every row; where points or shapes of bodies are to meet their poses are computed first."""
@@ -138,6 +149,8 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
         elif kind == layout.CONTACT:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
+        elif kind == layout.TANGENT:
+            h[i], hd[i] = 0.0 * w[0], _slip(p, w, i)[2]
         else:
             h[i], hd[i], _ = _row(q, v, p, i)
 
@@ -161,6 +174,10 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
             at, (gap, n, place) = _contact(p, w, idx[j])
             h[j], Hdv[j] = gap[0], gap[2]
             gradient(p, w, at, n, place, H[j])
+        elif kind == layout.TANGENT:
+            x, way, _, Hdv[j] = _slip(p, w, idx[j])
+            h[j] = 0.0 * w[0]
+            slip.columns(p, w, slip.place_of(p, idx[j])[0], x, way, H[j])
         else:
             h[j], _, Hdv[j] = _row(q, v, p, idx[j])
             _gradient(q, v, p, idx[j], H[j])

@@ -80,6 +80,31 @@ def _from_origin(p: Array, w: Array, node: int, a: Any, b: Any, c: Any) -> Any:
 
 
 @kernels.helper
+def field(p: Array, w: Array, node: int, x: Any) -> Any:
+    """Return the velocity of a node's material at x, three times place and velocity, and how it changes along x.
+
+    At v' = 0; of the world's node, -1, both are zero.
+    """
+    zero = 0.0 * w[0]
+    if node < 0:
+        return (zero, zero, zero), (zero, zero, zero)
+    y, g = layout.NODE_SCRATCH * node + layout.V_AT, layout.GRAVITY
+    z, o = layout.NODE_SCRATCH * node + layout.A_AT, _origin(p, w, node)
+    d0, d1, d2 = x[0][0] - o[0], x[1][0] - o[1], x[2][0] - o[2]
+    u = cross(w[y], w[y + 1], w[y + 2], d0, d1, d2)
+    e = cross(w[z], w[z + 1], w[z + 2], d0, d1, d2)
+    f = cross(w[y], w[y + 1], w[y + 2], x[0][1], x[1][1], x[2][1])
+    return (
+        (w[y + 3] + u[0], w[y + 4] + u[1], w[y + 5] + u[2]),
+        (
+            w[z + 3] + p[g] + e[0] + f[0],
+            w[z + 4] + p[g + 1] + e[1] + f[1],
+            w[z + 5] + p[g + 2] + e[2] + f[2],
+        ),
+    )
+
+
+@kernels.helper
 def direction(w: Array, node: int, a: Any, b: Any, c: Any) -> Any:
     """Return the same of a direction in a node's frame."""
     zero = 0.0 * w[0]

@@ -10,6 +10,7 @@ import numpy as np
 from crossbody.cases import Law
 from crossbody.cases.control import Control
 from crossbody.cases.scene import Scene
+from crossbody.cases.scene_contacts import WAYS, contacts
 from crossbody.cases.scene_rows import rows_of
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
@@ -30,6 +31,18 @@ def activations(scene: Scene, act0: Floats | None) -> Activations:
         span=np.array([part.activation_range for part in parts]),
         start=np.zeros(len(parts)) if act0 is None else np.array(act0),
     )  # fmt: skip
+
+
+def _friction(scene: Scene, nc: int) -> dict[str, Any]:
+    """Return which normal row each tangential row follows, and its coefficient."""
+    met, follows, mu = contacts(scene), np.full(nc, -1), np.full(nc, np.inf)
+    normal, row = nc - sum(len(one.rows) for one in met), nc - sum(len(one.tangents) for one in met)
+    for contact in met:
+        count = len(contact.tangents)
+        follows[row : row + count] = normal + np.arange(count) // len(WAYS)
+        mu[row : row + count] = contact.friction
+        normal, row = normal + contact.places, row + count
+    return {"follows": follows, "mu": mu}
 
 
 def system(
@@ -72,6 +85,7 @@ def system(
         n=scene.nv, nq=scene.nq, above=dof_parents(table),
         parameters=parameters, **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, b0=law.b0, b1=law.b1, unilateral=law.unilateral,
+        **_friction(scene, len(law.a0)),
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS,
     )  # fmt: skip

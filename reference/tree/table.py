@@ -234,7 +234,7 @@ class _Builder:
         pushes = [self._push(push) for push in scene.pushes]
         head[layout.PUSHES] = len(pushes)
         head[layout.SPANNED] = sum(scene.acts_along(tendon) for tendon in scene.tendons if tendon.bodies)
-        pairs_ = pair_rows(scene, self, first=len(rows) - sum(contact.places for contact in contacts(scene)))
+        pairs_ = pair_rows(scene, self, first=len(rows) - sum(len(contact.rows) for contact in contacts(scene)))
         for row in pairs_:
             row[pairs.PHASE] += self.sides + len(self.kinks)  # behind all that says how shapes lie
         head[layout.LYING] = sum(row[pairs.LIES] >= 0.0 for row in pairs_)
@@ -378,9 +378,20 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
                 rows.append(_row(layout.STRING, sign, *ends[0], *ends[1], beyond))
             else:
                 rows.append(_row(layout.TENDON_LIMIT, sign, i, beyond))
-    for i, contact in enumerate(contacts(scene)):
+    met = contacts(scene)
+    for i, contact in enumerate(met):
         rows += _contact_rows(contact, i, builder)
+    for i, contact in enumerate(met):
+        for row in _contact_rows(contact, i, builder) if contact.friction > 0.0 else ():
+            rows += [_tangent(row, across) for across in range(2)]
     return rows
+
+
+def _tangent(row: Floats, across: int) -> Floats:
+    """Return a tangential row of the contact row `row`."""
+    found = row.copy()
+    found[layout.KIND], found[pairs.ACROSS] = layout.TANGENT, across
+    return found
 
 
 def _contact_rows(contact: Contact, i: int, builder: _Builder) -> list[Floats]:

@@ -55,9 +55,10 @@ def truth_of(case: Case) -> Truth:
 
     arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
-        # SUNDIALS runs the level machine alone: the truth of another machine is known by itself only.
+        # SUNDIALS runs the level machine without friction alone: any other truth is known by itself only.
         case, first = tightened(case)
-        return _integrated(case, first, "cvode" if case.fsm == "level" else "compiled")
+        apart = case.fsm == "level" and engines.load("reference").why_not(case, "cvode") is None
+        return _integrated(case, first, "cvode" if apart else "compiled")
     motion = case.closed_form
     first = motion(np.zeros(1))
     truth = Truth(

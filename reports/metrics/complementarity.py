@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.cases.contacts import CLOSED
+from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.multipliers import told
 
 if TYPE_CHECKING:
@@ -34,8 +35,12 @@ def _open(truth: Truth, run: Trajectory) -> NDArray[np.bool_]:
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max of -lam and of |lam| on open unilateral rows, over max |lam|; NaN where lam is not known."""
-    rows = case.law.unilateral
+    """Max of -lam and of |lam| on open unilateral rows, over max |lam|; NaN where lam is not known.
+
+    Rows that follow others, those of friction, push either way.
+    """
+    system = equations(case)
+    rows = case.law.unilateral & (True if system is None else np.asarray(system.follows) < 0)
     if not rows.any():
         return None
     if told(run) is None:

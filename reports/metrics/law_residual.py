@@ -83,10 +83,11 @@ def multipliers(
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples; NaN where lam is not known.
 
-    None where nothing closes, and where a controller or discrete variables act that a row of the run does not show.
+    None where nothing closes, where contacts have friction, and where a controller or discrete variables act that
+    a row of the run does not show.
     """
     system = equations(case)
-    if system is None or (system.control is not None and run.inputs is None) or system.jumps:
+    if system is None or (system.control is not None and run.inputs is None) or system.jumps or system.frictional:
         return None
     known = told(run)
     if known is None or not finite(run):

@@ -16,6 +16,7 @@ from crossbody.reports.runs.store import Trace
 MODE_COLOURS = {
     Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
     Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
+    Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
 }  # fmt: skip
 LONGEST = 150
 """Intervals of one mode in one bar; of more, the longest are drawn."""

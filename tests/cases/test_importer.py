@@ -36,7 +36,7 @@ USED = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipso
 def told(scene: Scene) -> Scene:
     """Return what of a scene a file can say, pairs and corners sorted.
 
-    Pushes, shapes that meet nothing and unused numbers are left out.
+    Pushes, shapes that meet nothing and unused numbers are left out, and whether friction has rows: a file is asked.
     """
     met = {name for pair in scene.pairs for name in (pair.first, pair.second)}
     sizes = {s.name: (*s.size[: USED[s.type]], *(0.0,) * (3 - USED[s.type])) for s in scene.shapes if s.name in met}
@@ -52,6 +52,7 @@ def told(scene: Scene) -> Scene:
         actuators=tuple(replace(a, gear=gears[a.name]) for a in scene.actuators),
         pairs=tuple(sorted((replace(pair, friction=(0.0,) * 5) for pair in scene.pairs), key=lambda pair: pair.name)),
         pushes=(),
+        friction=False,
     )  # fmt: skip
 
 

@@ -1,0 +1,566 @@
+"""Coulomb friction in the algebra of the active rows: tangential rows that hold, or whose force follows the normal one.
+
+A contact that sticks has its tangential rows among those that are solved. One that slides has
+
+    lam_t = -mu lam_n s,    s = v_t / |v_t|
+
+in the columns, so that with G = H M^-1 H^T of all rows in contact the matrix that is solved,
+
+    A = G - mu (G_.t s) in the column of a sliding normal row
+
+is not symmetric. Rows may depend on each other, as those of a box on its corners do. Then the normal rows are fulfilled
+first, by multipliers of least norm, and the sticking ones in their null space, by those of least sum |lam_t|^2 / (mu
+lam_n): a load is shared so that no contact is nearer to its bound than it must be.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core.filters import STAGES_RANGE
+from crossbody.reference.core.friction import has_friction, is_tangent, slip_along, small_slip
+from crossbody.reference.core.guards import STOP
+from crossbody.reference.core.layout import NODES, Model, Work
+from crossbody.reference.kinds import Array, Floats, Index
+
+STOPPED = 10.0  # times as much as has no direction of its own: a contact with a slip velocity below stands
+CLEAR = 10.0  # times that, from which on it is forgotten with what velocity a slip began that counted as none
+RANK = 1e-10  # part of a contact's own size below which a pivot is that of a row which depends on others
+LIGHT = 1e-12  # part of the largest load at a contact, below which it counts as that
+OPEN = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
+SHARINGS = 3  # times that loads are shared anew: the normal ones follow from the tangential ones
+
+
+@compiled
+def begin(w: Work) -> None:
+    """Forget what another run of the same workspace has left."""
+    for left in (w.way, w.rest, w.tolerated):
+        left[:] = 0.0
+    w.off[:], w.begins[:] = 0, 0
+
+
+@compiled
+def stopped_slip(s: Any) -> float:
+    """The slip velocity below which a contact stands."""
+    return float(STOPPED * small_slip(s))
+
+
+@compiled
+def slip_velocity(m: Model, i: int, rate: Array) -> float:
+    """Size of the slip velocity of contact i, from the rates of all rows."""
+    square = 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        square += (rate[t] - m.drift[t]) ** 2
+    return float(np.sqrt(square))
+
+
+@compiled
+def face(m: Model, w: Work, i: int, rate: Array) -> None:
+    """Take the direction of the present slip velocity of contact i for that of reference."""
+    size = slip_velocity(m, i, rate)
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        w.way[t], w.rest[t] = (rate[t] - m.drift[t]) / size, 0.0
+
+
+@compiled
+def note_speed(s: Any, m: Model, rate: Array) -> None:
+    """Keep the largest speed seen at contacts with friction."""
+    for i in range(s.nc):
+        if has_friction(m, i):
+            s.slip_speed = max(s.slip_speed, slip_velocity(m, i, rate), abs(rate[i]))
+
+
+@compiled
+def follow_turns(s: Any, m: Model, w: Work) -> None:
+    """Renew directions of slips that have turned by a right angle within a step, and do not stop; rates in w.rate."""
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta and w.kind[i] == STOP and slip_velocity(m, i, w.rate) > stopped_slip(s):
+            face(m, w, i, w.rate)
+
+
+@compiled
+def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
+    """Take the directions of the present slip velocities for those of reference, where they are clear of zero."""
+    note_speed(s, m, rate)
+    for i in range(s.nc):
+        if has_friction(m, i) and w.slides[i]:
+            size, begun = slip_velocity(m, i, rate), 0.0
+            for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+                begun += w.rest[t] * w.rest[t]
+            if begun > 0.0 and size < CLEAR * stopped_slip(s):
+                continue
+            # Behind zero a stop is about to be found, if it is small; else it has turned by a right angle.
+            if size > stopped_slip(s) or (size > small_slip(s) and slip_along(m, w, i, rate) > 0.0):
+                face(m, w, i, rate)
+    if s.na > 0 and s.dependent_rows > 0:
+        s.redundant = max(s.redundant, s.dependent_rows)
+        if not s.indeterminate:
+            s.indeterminate = undetermined(s, m, w)
+
+
+@compiled
+def undetermined(s: Any, m: Model, w: Work) -> bool:
+    """Whether multipliers of the rows last factored that change no row change the motion: then the law leaves it open.
+
+    Those of contacts that stick together never do; of a box that slides and spins on four corners they do.
+    """
+    total = s.unknowns
+    _fill(s, m, w)
+    rank = factor_complete(w.matrix, total, total, w.down, w.across)
+    for k in range(rank, total):
+        for a in range(rank - 1, -1, -1):  # A z = 0
+            value = -w.matrix[a, k]
+            for c in range(a + 1, rank):
+                value -= w.matrix[a, c] * w.beside[c]
+            w.beside[a] = value / w.matrix[a, a]
+        for j in range(s.na):
+            w.trial[j] = 0.0
+        for a in range(rank + 1):
+            z = w.beside[a] if a < rank else 1.0
+            b = w.across[a if a < rank else k]
+            j = w.unknown[b]
+            i = w.idx[j]
+            w.trial[j] = z / w.size[b]
+            if has_friction(m, i) and w.slides[i]:
+                for c in range(w.listed[m.tangent[i]], w.listed[m.tangent[i]] + m.tangents[i]):
+                    w.trial[c] = -m.friction[i] * w.trial[j] * w.along[c]
+        moved, size = 0.0, 0.0
+        for j in range(s.na):
+            size += w.trial[j] * w.trial[j] * w.gram[j, j]
+            for c in range(s.na):
+                moved += w.trial[j] * w.gram[j, c] * w.trial[c]
+        if moved > OPEN * size:
+            return True
+    return False
+
+
+@compiled
+def _lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
+    """Return the slip velocity (x, y) of contact i, one that is small lengthened along the direction of reference.
+
+    So its direction changes steadily to that of reference where it vanishes: a jump would end every step.
+    """
+    t = m.tangent[i]
+    more = max(small_slip(s) - np.sqrt(x * x + y * y), 0.0)
+    return x + more * w.way[t], y + (more * w.way[t + 1] if m.tangents[i] > 1 else 0.0)
+
+
+@compiled
+def _directions(s: Any, m: Model, w: Work, turning: bool) -> None:
+    """Leave in w.along the direction in which every sliding contact slides, or that of reference."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if not has_friction(m, i) or not w.slides[i]:
+            continue
+        t, c, two = m.tangent[i], w.listed[m.tangent[i]], m.tangents[i] > 1
+        x, y = _lengthened(s, m, w, i, w.hda[c] - w.rest[t], w.hda[c + 1] - w.rest[t + 1] if two else 0.0)
+        size, ahead = np.sqrt(x * x + y * y), x * w.way[t] + (y * w.way[t + 1] if two else 0.0)
+        follows = turning and ahead > 0.0
+        w.along[c] = x / size if follows else w.way[t]
+        if two:
+            w.along[c + 1] = y / size if follows else w.way[t + 1]
+
+
+@compiled
+def _list_unknowns(s: Any, m: Model, w: Work) -> int:
+    """List in w.unknown the places that are solved for, sticking tangential rows last; how many are not of those."""
+    count = 0
+    for j in range(s.na):
+        if not w.off[w.idx[j]] and not is_tangent(m, w.idx[j]):
+            w.unknown[count] = j
+            count += 1
+    normals = count
+    for j in range(s.na):
+        i = w.idx[j]
+        if not w.off[i] and is_tangent(m, i) and not w.slides[i]:
+            w.unknown[count] = j
+            count += 1
+    s.unknowns = count
+    return normals
+
+
+@compiled
+def _size(m: Model, w: Work, j: int) -> float:
+    """Size of the row in place j, a tangential one by its normal row: it may be none that anything moves."""
+    i = w.idx[j]
+    normal = w.listed[m.follows[i]] if is_tangent(m, i) else j
+    return float(np.sqrt(max(w.gram[normal, normal], w.gram[j, j])))
+
+
+@compiled
+def _fill(s: Any, m: Model, w: Work) -> None:
+    """A of the unknowns in w.matrix, scaled by their sizes, which stand in w.size."""
+    for a in range(s.unknowns):
+        w.size[a] = _size(m, w, w.unknown[a])
+    for b in range(s.unknowns):
+        k = w.unknown[b]
+        i = w.idx[k]
+        sliding = has_friction(m, i) and w.slides[i]
+        first = w.listed[m.tangent[i]] if sliding else 0
+        for a in range(s.unknowns):
+            j = w.unknown[a]
+            total = w.gram[j, k]
+            if sliding:
+                for c in range(first, first + m.tangents[i]):
+                    total -= m.friction[i] * w.along[c] * w.gram[j, c]
+            w.matrix[a, b] = total / (w.size[a] * w.size[b])
+
+
+@compiled
+def factor_complete(A: Floats, rows: int, columns: int, down: Index, across: Index) -> int:
+    """LU factors with complete pivoting, in place; how many pivots are above RANK of the size 1 that rows have.
+
+    Args:
+        A: the matrix, overwritten by both factors; rows and columns as exchanged.
+        rows: how many it has.
+        columns: how many it has.
+        down: which row stands where.
+        across: which column stands where.
+    """
+    for a in range(rows):
+        down[a] = a
+    for b in range(columns):
+        across[b] = b
+    for c in range(min(rows, columns)):
+        best, most_a, most_b = RANK, -1, -1
+        for a in range(c, rows):
+            for b in range(c, columns):
+                if abs(A[a, b]) > best:
+                    best, most_a, most_b = abs(A[a, b]), a, b
+        if most_a < 0:
+            return c
+        if most_a != c:
+            for b in range(columns):
+                A[c, b], A[most_a, b] = A[most_a, b], A[c, b]
+            down[c], down[most_a] = down[most_a], down[c]
+        if most_b != c:
+            for a in range(rows):
+                A[a, c], A[a, most_b] = A[a, most_b], A[a, c]
+            across[c], across[most_b] = across[most_b], across[c]
+        for a in range(c + 1, rows):
+            if A[a, c] != 0.0:
+                A[a, c] /= A[c, c]
+                for b in range(c + 1, columns):
+                    A[a, b] -= A[a, c] * A[c, b]
+    return min(rows, columns)
+
+
+@compiled
+def _solve_normal(B: Floats, n: int, x: Array) -> None:
+    """X := B^-1 x of a symmetric positive definite B, which is overwritten by its Cholesky factor."""
+    for i in range(n):
+        for j in range(i + 1):
+            total = B[i, j]
+            for c in range(j):
+                total -= B[i, c] * B[j, c]
+            B[i, j] = np.sqrt(total) if i == j else total / B[j, j]
+    for i in range(n):
+        for c in range(i):
+            x[i] -= B[i, c] * x[c]
+        x[i] /= B[i, i]
+    for i in range(n - 1, -1, -1):
+        for c in range(i + 1, n):
+            x[i] -= B[c, i] * x[c]
+        x[i] /= B[i, i]
+
+
+@compiled
+def solve_complete(
+    A: Floats, n: int, rank: int, down: Index, across: Index, weight: Array, B: Floats, y: Array, x: Array
+) -> None:
+    """X := the solution of the system that `factor_complete` has factored, of least squares and of least norm.
+
+    Args:
+        A: the factors.
+        n: size of the system.
+        rank: of it.
+        down: which row stands where.
+        across: which column stands where.
+        weight: (n,) squares of entries count over these.
+        B: (n, n) scratch.
+        y: (n,) scratch.
+        x: right-hand side, overwritten.
+    """
+    for a in range(n):
+        y[a] = x[down[a]]
+    if rank == n:
+        for c in range(n):
+            for a in range(c + 1, n):
+                y[a] -= A[a, c] * y[c]
+        for c in range(n - 1, -1, -1):
+            for b in range(c + 1, n):
+                y[c] -= A[c, b] * y[b]
+            y[c] /= A[c, c]
+        for c in range(n):
+            x[across[c]] = y[c]
+        return
+    for a in range(rank):  # L^T L
+        for b in range(a + 1):
+            total = 0.0
+            for c in range(a, n):
+                total += (1.0 if c == a else A[c, a]) * (1.0 if c == b else A[c, b])
+            B[a, b] = total
+    for a in range(rank):  # L^T y, from above: what is still needed stands below
+        total = y[a]
+        for c in range(a + 1, n):
+            total += A[c, a] * y[c]
+        y[a] = total
+    _solve_normal(B, rank, y)
+    for a in range(rank):  # U W U^T
+        for b in range(a + 1):
+            total = 0.0
+            for c in range(a, n):
+                total += A[a, c] * weight[across[c]] * A[b, c]
+            B[a, b] = total
+    _solve_normal(B, rank, y)
+    for c in range(n):
+        total = 0.0
+        for a in range(min(c + 1, rank)):
+            total += A[a, c] * y[a]
+        x[across[c]] = weight[across[c]] * total
+
+
+@compiled
+def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
+    """Factor A of the rows in contact from G in the lower triangle of w.G; 1 if that is not finite.
+
+    The rates of tangential rows count from here on against what the surface does by itself. Directions of slip are
+    those of the present velocities if they are `turning`, else those of reference.
+    """
+    for j in range(s.na):
+        i = w.idx[j]
+        w.listed[i] = j
+        if m.drift[i] != 0.0:
+            w.hda[j] -= m.drift[i]
+            w.r[j] += w.law[i, 1] * m.drift[i]
+    for j in range(s.na):
+        for c in range(j + 1):
+            value = w.G[j, c] if c >= w.reach[j] else 0.0
+            w.gram[j, c] = value
+            w.gram[c, j] = value
+    _directions(s, m, w, turning)
+    factor_set(s, m, w)
+    return int(s.rank == 0 and s.unknowns > 0)
+
+
+@compiled
+def factor_set(s: Any, m: Model, w: Work) -> None:
+    """Factor A of the rows that are not off, from w.gram, w.slides and w.along."""
+    s.normals = _list_unknowns(s, m, w)
+    _fill(s, m, w)
+    s.rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across)
+    s.dependent_rows = s.unknowns - s.rank
+    if s.dependent_rows > 0:
+        _factor_in_turn(s, m, w)
+
+
+@compiled
+def _factor_in_turn(s: Any, m: Model, w: Work) -> None:
+    """Factor the normal rows alone, and what they leave of the sticking ones."""
+    count, total = s.normals, s.unknowns
+    _fill(s, m, w)
+    for a in range(count):
+        for b in range(count):
+            w.first[a, b] = w.matrix[a, b]
+        w.weight[a] = 1.0
+    s.rank_first = factor_complete(w.first, count, count, w.down, w.across)
+    for b in range(count, total):
+        for a in range(count):
+            w.found[a] = w.matrix[a, b]
+        solve_complete(w.first, count, s.rank_first, w.down, w.across, w.weight, w.square, w.beside, w.found)
+        for a in range(count, total):
+            value = w.matrix[a, b]
+            for c in range(count):
+                value -= w.matrix[a, c] * w.found[c]
+            w.second[a - count, b - count] = value
+        for a in range(count):
+            w.held[a, b - count] = w.found[a]
+    for a in range(count, total):
+        for c in range(count):
+            w.held[a, c] = w.matrix[a, c]
+    s.rank_second = factor_complete(w.second, total - count, total - count, w.down2, w.across2)
+
+
+@compiled
+def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
+    """Fill la of all rows in contact from the right-hand side r and what `factor` left; rows that are off get none."""
+    total = s.unknowns
+    for a in range(total):
+        w.found[a] = r[w.unknown[a]] / w.size[a]
+    if s.dependent_rows > 0:
+        _solve_in_turn(s, m, w)
+    else:
+        solve_complete(w.matrix, total, s.rank, w.down, w.across, w.weight, w.square, w.beside, w.found)
+    for j in range(s.na):
+        la[j] = 0.0
+    for a in range(total):
+        la[w.unknown[a]] = w.found[a] / w.size[a]
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and w.slides[i] and not w.off[i]:
+            first = w.listed[m.tangent[i]]
+            for c in range(first, first + m.tangents[i]):
+                la[c] = -m.friction[i] * la[j] * w.along[c]
+
+
+@compiled
+def _solve_in_turn(s: Any, m: Model, w: Work) -> None:
+    """Solve for w.found the normal rows, and in their null space the sticking ones, by loads that suit these."""
+    count, sticking = s.normals, s.unknowns - s.normals
+    for a in range(count):
+        w.weight[a] = 1.0
+    solve_complete(w.first, count, s.rank_first, w.down, w.across, w.weight, w.square, w.beside, w.found)
+    for a in range(sticking):
+        value = w.found[count + a]
+        for c in range(count):
+            value -= w.held[count + a, c] * w.found[c]
+        w.left[a] = value
+    for a in range(count):
+        w.press[a] = w.found[a]
+    for _ in range(SHARINGS if s.rank_second < sticking else 1):
+        _weigh(s, m, w)
+        for a in range(sticking):
+            w.found[count + a] = w.left[a]
+        solve_complete(
+            w.second, sticking, s.rank_second, w.down2, w.across2, w.weight, w.square, w.beside, w.found[count:]
+        )  # fmt: skip
+        for a in range(count):
+            value = w.press[a]
+            for c in range(sticking):
+                value -= w.held[a, c] * w.found[count + c]
+            w.found[a] = value
+
+
+@compiled
+def _weigh(s: Any, m: Model, w: Work) -> None:
+    """Leave in w.weight the bound of every sticking row, mu lam_n, in the scale of its unknown."""
+    count, most = s.normals, 0.0
+    for a in range(s.unknowns - count):
+        n = m.follows[w.idx[w.unknown[count + a]]]
+        load = 0.0
+        for b in range(count):
+            if w.unknown[b] == w.listed[n]:
+                load = m.friction[n] * w.found[b] / w.size[b] if m.friction[n] < np.inf else w.found[b] / w.size[b]
+        w.weight[a] = max(load, 0.0) * w.size[count + a] ** 2
+        most = max(most, w.weight[a])
+    for a in range(s.unknowns - count):
+        w.weight[a] = max(w.weight[a], LIGHT * most) if most > 0.0 else 1.0
+
+
+@compiled
+def stiffness(s: Any, m: Model, w: Work, j: int) -> float:
+    """P = 1/(A^-1)_jj of the row in place j: what its multiplier does to its own gap, all others following their laws.
+
+    Scratch: w.r, w.trial.
+    """
+    for a in range(s.na):
+        w.r[a] = 0.0
+    w.r[j] = 1.0
+    solve(s, m, w, w.r, w.trial)
+    return float(1.0 / w.trial[j]) if w.trial[j] != 0.0 else np.inf
+
+
+@compiled
+def without_pull(s: Any, m: Model, w: Work) -> None:
+    """Solve again without what pulls sticking rows back, whose noise would move the instant at which they slip."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if is_tangent(m, i) and not w.slides[i]:
+            w.r[j] += w.law[i, 1] * w.hda[j]
+    solve(s, m, w, w.r, w.la)
+
+
+@compiled
+def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
+    """Write how far every contact is from sliding, or one that slides from a jam, after an evaluation."""
+    without_pull(s, m, w)
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and not w.slides[i]:
+            out[i] = margin(m, w, i, w.la)
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and w.slides[i]:
+            out[i] = stiffness(s, m, w, j)
+
+
+@compiled
+def _across(m: Model, w: Work, i: int) -> tuple[float, float]:
+    """Across the direction of slip of contact i: its part along both tangential rows."""
+    first = w.listed[m.tangent[i]]
+    return -w.along[first + 1], w.along[first]
+
+
+@compiled
+def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
+    """Size of the slip velocity at the step's start by which contact i turns."""
+    t = m.tangent[i]
+    x, y = w.rates[0, t] - m.drift[t] - w.rest[t], w.rates[0, t + 1] - m.drift[t + 1] - w.rest[t + 1]
+    x, y = _lengthened(s, m, w, i, x, y)
+    return float(np.sqrt(x * x + y * y))
+
+
+@compiled
+def turning_rate(s: Any, m: Model, w: Work) -> float:
+    """Fastest rate, 1/s, at which friction turns a slip into its own direction: mu lam_n / |v_t| over the mass there.
+
+    From the last evaluation and what stands at the step's start. It grows without bound as a slip dies out.
+    """
+    fastest = 0.0
+    for i in range(s.nc):
+        if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1:
+            c, (x, y), size = w.listed[m.tangent[i]], _across(m, w, i), _turning_slip(s, m, w, i)
+            light = x * x * w.gram[c, c] + 2.0 * x * y * w.gram[c, c + 1] + y * y * w.gram[c + 1, c + 1]
+            if size > 0.0:
+                fastest = max(fastest, m.friction[i] * w.lam0[i] * light / size)
+    return float(fastest)
+
+
+@compiled
+def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
+    """Fill w.la with what a turn of the slip of contact i by one radian makes of all multipliers; 1/|v_t|, or 0.
+
+    Times the slip velocity across it is the turn. w.lam0 has the multipliers of the present instant.
+    """
+    size = _turning_slip(s, m, w, i) if w.slides[i] and m.tangents[i] > 1 else 0.0
+    if not size > 0.0:
+        return 0.0
+    c, (x, y) = w.listed[m.tangent[i]], _across(m, w, i)
+    force = -m.friction[i] * w.lam0[i]
+    for j in range(s.na):
+        w.r[j] = -force * (w.gram[j, c] * x + w.gram[j, c + 1] * y)
+    solve(s, m, w, w.r, w.la)
+    w.la[c] += force * x
+    w.la[c + 1] += force * y
+    return float(1.0 / size)
+
+
+@compiled
+def _bound(m: Model, i: int, lam: Array) -> float:
+    """Mu lam_n - |lam_t| of contact i, from the multipliers of all rows."""
+    square = 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        square += lam[t] * lam[t]
+    return float(m.friction[i] * lam[i] - np.sqrt(square))
+
+
+@compiled
+def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether a contact that sticks stays clear of its bound, as far as the stages tell."""
+    low, high = np.inf, -np.inf
+    for stage in range(s.end + 1):
+        value = _bound(m, i, w.lams[0] if stage == 0 else (w.lam_at[stage] if stage < s.end else w.lams[NODES - 1]))
+        low, high = min(low, value), max(high, value)
+    return bool(low > 0.0 and low > STAGES_RANGE * (high - low))
+
+
+@compiled
+def margin(m: Model, w: Work, i: int, la: Array) -> float:
+    """Mu lam_n - |lam_t| of contact i."""
+    square = 0.0
+    for c in range(w.listed[m.tangent[i]], w.listed[m.tangent[i]] + m.tangents[i]):
+        square += la[c] * la[c]
+    return float(m.friction[i] * la[w.listed[i]] - np.sqrt(square))

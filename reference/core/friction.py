@@ -1,0 +1,97 @@
+"""Coulomb friction as the loop meets it: what it asks for at a step, and the call that has the rest done.
+
+The algebra of rows that stick and slide and the search for their modes (`coulomb`, `sticking`) are half as much code
+again as the loop. They are compiled on their own, once a scene has friction; the state has the address at which they
+stand. No other scene compiles them, and none calls them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core.layout import SLIP, Model, Work
+from crossbody.reference.kinds import Array, Bytes
+
+SMALL_SLIP = 1e-9  # of the largest speed: a slip velocity below has no direction of its own,
+SMALL_SLIP_STEPS = 10.0  # or below so many times the relative tolerance
+
+(
+    BEGIN, FACTOR, SOLVE, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, FOLLOW_TURNS, STANDS, HOLDS_ON,
+    BEGIN_SLIP, DECIDE,
+) = np.arange(14)  # fmt: skip
+NOTHING = np.int64(0)  # beside what is asked of all rows together
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _call(typingctx: Any, address: Any, what: Any, state: Any, model: Any, work: Any, i: Any) -> Any:
+    """Call the code at an address by the convention of compiled functions, and hand on what it raises."""
+    given = (what, state, model, work, i)
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        convention = context.call_conv
+        kind = convention.get_function_type(types.float64, given)
+        function = builder.inttoptr(args[0], kind.as_pointer())
+        status, found = convention.call_function(builder, function, types.float64, given, args[1:])
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return found
+
+    return types.float64(address, *given), generate
+
+
+@compiled
+def ask(what: int, s: Any, m: Model, w: Work, i: int) -> float:
+    """Have something done, or told, by the code of friction: `friction_answers` says what."""
+    return _call(s.friction_code, what, s, m, w, i)  # type: ignore[no-any-return]
+
+
+@compiled
+def has_friction(m: Model, i: int) -> bool:
+    """Whether row i is the normal row of a contact with friction."""
+    return bool(m.tangents[i] > 0)
+
+
+@compiled
+def small_slip(s: Any) -> float:
+    """The slip velocity below which the direction of the last step's start holds."""
+    return float(max(SMALL_SLIP, SMALL_SLIP_STEPS * s.rtol) * s.slip_speed + s.atol)
+
+
+@compiled
+def slip_along(m: Model, w: Work, i: int, rate: Array) -> float:
+    """Slip velocity of contact i along its direction of reference, against that with which it began."""
+    total = 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        total += (rate[t] - m.drift[t] - w.rest[t]) * w.way[t]
+    return float(total)
+
+
+@compiled
+def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
+    """Write which rows slide: a normal row whose tangential ones are not solved for, and these; they have no law."""
+    for i in range(s.nc):
+        w.slides[i] = 0
+    for i in range(s.nc):
+        if has_friction(m, i) and mode[i] == SLIP:
+            w.slides[i] = 1
+            for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+                w.slides[t] = 1
+                w.law[t, 0], w.law[t, 1], w.law[t, 2] = 0.0, 0.0, 0.0
+
+
+@compiled
+def is_tangent(m: Model, i: int) -> bool:
+    """Whether row i is a tangential row of a contact with friction."""
+    return bool(m.follows[i] >= 0 and m.tangents[m.follows[i]] > 0)
+
+
+@compiled
+def is_shared(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether row i has no law of its own to follow: it slides, or it sticks with others that it depends on."""
+    return bool(is_tangent(m, i) and (w.slides[i] or s.dependent_rows > 0))

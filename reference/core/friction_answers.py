@@ -1,0 +1,74 @@
+"""What the loop asks about friction, answered by one function that stands at one address."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference.core import coulomb, sticking
+from crossbody.reference.core.friction import (
+    BEGIN,
+    BEGIN_SLIP,
+    DECIDE,
+    FACTOR,
+    FOLLOW_TURNS,
+    HOLDS_ON,
+    MARGIN,
+    RENEW,
+    SOLVE,
+    STANDS,
+    STIFFNESS,
+    TURN_PART,
+    TURNING_RATE,
+    WATCH,
+)
+from crossbody.reference.core.layout import Model, Work
+
+
+def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
+    """Do, or tell, what is asked.
+
+    FACTOR          A from G; i = 1 if directions of slip turn; 1 if it is not finite
+    SOLVE           w.la from w.r
+    STIFFNESS       what a multiplier of contact i does to its own gap
+    MARGIN          how far contact i is from sliding
+    WATCH           either of all contacts, into w.cones[i]
+    TURNING_RATE    fastest rate at which a slip turns
+    TURN_PART       1/|v_t|, and in w.la what a turn of contact i by one radian makes of all multipliers
+    STANDS          1 if contact i has no slip velocity
+    HOLDS_ON        1 if contact i, which sticks, surely does so throughout the step
+    BEGIN           of a run: forget what another one left
+    RENEW           directions of slip after a step
+    FOLLOW_TURNS    those that have turned by a right angle, where a step is cut
+    BEGIN_SLIP      of contacts that have reached their bounds, there
+    DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
+    """
+    if what == FACTOR:
+        return float(coulomb.factor(s, m, w, i != 0))
+    if what == SOLVE:
+        coulomb.solve(s, m, w, w.r, w.la)
+    elif what == STIFFNESS:
+        return float(coulomb.stiffness(s, m, w, w.listed[i]))
+    elif what == MARGIN:
+        coulomb.without_pull(s, m, w)
+        return float(coulomb.margin(m, w, i, w.la))
+    elif what == WATCH:
+        coulomb.watch_friction(s, m, w, w.cones[i])
+    elif what == TURNING_RATE:
+        return float(coulomb.turning_rate(s, m, w))
+    elif what == TURN_PART:
+        return float(coulomb.turn_part(s, m, w, i))
+    elif what == RENEW:
+        coulomb.renew(s, m, w, w.rates[0])
+    elif what == FOLLOW_TURNS:
+        coulomb.follow_turns(s, m, w)
+    elif what == STANDS:
+        return 1.0 if coulomb.slip_velocity(m, i, w.rate) <= coulomb.stopped_slip(s) else 0.0
+    elif what == HOLDS_ON:
+        return 1.0 if coulomb.holds_on(s, m, w, i) else 0.0
+    elif what == BEGIN_SLIP:
+        sticking.begin_slip(s, m, w)
+    elif what == DECIDE:
+        return float(sticking.decide(s, m, w))
+    elif what == BEGIN:
+        coulomb.begin(w)
+    return 0.0

@@ -1,0 +1,130 @@
+"""Tangential rows of pairs: the velocity of one shape over the other where they meet.
+
+With V(x) the velocity of a body's material at the place x where they meet, and t a direction of an orthonormal frame of
+the tangent plane,
+
+    v_t = t.(V_2(x) - V_1(x)),    H'v = t'.(V_2 - V_1) + t.(A_2 - A_1),    A = V' at v' = 0 along the way of x
+
+x and t move with the shapes, not with the material: a sphere that rolls on a plane has x' = its centre's velocity. Over
+a plane the frame is the plane's own. On other shapes it is that of the normal in the second shape's axes, which has a
+pole in a direction that no symmetry chooses.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.reference import kernels
+from crossbody.reference.kinds import Array
+from crossbody.reference.pairs import layout
+from crossbody.reference.pairs.jets import (
+    Jet,
+    Vector,
+    add,
+    along,
+    apart,
+    dot,
+    moved,
+    over,
+    root,
+    scaled,
+    shifted,
+    times,
+    value,
+)
+from crossbody.reference.tree import layout as tree
+from crossbody.reference.tree.pair_rows import _axis, _point
+from crossbody.reference.tree.points import direction, field, point, pull
+
+POLE = ((0.8, -0.6, 0.0), (0.48, 0.64, -0.6), (0.36, 0.48, 0.8))
+"""Orthonormal axes (by rows) in those of a shape: the frame of the normal has its pole against the last one."""
+
+
+@kernels.helper
+def _spread(r: Vector, k: Jet) -> Vector:
+    """Return the vector r / k."""
+    return over(r[0], k), over(r[1], k), over(r[2], k)
+
+
+@kernels.helper
+def _times(k: Jet, r: Vector) -> Vector:
+    """Return the vector k r."""
+    return times(k, r[0]), times(k, r[1]), times(k, r[2])
+
+
+@kernels.helper
+def _lowest(p: Array, w: Array, o: int, row: int, N: Vector) -> Vector:
+    """Return the lowest point of the shape at p[o:] over a plane with normal N, in the place of the row at p[row:]."""
+    if int(p[o].real) == layout.ELLIPSOID:
+        X, Y, Z, s = _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2), o + layout.SIZE
+        x, y, z = dot(N, X), dot(N, Y), dot(N, Z)
+        a, b, c = scaled(p[s] ** 2, x), scaled(p[s + 1] ** 2, y), scaled(p[s + 2] ** 2, z)
+        far = scaled(-1.0, root(add(add(times(a, x), times(b, y)), times(c, z))))
+        out = along(along(_times(over(a, far), X), over(b, far), Y), over(c, far), Z)
+        return along(_point(p, w, o), shifted(scaled(0.0, x), 1.0), out)
+    k = row + layout.POINT
+    C = point(p, w, int(p[o + layout.NODE].real), p[k], p[k + 1], p[k + 2])
+    return moved(C, -p[row + layout.RADIUS], N)
+
+
+@kernels.helper
+def _pole_axis(p: Array, w: Array, o: int, k: int) -> Vector:
+    """Return axis k of those in which the frame of a normal is taken, of the shape at p[o:]."""
+    a, b, c = POLE[k]
+    R = o + layout.POSE
+    return direction(
+        w, int(p[o + layout.NODE].real), p[R] * a + p[R + 1] * b + p[R + 2] * c,
+        p[R + 3] * a + p[R + 4] * b + p[R + 5] * c, p[R + 6] * a + p[R + 7] * b + p[R + 8] * c,
+    )  # fmt: skip
+
+
+@kernels.helper
+def _frame(p: Array, w: Array, o: int, n: Vector) -> tuple[Vector, Vector]:
+    """Return two directions across n, in the axes of the shape at p[o:] (Frisvad, J. Graphics Tools 16 (2012))."""
+    X, Y, Z = _pole_axis(p, w, o, 0), _pole_axis(p, w, o, 1), _pole_axis(p, w, o, 2)
+    a, b, c = dot(n, X), dot(n, Y), dot(n, Z)
+    k = shifted(c, 1.0)
+    minus_a, minus_b, both = scaled(-1.0, a), scaled(-1.0, b), over(scaled(-1.0, times(a, b)), k)
+    one = shifted(over(scaled(-1.0, times(a, a)), k), 1.0)
+    other = shifted(over(scaled(-1.0, times(b, b)), k), 1.0)
+    return (
+        along(along(_times(one, X), both, Y), minus_a, Z),
+        along(along(_times(both, X), other, Y), minus_b, Z),
+    )
+
+
+@kernels.helper
+def meeting(p: Array, w: Array, o: int, row: int) -> tuple[Vector, Vector, Vector]:
+    """Return where the pair at p[o:] meets in the place of the row at p[row:], and the frame across its normal."""
+    one, two = o + layout.FIRST, o + layout.SECOND
+    if int(p[one].real) == layout.PLANE:
+        return _lowest(p, w, two, row, _axis(p, w, one, 2)), _axis(p, w, one, 0), _axis(p, w, one, 1)
+    C = _point(p, w, one)
+    D = apart(_point(p, w, two), C)
+    n = _spread(D, root(dot(D, D)))
+    first, second = _frame(p, w, two, n)
+    return moved(C, p[one + layout.SIZE], n), first, second
+
+
+@kernels.helper
+def velocity(p: Array, w: Array, o: int, x: Vector, t: Vector) -> tuple[Any, Any]:
+    """Return the velocity of the second shape of the pair at p[o:] over the first along t where they meet, and H'v."""
+    (a, b, c), (d, e, f) = field(p, w, int(p[o + layout.SECOND + layout.NODE].real), x)
+    (g, h, i), (j, k, m) = field(p, w, int(p[o + layout.FIRST + layout.NODE].real), x)
+    rate = t[0][0] * (a - g) + t[1][0] * (b - h) + t[2][0] * (c - i)
+    turned = t[0][1] * (a - g) + t[1][1] * (b - h) + t[2][1] * (c - i)
+    return rate, turned + t[0][0] * (d - j) + t[1][0] * (e - k) + t[2][0] * (f - m)
+
+
+@kernels.helper
+def columns(p: Array, w: Array, o: int, x: Vector, t: Vector, H: Array) -> None:
+    """Add H of the velocity of the pair at p[o:] along t."""
+    pull(p, w, int(p[o + layout.FIRST + layout.NODE].real), -1.0, value(t), value(x), H)
+    pull(p, w, int(p[o + layout.SECOND + layout.NODE].real), 1.0, value(t), value(x), H)
+
+
+@kernels.helper
+def place_of(p: Array, i: int) -> tuple[int, int]:
+    """Return where the pair of the tangential row i and the row stand in p."""
+    row = int(p[tree.AT_ROW].real) + tree.ROW * i
+    return int(p[tree.AT_PAIR].real) + layout.PAIR * int(p[row + layout.WHICH].real), row

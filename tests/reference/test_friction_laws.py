@@ -1,0 +1,215 @@
+"""What holds of every motion with friction, whatever the scene; and every set of modes against all that could be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_oracle import STICK, Body
+from friction_scenes import HALF, G, account, box_body, box_on_floor, linear, pair, point, rod_on_floor, run
+
+from crossbody import cases, engines
+from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Joint, RowLaw, Scene, Shape
+from crossbody.reference import System, simulate
+from crossbody.reference.linear import linearise
+from crossbody.reference.tree.system import system
+
+ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
+EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
+HEAVIEST = 2.0  # kg
+STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
+
+
+def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int = 3) -> Any:
+    """Return bodies tossed onto a floor, two spheres among them that may meet, their start and mu."""
+    sizes = ROUND | first
+    rng = np.random.default_rng(seed)
+    mu, law = float(rng.uniform(0.0, 1.0)), RowLaw(a0=float(10 ** rng.uniform(3, 4.5)), a1=float(rng.uniform(5, 200)))
+    kinds = [str(rng.choice(list(first))), "sphere", "sphere"][: int(rng.integers(1, 1 + most))]
+    bodies, shapes, q, v = [], [Shape(name="floor", type="plane")], [], []
+    for i, kind in enumerate(kinds):
+        bodies.append(box_body(f"b{i}", HALF, float(rng.uniform(0.5, HEAVIEST))))
+        shapes.append(Shape(name=f"s{i}", body=f"b{i}", type=kind, size=sizes[kind]))
+        turn = rng.normal(size=4)
+        q += [0.15 * i, 0.0, 0.3 + 0.25 * i, *(turn / np.linalg.norm(turn))]
+        v += [*rng.normal(size=2), -1.0, *(4.0 * rng.normal(size=3))]
+    pairs = [pair("floor", f"s{i}", mu, law) for i in range(len(kinds))]
+    pairs += [pair(f"s{i}", f"s{i + 1}", mu, law) for i in range(1, len(kinds) - 1)]
+    joints = tuple(Joint(name=body.name, body=body.name, type="free") for body in bodies)
+    scene = Scene(bodies=tuple(bodies), joints=joints, shapes=tuple(shapes), pairs=tuple(pairs))
+    return scene, np.array(q), np.array(v), mu
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
+    scene, q0, v0, mu = tossed(seed)
+    run_ = run(scene, q0, v0, 0.5, rtol=1e-8)
+    assert run_.outcome is Outcome.FINISHED, run_.message
+    obeys(scene, run_, mu, 1e-8)
+
+
+@pytest.mark.parametrize("seed", [*range(60), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(60, 600))])
+def test_cones_power_and_energy_of_bodies_with_edges(seed: int) -> None:
+    scene, q0, v0, mu = tossed(seed, EDGED, 1)
+    run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=20_000)
+    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), run_.message
+    obeys(scene, run_, mu, 1e-6)
+
+
+def obeys(scene: Scene, run_: Trajectory, mu: float, rtol: float) -> None:
+    """Check cones and the power of friction at every row of a motion, and its account.
+
+    Rows at the instants of events belong to two sets of modes.
+    """
+    instants = {event.t for event in run_.events}
+    made = system(scene, case_of(scene).law)
+    follows, law, count = np.asarray(made.follows), np.asarray(made.a1), 0
+    for t, q, v, lam, mode in zip(run_.t, run_.q, run_.v, run_.lam, run_.mode, strict=True):
+        assert np.all(np.isfinite(lam))
+        if t in instants:
+            continue
+        rate = made.gap(q, v)[1]
+        for i in np.flatnonzero((mode == Mode.STICK) | (mode == Mode.SLIP)):
+            ways = np.flatnonzero(follows == i)
+            force, slip = lam[ways], rate[ways]
+            size = np.linalg.norm(slip)
+            pull = (
+                HEAVIEST * law[i] * size if mode[i] == Mode.STICK else 0.0
+            )  # what holds the drift down is no friction
+            assert np.linalg.norm(force) <= mu * max(lam[i], 0.0) * (1.0 + 1e-9) + 1e-9 + pull
+            if mode[i] == Mode.SLIP and size > STILL * rtol * np.abs(run_.v).max():
+                assert force @ slip == pytest.approx(-mu * lam[i] * size, rel=1e-9, abs=1e-12)
+                count += 1
+    assert account(run_) < 1e3 * rtol
+    assert count > 0 or mu == 0.0 or not run_.events
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 6, 8])
+def test_a_second_machine_moves_a_tossed_rod_alike(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mu, half, radius, a1 = rng.uniform(0.1, 0.8), 0.5, 0.05, float(rng.choice([20.0, 100.0, 200.0]))
+    th = rng.uniform(-3.0, 3.0)
+    q0 = np.array([0.0, abs(half * np.cos(th)) + radius + rng.uniform(0.01, 0.1), th])
+    v0 = rng.normal(size=3) * [1.5, 1.0, 3.0]
+    other = Body(1.0, half**2 / 3, np.array([[0, -half], [0, half]]), np.full(2, radius), 1e4, a1, mu)
+    q, v, log = other.run(q0, v0, 0.35)
+    assert all(modes.count(STICK) < 2 for _, modes in log)  # two that stick share a load in many ways
+    scene = rod_on_floor(mu, length=half, radius=radius, law=RowLaw(a0=1e4, a1=a1))
+    found = run(scene, q0, v0, 0.35, rtol=1e-10)
+    assert np.abs(found.q[-1] - q).max() < 1e-9
+    assert np.abs(found.v[-1] - v).max() < 1e-7
+    times = np.array([e.t for e in found.events])
+    assert all(np.abs(times - t).min() < 1e-9 for t, _ in log[1:])
+
+
+def consistent(H: np.ndarray, force: np.ndarray, mu: float, k: int) -> list[np.ndarray]:
+    """Accelerations of every set of modes that agrees with its forces: OFF, STICK, SLIP to either side."""
+    found = []
+    for modes in product("FTPM", repeat=k):
+        on, held = [i for i in range(k) if modes[i] != "F"], [k + i for i in range(k) if modes[i] == "T"]
+        sign = {"P": mu, "M": -mu}
+        R = H[on + held]
+        C = np.array([H[i] - sign.get(modes[i], 0.0) * H[k + i] for i in on] + [H[i] for i in held]).reshape(R.shape)
+        x = np.linalg.solve(R @ C.T, -R @ force) if on else np.zeros(0)
+        a = force + C.T @ x
+        normal, along = dict(zip(on, x, strict=False)), dict(zip(held, x[len(on) :], strict=True))
+        good = all(H[i] @ a >= -1e-9 for i in range(k) if modes[i] == "F") and all(f >= -1e-9 for f in normal.values())
+        good = good and all(abs(f) <= mu * normal[i - k] + 1e-9 for i, f in along.items())
+        if good and all(np.sign(sign[modes[i]]) * (H[k + i] @ a) >= -1e-9 for i in range(k) if modes[i] in "PM"):
+            found.append(a)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_modes_are_a_set_that_agrees_with_its_forces(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(10):
+        k = int(rng.integers(1, 5))
+        n, mu = 2 * k + int(rng.integers(0, 3)), float(rng.uniform(0.05, 1.5))
+        H = rng.normal(size=(2 * k, n)) * 0.6 + np.eye(2 * k, n)
+        force = rng.normal(size=n) * 2.0 - H[:k].T @ np.abs(rng.normal(size=k)) * 2.0
+        sets = consistent(H, force, mu, k)
+        run_ = simulate(linear(H, force, mu, k), np.zeros(n), np.zeros(n), 1e-6, rtol=1e-6, max_steps=3)
+        if run_.outcome is Outcome.PAINLEVE:
+            continue
+        assert sets
+        assert run_.outcome is not Outcome.NO_CONSISTENT_MODES, run_.message
+        assert min(np.abs(run_.v[-1] / run_.t[-1] - a).max() for a in sets) < 1e-3
+        assert k > 2 or ("not_unique" in run_.counts) == (len(sets) > 1)
+
+
+def test_turning_the_frame_of_a_plane_changes_nothing() -> None:
+    q0, v0 = [0, 0, 0.1, 1, 0, 0, 0], [1.0, 0.4, 0, 0, 0, 0]
+    ends = [run(box_on_floor(0.3, turn=turn, tilt=0.2), q0, v0, 0.4) for turn in (0.0, 1.1)]
+    assert np.abs(ends[0].q[-1] - ends[1].q[-1]).max() < 1e-12
+
+
+def test_a_spinning_box_that_slides_is_told_to_be_indeterminate() -> None:
+    run_ = run(box_on_floor(0.3), [0, 0, 0.1, 1, 0, 0, 0], [1.0, 0.3, 0, 0, 0, 2.0], 0.2, rtol=1e-9)
+    assert run_.counts["indeterminate"]
+    assert run_.message.startswith("indeterminate")
+
+
+def test_a_file_slides_as_its_scene_does(tmp_path: Path) -> None:
+    text = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
+      <geom name="floor" type="plane" size="1 1 1" friction="0.3"/>
+      <body name="box" pos="0 0 .1"><freejoint/><geom type="box" size=".2 .15 .1" mass="1" friction="0.2"/></body>
+    </worldbody><keyframe><key name="k" qpos="0 0 .1 1 0 0 0" qvel="1 0 0 0 0 0"/></keyframe></mujoco>"""
+    path = tmp_path / "box.xml"
+    path.write_text(text)
+    case = cases.from_file(str(path), friction=1, t_end=0.5)
+    run_ = engines.load("reference").prepare(case, "compiled", rtol=1e-11).run()
+    assert run_.outcome is Outcome.FINISHED, run_.message
+    stops = {e.t for e in run_.events if e.after is Mode.STICK and e.t > 0.0}
+    assert len(stops) == 1
+    assert abs(stops.pop() - 1.0 / (0.3 * G)) < 1e-11
+    reason = engines.load("mujoco").why_not(case, "matched")
+    assert reason
+    assert "friction" in reason
+    assert not any("t1" in name for name in cases.from_file(str(path), t_end=0.5).contacts)
+
+
+def wall(mu: object, **given: object) -> System:
+    base = point(0.5, 0.1)
+    fields = {name: getattr(base, name) for name in ("n", "dynamics", "gaps", "rows", "a0", "a1", "follows")}
+    return System(**(fields | {"parameters": base.p, "mu": mu} | given))
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"mu": [np.inf, -0.1]}, "at least 0"),
+        ({"mu": [np.inf, np.nan]}, "at least 0"),
+        ({"mu": [np.inf, 0.5], "unilateral": [False, True]}, "able to open"),
+        ({"mu": [np.inf, np.inf], "drift": [0.0, 1.0]}, "drift"),
+    ],
+)
+def test_systems_with_wrong_friction_are_refused(given: dict[str, object], told: str) -> None:
+    with pytest.raises(SceneError, match=told):
+        wall(**given)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "told"),
+    [
+        ({"fsm": "edge"}, InvalidValue, "friction"),
+        ({"solver": "cvode"}, InvalidValue, "friction"),
+        ({"solver": "ida"}, InvalidValue, "friction"),
+    ],
+)
+def test_machines_without_friction_are_refused(options: dict, error: type, told: str) -> None:
+    with pytest.raises(error, match=told):
+        simulate(point(0.5, 0.1), [0, 0], [0, 0], 0.1, **options)
+
+
+def test_collisions_and_linear_models_with_friction_are_refused() -> None:
+    with pytest.raises(SceneError, match="friction"):
+        simulate(wall([np.inf, 0.5], b0=[1e6, 0.0]), [0, 0], [0, 0], 0.1)
+    with pytest.raises(SceneError, match="friction"):
+        linearise(point(0.5, 0.1), [0.0, 0.0])

@@ -1,0 +1,155 @@
+"""Scenes with friction whose motion is known, or that a second machine can follow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint, Pair, Push, RowLaw, Scene, Shape
+from crossbody.reference import System, kernels, simulate
+from crossbody.reference.tree.system import system
+
+G = 9.81
+LAW = RowLaw(a0=1e4, a1=200.0)
+PLANAR = (("x", (1, 0, 0), "slide"), ("z", (0, 0, 1), "slide"), ("turn", (0, 1, 0), "hinge"))
+HALF = (0.2, 0.15, 0.1)
+
+
+def box_body(name: str, half: tuple[float, ...], mass: float = 1.0) -> Body:
+    """Return a homogeneous box."""
+    a, b, c = half
+    inertia = (b * b + c * c, a * a + c * c, a * a + b * b)
+    return Body(name=name, mass=mass, inertia=(*(mass / 3.0 * part for part in inertia), 0.0, 0.0, 0.0))
+
+
+def pair(first: str, second: str, mu: float, law: RowLaw = LAW) -> Pair:
+    """Return a pair that slides with friction."""
+    return Pair(
+        name=f"{first}:{second}", first=first, second=second, friction=(mu, mu, 0.0, 0.0, 0.0), dimension=3, law=law
+    )
+
+
+def on_floor(body: Body, shape: Shape, mu: float, *, tilt: float = 0.0, planar: bool = False, turn: float = 0.0,
+             law: RowLaw = LAW) -> Scene:  # fmt: skip
+    """Return a body on a plane that falls in x by `tilt`; the plane's own frame is turned about its normal."""
+    free = (Joint(name="free", body=body.name, type="free"),)
+    joints = tuple(Joint(name=n, body=body.name, type=kind, axis=axis) for n, axis, kind in PLANAR) if planar else free
+    floor = Shape(name="floor", type="plane", orientation=(np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)))
+    return Scene(
+        bodies=(body,), joints=joints, shapes=(floor, shape), pairs=(pair("floor", shape.name, mu, law),),
+        gravity=(G * np.sin(tilt), 0.0, -G * np.cos(tilt)),
+    )  # fmt: skip
+
+
+def box_on_floor(mu: float, *, half: tuple[float, ...] = HALF, **given: Any) -> Scene:
+    """Return a box on a plane."""
+    return on_floor(box_body("box", half), Shape(name="box", body="box", type="box", size=half), mu, **given)
+
+
+def sphere_on_floor(mu: float, radius: float, **given: Any) -> Scene:
+    """Return a homogeneous sphere of 1 kg on a plane."""
+    body = Body(name="sphere", mass=1.0, inertia=(0.4 * radius**2,) * 3 + (0.0,) * 3)
+    return on_floor(body, Shape(name="sphere", body="sphere", type="sphere", size=(radius, 0, 0)), mu, **given)
+
+
+def rod_on_floor(mu: float, *, length: float = 0.5, radius: float = 1e-3, law: RowLaw = LAW) -> Scene:
+    """Return a rod of half this length with round ends, in a plane."""
+    body = Body(name="rod", mass=1.0, inertia=(length**2 / 3, length**2 / 3, 1e-3, 0.0, 0.0, 0.0))
+    shape = Shape(name="rod", body="rod", type="capsule", size=(radius, length, 0.0))
+    return on_floor(body, shape, mu, planar=True, law=law)
+
+
+def stack(mu1: float, mu2: float, m1: float = 2.0, m2: float = 1.0) -> Scene:
+    """Return a flat block on a floor and one on it, each with a force at its centre of mass."""
+    low, high = (0.4, 0.3, 0.1), (0.1, 0.1, 0.1)
+    return Scene(
+        bodies=(box_body("low", low, m1), box_body("high", high, m2)),
+        joints=tuple(Joint(name=name, body=name, type="free") for name in ("low", "high")),
+        shapes=(
+            Shape(name="floor", type="plane"), Shape(name="low", body="low", type="box", size=low),
+            Shape(name="top", body="low", type="plane", position=(0.0, 0.0, 0.1)),
+            Shape(name="high", body="high", type="box", size=high),
+        ),
+        pairs=(pair("floor", "low", mu1), pair("top", "high", mu2)),
+        pushes=(Push(name="on low", body="low"), Push(name="on high", body="high")),
+    )  # fmt: skip
+
+
+def run(scene: Scene, q0: Any, v0: Any, t_end: float, **options: Any) -> Trajectory:
+    """Integrate a scene with its energy account."""
+    case = case_of(scene)
+    chosen = {"rtol": 1e-11, "ledger": True, **options}
+    return simulate(system(scene, case.law), q0, v0, t_end, **chosen)
+
+
+@kernels.dynamics
+def _dynamics(t, q, v, u, p, M, f, w):  # type: ignore[no-untyped-def]
+    n = len(q)
+    for i in range(n):
+        for j in range(n):
+            M[i, j] = 1.0 if i == j else 0.0
+        f[i] = p[1 + i] - p[1 + n + i] * q[i]
+
+
+@kernels.gaps
+def _gaps(t, q, v, p, h, hd):  # type: ignore[no-untyped-def]
+    n, first = len(q), 1 + 2 * len(q)
+    for i in range(len(h)):
+        h[i], hd[i] = 0.0 * q[0], 0.0 * q[0]
+        for c in range(n):
+            hd[i] += p[first + n * i + c] * v[c]
+            if i < p[0].real:
+                h[i] += p[first + n * i + c] * q[c]
+
+
+@kernels.rows
+def _rows(t, q, v, p, w, idx, na, H, h, Hdv):  # type: ignore[no-untyped-def]
+    n, first = len(q), 1 + 2 * len(q)
+    for j in range(na):
+        h[j], Hdv[j] = 0.0 * q[0], 0.0 * q[0]
+        for c in range(n):
+            H[j, c] = p[first + n * idx[j] + c]
+            if idx[j] < p[0].real:
+                h[j] += H[j, c] * q[c]
+
+
+@kernels.energy
+def _energy(q, v, p, e):  # type: ignore[no-untyped-def]
+    e[0], e[1] = 0.0 * q[0], 0.0 * q[0]
+    for i in range(len(q)):
+        e[0] += 0.5 * v[i] * v[i]
+        e[1] += 0.5 * p[1 + len(q) + i] * q[i] * q[i] - p[1 + i] * q[i]
+
+
+def linear(H: Any, force: Any, mu: float, contacts: int, *, spring: Any = None, drift: Any = 0.0,
+           a0: float = 1e4, a1: float = 200.0) -> System:  # fmt: skip
+    """Return unit masses under constant forces and springs: normal rows of H first, then the tangential ones."""
+    H, force = np.atleast_2d(np.array(H, dtype=float)), np.array(force, dtype=float)
+    nc, ways = len(H), len(H) // contacts - 1
+    springs = np.zeros(len(force)) if spring is None else np.array(spring, dtype=float)
+    return System(
+        n=len(force), dynamics=_dynamics, gaps=_gaps, rows=_rows, energy=_energy,
+        parameters=np.concatenate([[contacts], force, springs, H.ravel()]),
+        a0=[a0] * contacts + [0.0] * (nc - contacts), a1=[a1] * nc,
+        follows=[-1] * contacts + [i // ways for i in range(nc - contacts)],
+        mu=[np.inf] * contacts + [mu] * (nc - contacts),
+        drift=np.concatenate([np.zeros(contacts), np.broadcast_to(drift, nc - contacts)]),
+    )  # fmt: skip
+
+
+def point(mu: float, alpha: float, *, space: bool = False, **given: Any) -> System:
+    """Return a point of 1 kg on a slope that falls in x: (x, y downwards to the slope's normal, and across it)."""
+    down, press = G * np.sin(alpha), -G * np.cos(alpha)
+    if space:
+        return linear([[0, 0, 1], [1, 0, 0], [0, 1, 0]], [down, 0.0, press], mu, 1, **given)
+    return linear([[0, 1], [1, 0]], [down, press], mu, 1, **given)
+
+
+def account(run: Trajectory) -> float:
+    """Return by how much the energy account is open at the end, J."""
+    assert run.ledger is not None
+    done = run.ledger.contact.sum(axis=1) + run.ledger.input - run.ledger.dissipated
+    return float(np.abs(run.total_energy - run.total_energy[0] - done).max())
