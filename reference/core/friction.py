@@ -20,6 +20,7 @@ from crossbody.reference.kinds import Array, Bytes
 
 SMALL_SLIP = 1e-9  # of the largest speed: a slip velocity below has no direction of its own,
 SMALL_SLIP_STEPS = 10.0  # or below so many times the relative tolerance
+TOLERATED = 1e-9  # part of the largest acceleration by which a set of modes may be off
 
 (
     BEGIN, FACTOR, SOLVE, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, FOLLOW_TURNS, STANDS, HOLDS_ON,
@@ -61,6 +62,12 @@ def has_friction(m: Model, i: int) -> bool:
 def small_slip(s: Any) -> float:
     """The slip velocity below which the direction of the last step's start holds."""
     return float(max(SMALL_SLIP, SMALL_SLIP_STEPS * s.rtol) * s.slip_speed + s.atol)
+
+
+@compiled
+def decided_to(s: Any) -> float:
+    """By how much accelerations of rows may be off where modes are decided."""
+    return float(TOLERATED * s.push_scale)
 
 
 @compiled

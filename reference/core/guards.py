@@ -10,7 +10,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.friction import MARGIN, STIFFNESS, ask, has_friction, slip_along, small_slip
+from crossbody.reference.core.friction import MARGIN, STIFFNESS, ask, decided_to, has_friction, slip_along, small_slip
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, off_law, slow
 from crossbody.reference.kinds import Array, Bytes
@@ -71,8 +71,9 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
         w.bands[0] = w.noise[i]  # a row without memory may press again at once
     elif kind == TOUCH_INSIDE and abs(w.rates[0, i]) <= slow(s):
         w.bands[1] = slow(s)
-    elif kind == CATCH and abs(w.rates[0, i]) <= slow(s):
-        w.bands[0] = slow(s)
+    elif kind == CATCH:
+        w.bands[0] = slow(s) if abs(w.rates[0, i]) <= slow(s) else 0.0
+        w.bands[1] = 2.0 * decided_to(s) if s.frictional else 0.0
     elif kind == STOP:
         # A slip that grazes zero goes on, and one that begins does not stop.
         w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + GRAZE * small_slip(s)

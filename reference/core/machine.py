@@ -29,7 +29,7 @@ from crossbody.reference.core.acceleration import (
 )
 from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_mass, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
-from crossbody.reference.core.friction import STANDS, ask, has_friction
+from crossbody.reference.core.friction import STANDS, ask, decided_to, has_friction
 from crossbody.reference.core.layout import (
     BALLISTIC,
     COLLISION,
@@ -312,6 +312,8 @@ def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool
     _alone(K, m, w, j, i, s.t, w.y[:nq], w.y[nq:])
     off, size = _off_law(m, w, j, i, 0.0 if at_rest else 1.0, w.y[nq:], w.k[START, nq:])
     rounding = ROUNDING * size + _stirred(s, m, w, j) + _from_state(s, w, i)
+    if s.frictional:  # or what was left off would join again, for ever
+        rounding = max(rounding, decided_to(s))
     return bool(-off > rounding + _left_over(s, m, w, i))
 
 

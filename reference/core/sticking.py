@@ -20,12 +20,11 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import factor_lu, solve_lu
 from crossbody.reference.core.coulomb import factor_set, note_speed, solve, stiffness, stopped_slip, without_pull
-from crossbody.reference.core.friction import has_friction
+from crossbody.reference.core.friction import decided_to, has_friction
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import FREE, NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.kinds import Array
 
-TOLERATED = 1e-9  # part of the largest acceleration by which a set may be off
 SWEEPS = 60
 CLEAR = 1e-6  # part of its bound by which a force must stay below it to count as that of a contact that sticks
 TURNS = 40  # of directions of slip towards those of acceleration
@@ -177,7 +176,7 @@ def _fill_turns(s: Any, m: Model, w: Work) -> int:
             w.turns[a, b] = total
         i = w.idx[w.turning[b]]
         w.turn_by[b] = -_aside(m, w, i)
-        w.turns[b, b] -= max(_ahead(m, w, i), 0.0) + TOLERATED * s.push_scale  # definite where loads are shared
+        w.turns[b, b] -= max(_ahead(m, w, i), 0.0) + decided_to(s)  # definite where loads are shared
     return count
 
 
@@ -210,7 +209,7 @@ def _turn(s: Any, m: Model, w: Work) -> float:
 @compiled
 def _worst(s: Any, m: Model, w: Work) -> int:
     """The contact that violates its mode most, -1 if none does; w.wants has the modes that all would rather have."""
-    found, most = -1, TOLERATED * s.push_scale
+    found, most = -1, decided_to(s)
     for j in range(s.na):
         i = w.idx[j]
         if not has_friction(m, i):
@@ -227,7 +226,7 @@ def _worst(s: Any, m: Model, w: Work) -> int:
                 other = max(-_ahead(m, w, i), abs(_aside(m, w, i)))
             if other > missing:
                 missing, becomes = other, then
-        if missing > TOLERATED * s.push_scale:
+        if missing > decided_to(s):
             w.wants[i] = becomes
         if missing > most:
             found, most = i, missing
@@ -372,7 +371,7 @@ def _sweep(s: Any, m: Model, w: Work) -> None:
         if has_friction(m, i):
             if w.stands[i]:
                 _aim(m, w, i)
-            if w.la[j] * w.gram[j, j] <= TOLERATED * s.push_scale:
+            if w.la[j] * w.gram[j, j] <= decided_to(s):
                 _put(m, w, i, FREE)
             elif w.stands[i] and _size(m, w, i, w.la) < (1.0 - CLEAR) * m.friction[i] * w.la[j]:
                 _put(m, w, i, STICK)
@@ -512,7 +511,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
         if has_friction(m, i):
             for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
                 w.rest[w.idx[c]] = w.hda[c] if w.stands[i] and w.state[i] == SLIP else 0.0
-            w.tolerated[i] = TOLERATED * s.push_scale / w.gram[j, j]
+            w.tolerated[i] = decided_to(s) / w.gram[j, j]
     for i in range(s.nc):
         w.off[i], w.begins[i] = 0, 0
     return 0

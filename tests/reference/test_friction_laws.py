@@ -23,6 +23,7 @@ from crossbody.reference.tree.system import system
 ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
 EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
 HEAVIEST = 2.0  # kg
+QUICK = (*range(60), 70, 240, 536)  # in the last ones what was decided to be off pressed by less than that is known to
 STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
 
 
@@ -54,7 +55,10 @@ def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
     obeys(scene, run_, mu, 1e-8)
 
 
-@pytest.mark.parametrize("seed", [*range(60), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(60, 600))])
+@pytest.mark.parametrize(
+    "seed",
+    [pytest.param(seed, marks=[] if seed in QUICK else pytest.mark.slow) for seed in range(600)],
+)
 def test_cones_power_and_energy_of_bodies_with_edges(seed: int) -> None:
     scene, q0, v0, mu = tossed(seed, EDGED, 1)
     run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=20_000)
