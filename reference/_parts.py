@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
+from weakref import WeakValueDictionary
 
-from numba.core.codegen import JITCodeLibrary
+import llvmlite.binding as llvm
+from numba.core.codegen import JITCodeLibrary, RuntimeLinker
 from numba.core.compiler import Compiler
 
 
@@ -26,6 +28,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
         for part in parts:
             self._final_module.link_in(part.module(), preserve=True)
             self._reload_init.update(part._reload_init)
+        self._close_circles()
         for part in parts:
             part.make_private(self._final_module)
         own = [self, *parts]
@@ -36,6 +39,20 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
             if part.environment is not None:
                 self._codegen.set_env(*part.environment)
 
+    def _close_circles(self) -> None:
+        """Let functions that call themselves, or each other in turn, find what they call inside the whole.
+
+        numba calls it through a variable that is filled once the name can be seen from outside, which of a part it
+        never can, and in code that is read back it is not filled at all.
+        """
+        whole = self._final_module
+        known = {function.name for function in whole.functions if not function.is_declaration}
+        for called in known.intersection(_circles(whole)):
+            name = RuntimeLinker.PREFIX + called
+            text = f'declare void @"{called}"()\n@"{name}" = constant ptr @"{called}"\n'
+            whole.link_in(llvm.parse_assembly(text))
+            whole.get_global_variable(name).linkage = "internal"
+
 
 class _Part(_Library):
     """Code of a part, which is never made callable on its own."""
@@ -43,6 +60,9 @@ class _Part(_Library):
     def finalize(self) -> None:
         """Leave everything to the whole."""
         self._raise_if_finalized()
+        _LOWERED.update(
+            {function.name: self for function in self._final_module.functions if not function.is_declaration}
+        )
         self._finalized = True
 
     def module(self) -> Any:
@@ -57,8 +77,18 @@ class _Part(_Library):
                 whole.get_function(function.name).linkage = "internal"
 
 
+_LOWERED: WeakValueDictionary[str, _Part] = WeakValueDictionary()  # by what they define
+
+
+def _circles(module: Any) -> list[str]:
+    """Return the functions that a module calls while they, or one that calls them, were not lowered yet."""
+    mark = RuntimeLinker.PREFIX
+    return [one.name.removeprefix(mark) for one in module.global_variables if one.name.startswith(mark)]
+
+
 def _parts_of(library: _Library, met: set[Any]) -> Iterator[_Part]:
-    for part in library._linking_libraries:
+    """Yield all that a function calls, directly or not, once."""
+    for part in (*library._linking_libraries, *map(_LOWERED.get, _circles(library._final_module))):
         if isinstance(part, _Part) and part not in met:
             met.add(part)
             yield part

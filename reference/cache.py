@@ -237,6 +237,7 @@ class Part(Lean):
         """Take what was lowered: nothing that Python could call."""
         entry = object()  # callers know the code by it
         cres.library.environment = (cres.fndesc.env_name, cres.environment)
+        cres.library.finalize()
         self.targetctx.insert_user_function(entry, cres.fndesc, [cres.library])
         self.overloads[tuple(cres.signature.args)] = cres._replace(entry_point=entry, type_annotation="")
 

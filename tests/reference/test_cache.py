@@ -51,6 +51,41 @@ PROGRAM = """
         print(e[0], sum(kernel._cache_hits.values()))
 """
 
+CIRCLES = """
+    import numpy as np
+    from crossbody.reference import kernels
+    from crossbody.reference.kernels import helper
+
+    @helper
+    def factorial(n):
+        return 1.0 if n <= 1 else n * factorial(n - 1)
+
+    @helper
+    def even(n):
+        return True if n == 0 else odd(n - 1)
+
+    @helper
+    def odd(n):
+        return False if n == 0 else even(n - 1)
+
+    def times(factor):
+        @helper
+        def scaled(x):
+            return factor * x
+        return scaled
+
+    two, three = times(2.0), times(3.0)
+
+    @kernels.energy
+    def energy(q, v, p, e):
+        e[0] = factorial(5) + even(int(q[0])) + 10.0 * odd(7)
+        e[1] = two(q[0]) + 10.0 * three(q[0])
+
+    z, e = np.full(1, 4.0), np.zeros(2)
+    energy(z, z, z, e)
+    print(*e, sum(energy._cache_hits.values()))
+"""
+
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
@@ -69,6 +104,15 @@ def _run(tmp_path, *values, **more):
         [sys.executable, str(path), *map(str, values)], capture_output=True, text=True, check=True, **more
     )
     return [tuple(map(float, line.split())) for line in done.stdout.splitlines()], done.stderr
+
+
+def test_helpers_that_call_themselves_or_each_other_are_found_also_in_code_that_is_read_back(tmp_path):
+    (tmp_path / "circles.py").write_text(textwrap.dedent(CIRCLES))
+    for hits in (0, 1):
+        done = subprocess.run(
+            [sys.executable, str(tmp_path / "circles.py")], capture_output=True, text=True, check=True
+        )
+        assert done.stdout.split() == ["131.0", "128.0", str(hits)]
 
 
 def _kernel(value):
