@@ -15,6 +15,7 @@ import weakref
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import SceneError
 from crossbody.reference._differences import AGREE, closest, differs
@@ -24,6 +25,7 @@ from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
 from crossbody.reference.systems import _none
 
+ROUNDED = 64 * np.finfo(float).eps  # by which a length of 1 is known
 EXACT = 1e-9  # part of the terms by which what is computed twice may differ
 NEAR = (1e-2, 1e-4)  # distance of random states, in units of the coordinates; the second where the first is not finite
 TIMES = 4  # random instants at which gaps are looked at again, beside those of the random states and the horizon
@@ -168,6 +170,7 @@ def _check_rows(at: State, draw: Any) -> None:
     s, q, v, there = at.system, at.q, at.v, at.evaluated()
     if not np.any(there):
         return
+    there &= ~_unmoved(at)
     reach, H = at.reach(), np.abs(at.H)
     _compare(at, "rows", "h", at.h, "gaps' h", at.gap, np.where(there, EXACT * (np.abs(at.gap) + reach), np.inf))
     held = (np.asarray(s.follows) < 0) & there
@@ -188,6 +191,18 @@ def _check_rows(at: State, draw: Any) -> None:
         i = int(np.flatnonzero(wrong)[0])
         slope = closest(turned, q, rates, at.Hdv)[i]
         _refuse(at, "rows", f"Hdv[{i}]", at.Hdv[i], "(d/dt H) v by differences", slope)
+
+
+def _unmoved(at: State) -> NDArray[np.bool_]:
+    """Return rows whose H and rate are what rounding makes of a length that nothing changes; none may be closed."""
+    size = 1.0 + np.abs(at.gap)
+    found: NDArray[np.bool_] = np.abs(at.H) @ (1.0 + at.sizes()) <= ROUNDED * size
+    found &= np.abs(at.rate) <= ROUNDED * size * (1.0 + np.abs(at.v).sum())
+    closed = found & (at.gap < -EXACT * size)
+    if np.any(closed):
+        i = int(np.flatnonzero(closed)[0])
+        raise SceneError(f"Row {i} has the gap {at.gap[i]:.9g}, and no coordinate changes it{at.where()}.")
+    return found
 
 
 def _name_gradient(at: State, i: int) -> None:

@@ -64,7 +64,11 @@ def test_random_trees_with_quaternions(seed: int, at: list[float]) -> None:
     found = random_scene(seed, bodies=3).replace(shapes=(), pairs=(), loops=())
     q, v, _ = random_state(found, np.random.default_rng(seed))
     start = system_of(cases.from_scene(found)), q, v, 0.2
-    assume(simulate(*start, rtol=1e-7).outcome.ok)  # a random row may have nothing that moves it
+    try:
+        assume(simulate(*start, rtol=1e-7).outcome.ok)
+    except SceneError as error:  # a random rope may be too long for good
+        assume("no coordinate changes it" not in str(error))
+        raise
     agrees(start, at, rtol=1e-7)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import textwrap
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from places import helped
 
 from crossbody import cases
 from crossbody.cases import SceneError
-from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
+from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape, Tendon
 from crossbody.engines.equations import system_of
 from crossbody.reference import Options, System, _check, kernels, prepare, simulate
 from crossbody.reference._check import check_kernels
@@ -314,3 +315,22 @@ def test_a_sphere_over_the_edge_of_a_face_passes() -> None:
     )  # fmt: skip
     case = cases.from_scene(scene, q0=[0.7, 0.03, 0.1, 1.0, 0.0, 0.0, 0.0])
     system_of(case).check(case.q0, case.v0)
+
+
+@pytest.mark.parametrize("height", [0.5, -0.5])
+def test_a_row_that_nothing_moves_is_no_fault_of_a_kernel_but_cannot_be_closed(height: float) -> None:
+    """A rope from the centre of a ball joint to the wall: its length is known to rounding, and so are H and rate."""
+    ball = Body(
+        name="ball", mass=1.0, inertia=(0.1, 0.2, 0.3, 0.0, 0.0, 0.0), com=(0.1, 0.0, 0.0), position=(0.3, 0.4, 0.5)
+    )
+    rope = Tendon(
+        name="rope", bodies=("", "ball"), positions=((0.1, 0.2, -0.7), (0.0, 0.0, 0.0)), range=(0.0, 1.2 + height)
+    )
+    scene = Scene(bodies=(ball,), joints=(Joint(name="socket", body="ball", type="ball"),), tendons=(rope,))
+    case = cases.from_scene(scene)
+    run = partial(simulate, system_of(case), case.q0, [1.0, 2.0, 3.0], 0.1)
+    if height < 0.0:
+        with pytest.raises(SceneError, match="no coordinate changes it"):
+            run()
+    else:
+        assert run().outcome.ok
