@@ -26,7 +26,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
         """Put the whole together, optimise it and make it callable."""
         parts = list(_parts_of(self, {self}))
         for part in parts:
-            self._final_module.link_in(part.module(), preserve=True)
+            self._final_module.link_in(part._final_module, preserve=True)
             self._reload_init.update(part._reload_init)
         self._close_circles()
         for part in parts:
@@ -46,8 +46,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
         never can, and in code that is read back it is not filled at all.
         """
         whole = self._final_module
-        known = {function.name for function in whole.functions if not function.is_declaration}
-        for called in known.intersection(_circles(whole)):
+        for called in {function.name for function in _defined(whole)}.intersection(_circles(whole)):
             name = RuntimeLinker.PREFIX + called
             text = f'declare void @"{called}"()\n@"{name}" = constant ptr @"{called}"\n'
             whole.link_in(llvm.parse_assembly(text))
@@ -60,24 +59,22 @@ class _Part(_Library):
     def finalize(self) -> None:
         """Leave everything to the whole."""
         self._raise_if_finalized()
-        _LOWERED.update(
-            {function.name: self for function in self._final_module.functions if not function.is_declaration}
-        )
+        _LOWERED.update({function.name: self for function in _defined(self._final_module)})
         self._finalized = True
-
-    def module(self) -> Any:
-        """The code as it was lowered."""
-        self._ensure_finalized()
-        return self._final_module
 
     def make_private(self, whole: Any) -> None:
         """Let nothing outside the whole call this, so that it goes where it is written out."""
-        for function in self._final_module.functions:
-            if not function.is_declaration and function.linkage.name == "external":
+        for function in _defined(self._final_module):
+            if function.linkage.name == "external":
                 whole.get_function(function.name).linkage = "internal"
 
 
 _LOWERED: WeakValueDictionary[str, _Part] = WeakValueDictionary()  # by what they define
+
+
+def _defined(module: Any) -> list[Any]:
+    """Return the functions whose code a module has."""
+    return [function for function in module.functions if not function.is_declaration]
 
 
 def _circles(module: Any) -> list[str]:

@@ -49,6 +49,8 @@ class Lean(CPUDispatcher):  # type: ignore[misc]
     anything in it lives. A function that names kernels, and hangs on one of them, would hold itself.
     """
 
+    frozen_values: list[Any] | None = None
+
     def add_overload(self, cres: CompileResult) -> None:
         """Take what was compiled."""
         super().add_overload(cres._replace(type_annotation=""))
@@ -88,7 +90,6 @@ class Compiled(Lean):
         super().__init__(function, locals, {"nopython": True, **(targetoptions or {})}, pipeline_class=WholePasses)
         self._cache = _Overloads(self)
         self.declared = {tuple(signature.args): signature for signature in declared}
-        self.frozen_values: list[Any] | None = None
 
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, or read the code back."""
@@ -225,7 +226,6 @@ class Part(Lean):
 
     def __init__(self, function: Callable[..., Any], targetoptions: Any) -> None:
         super().__init__(function, None, {"nopython": True, **targetoptions}, pipeline_class=PartPasses)
-        self.frozen_values: list[Any] | None = None
 
     def compile(self, sig: Any) -> Any:
         """Lower for a signature, with the values that are read now."""

@@ -170,14 +170,14 @@ class Store:
         """Let one process compile while others wait for its code, until it is there or `WAIT_S` have passed."""
         with ExitStack() as held:
             lock = self._lock(name, held) if fcntl is not None else None
-            slow = Timer(SLOW_S, tell, [COMPILING])
-            slow.daemon = True  # a process that ends meanwhile does not wait for it
             if not os.path.exists(self.folder / (name + CODE)):
+                slow = Timer(SLOW_S, tell, [COMPILING])
+                slow.daemon = True  # a process that ends meanwhile does not wait for it
                 slow.start()
+                held.callback(slow.cancel)
             try:
                 yield
             finally:
-                slow.cancel()
                 if lock is not None:
                     with suppress(OSError):
                         lock.unlink()  # who waits for it looks for the code next

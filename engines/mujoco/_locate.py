@@ -82,8 +82,8 @@ class Locator:
                 roots.append(brentq(value, 0.0, full, (row, which), 1e-15 * full, maxiter=TRIALS) if bracketed else 0.0)
             except ValueError:  # a trial starts from an evaluation of its own, and may just miss what the step passed
                 roots.append(full)
-        together = {one for one, root in zip(crossed, roots, strict=True) if root <= min(roots) + TOGETHER * full}
         tau, nudge = min(roots), 1e-16 * full
+        together = {one for one, root in zip(crossed, roots, strict=True) if root <= tau + TOGETHER * full}
         self._redo(tau)
         while not together.issubset(self._crossed(modes)) and tau < full:
             tau, nudge = min(tau + nudge, full), 2.0 * nudge

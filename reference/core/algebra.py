@@ -169,6 +169,12 @@ def solve_lu(A: Floats, n: int, pivot: Index, x: Array) -> None:
     """X := A^-1 x, in place; rows were exchanged with all that stood in them, so that every exchange comes first."""
     for c in range(n):
         x[c], x[pivot[c]] = x[pivot[c]], x[c]
+    substitute(A, n, x)
+
+
+@compiled
+def substitute(A: Floats, n: int, x: Array) -> None:
+    """X := (L U)^-1 x, in place, of both factors in A, of which L has ones on its diagonal."""
     for c in range(n):
         for i in range(c + 1, n):
             x[i] -= A[i, c] * x[c]

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core.algebra import substitute
 from crossbody.reference.core.filters import STAGES_RANGE
 from crossbody.reference.core.friction import has_friction, is_tangent, slip_along, small_slip
 from crossbody.reference.core.guards import STOP
@@ -287,13 +288,7 @@ def solve_complete(
     for a in range(n):
         y[a] = x[down[a]]
     if rank == n:
-        for c in range(n):
-            for a in range(c + 1, n):
-                y[a] -= A[a, c] * y[c]
-        for c in range(n - 1, -1, -1):
-            for b in range(c + 1, n):
-                y[c] -= A[c, b] * y[b]
-            y[c] /= A[c, c]
+        substitute(A, n, y)
         for c in range(n):
             x[across[c]] = y[c]
         return
@@ -539,12 +534,12 @@ def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
 
 
 @compiled
-def _bound(m: Model, i: int, lam: Array) -> float:
-    """Mu lam_n - |lam_t| of contact i, from the multipliers of all rows."""
+def _within_bound(m: Model, i: int, lam: Array, normal: int, first: int) -> float:
+    """Mu lam_n - |lam_t| of contact i, whose rows stand at `normal` and from `first` on in lam."""
     square = 0.0
-    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+    for t in range(first, first + m.tangents[i]):
         square += lam[t] * lam[t]
-    return float(m.friction[i] * lam[i] - np.sqrt(square))
+    return float(m.friction[i] * lam[normal] - np.sqrt(square))
 
 
 @compiled
@@ -552,15 +547,13 @@ def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
     """Whether a contact that sticks stays clear of its bound, as far as the stages tell."""
     low, high = np.inf, -np.inf
     for stage in range(s.end + 1):
-        value = _bound(m, i, w.lams[0] if stage == 0 else (w.lam_at[stage] if stage < s.end else w.lams[NODES - 1]))
+        lam = w.lams[0] if stage == 0 else (w.lam_at[stage] if stage < s.end else w.lams[NODES - 1])
+        value = _within_bound(m, i, lam, i, m.tangent[i])
         low, high = min(low, value), max(high, value)
     return bool(low > 0.0 and low > STAGES_RANGE * (high - low))
 
 
 @compiled
 def margin(m: Model, w: Work, i: int, la: Array) -> float:
-    """Mu lam_n - |lam_t| of contact i."""
-    square = 0.0
-    for c in range(w.listed[m.tangent[i]], w.listed[m.tangent[i]] + m.tangents[i]):
-        square += la[c] * la[c]
-    return float(m.friction[i] * la[w.listed[i]] - np.sqrt(square))
+    """Mu lam_n - |lam_t| of contact i, from the multipliers of the rows in contact."""
+    return float(_within_bound(m, i, la, w.listed[i], w.listed[m.tangent[i]]))

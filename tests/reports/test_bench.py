@@ -313,7 +313,7 @@ def test_wrong_use_is_one_sentence(
     assert end.value.code == 2
     said = capsys.readouterr().err
     assert words in said
-    assert len([line for line in said.strip().splitlines() if "compil" not in line]) == 1
+    assert len([line for line in said.strip().splitlines() if "waiting for it" not in line]) == 1
     assert not (tmp_path / "out").exists()
 
 
