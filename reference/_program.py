@@ -18,7 +18,6 @@ from numba.extending import intrinsic
 from crossbody.reference import kernels
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import advance as core
-from crossbody.reference.core import friction_answers
 from crossbody.reference.core._struct import TABLE
 from crossbody.reference.core.layout import MODEL, STATE, WORK
 
@@ -44,6 +43,8 @@ _FRICTION = types.float64(types.int64, _state().dtype, MODEL, WORK, types.int64)
 @cache
 def _friction() -> Any:
     """What answers for contacts with friction, from the cache or compiled once a scene has some."""
+    from crossbody.reference.core import friction_answers
+
     return compiled(friction_answers.answer, [_FRICTION])
 
 

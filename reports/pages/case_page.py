@@ -85,7 +85,7 @@ def _glance(found: Results, case: CaseFiles) -> Section:
 
 def studied(out: Path, about: Mapping[str, Any]) -> list[Section]:
     """What studies in the same folder drew of this case."""
-    mine = [name for name in sections.names() if about.get("case") in getattr(sections.load(name), "CASES", ())]
+    mine = [name for name in sections.names(out) if about.get("case") in getattr(sections.load(name), "CASES", ())]
     return [replace(section, tables=()) for name in mine for section in sections.shown(name, out)]
 
 

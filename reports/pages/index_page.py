@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
@@ -65,13 +66,12 @@ def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
 
 def _tiles(found: Results) -> dict[str, Any]:
     """Counts of all verdicts, and sentences of warning."""
-    counts = found.verdicts["verdict"].value_counts()
-    words = {word: int(counts.get(word, 0)) for word in (*reversed(grid.WORST), Word.SKIPPED.value)}
-    audits = found.verdicts[found.verdicts["metric"] == "audit"]["verdict"]
-    failed = int((audits == Word.OUTSIDE.value).sum())
+    counts = Counter(row["verdict"] for row in found.verdicts)
+    words = {word: counts[word] for word in (*reversed(grid.WORST), Word.SKIPPED.value)}
+    failed = sum(row["metric"] == "audit" and row["verdict"] == Word.OUTSIDE for row in found.verdicts)
     tiles = [
         {"value": len(found.cases), "title": "cases", "word": ""},
-        {"value": found.verdicts["who"].nunique(), "title": "engines with profile", "word": ""},
+        {"value": len({row["who"] for row in found.verdicts}), "title": "engines with profile", "word": ""},
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if failed:

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from crossbody.reports.figures.section import Figure, Plot, Section
 from crossbody.reports.figures.styles import COLOURS
 from crossbody.reports.pages.sheet import plain
@@ -37,10 +35,12 @@ def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: M
         walls: run time of each engine, s.
     """
     ladders = _ladders(out, label)
-    if ladders is not None:
+    if ladders:
+        import pandas as pd
+
         from crossbody.reports.bench.figure import work_precision
 
-        return [_section(work_precision(ladders), LADDERS)]
+        return [_section(work_precision(pd.DataFrame(ladders)), LADDERS)]
     points = [
         (row["who"], float(row["value"]), 1e3 * walls[row["who"]]) for row in rows
         if row["metric"] == "position" and row["value"] is not None and walls.get(row["who"])
@@ -53,12 +53,10 @@ def _section(figure: Figure, text: str) -> Section:
     return Section(name="precision", title="Run time against error", text=text, plots=plots)
 
 
-def _ladders(out: Path, label: str) -> pd.DataFrame | None:
+def _ladders(out: Path, label: str) -> list[dict[str, Any]]:
     if not (out / "bench.json").is_file():
-        return None
-    rows = pd.DataFrame(read_json(out / "bench.json")["rows"])
-    mine = rows[rows["case"] == label] if len(rows) else rows
-    return mine if len(mine) else None
+        return []
+    return [row for row in read_json(out / "bench.json")["rows"] if row["case"] == label]
 
 
 def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:

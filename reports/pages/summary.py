@@ -9,8 +9,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import pandas as pd
-
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid
@@ -80,8 +78,8 @@ def _ratios(out: Path) -> dict[str, float]:
     """Of a benchmark: time at the engine's best error over the reference's, median over cases."""
     if not (out / "headline.json").is_file():
         return {}
-    rows = pd.DataFrame(read_json(out / "headline.json")["rows"])
-    if rows.empty or "ratio" not in rows:
-        return {}
-    found = rows.assign(who=rows["engine"] + ":" + rows["profile"]).groupby("who")["ratio"].median()
-    return {str(who): float(value) for who, value in found.dropna().items()}
+    found: dict[str, list[float]] = {}
+    for row in read_json(out / "headline.json")["rows"]:
+        if row.get("ratio") is not None:
+            found.setdefault(f"{row['engine']}:{row['profile']}", []).append(row["ratio"])
+    return {who: median(ratios) for who, ratios in found.items()}

@@ -14,7 +14,6 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
-import pandas as pd
 import plotly.graph_objects as go
 import pytest
 from ladder import ladder
@@ -22,9 +21,9 @@ from ladder import ladder
 from crossbody.cases import OutputError, load
 from crossbody.reports.bench.order import observed_order
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
-from crossbody.reports.judging.comparison import Entry, table
+from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import file_name
@@ -38,7 +37,7 @@ LIMIT = 1.5e6
 """Largest page of a case beside the shared script, bytes."""
 
 
-def made(path: Path, results: Sequence[CaseResult], rows: pd.DataFrame | None = None) -> Path:
+def made(path: Path, results: Sequence[CaseResult], rows: Sequence[Row] | None = None) -> Path:
     commands = {result.case.label: f"crossbody run {result.case.name}" for result in results}
     told = {"command": f"crossbody run {HOSTILE}", "time": "", "versions": {"crossbody": "0.0.1"}}
     with folder(path) as out:
@@ -292,13 +291,13 @@ def changed(out: Path, base: Path) -> str:
     return found.group()
 
 
-def fake_rows(count: int, name: str = "case {}") -> pd.DataFrame:
-    return table(
+def fake_rows(count: int, name: str = "case {}") -> list[Row]:
+    return [
         Verdict(
             case=name.format(i), variant="v", engine="e", profile=f"p{k}", metric="m", value=1.0, unit="1", limit=2.0,
             tier="A", verdict=Word.WITHIN, command="crossbody run",
-        ) for i in range(count) for k in range(3)
-    )  # fmt: skip
+        ).row() for i in range(count) for k in range(3)
+    ]  # fmt: skip
 
 
 def test_a_thousand_cases_are_paged(tmp_path: Path) -> None:
