@@ -44,7 +44,8 @@ def run(
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
         click.echo(f"note: {sentence}", err=True)
-    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
+    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--set-engine")
+    jobs.check_asked(asked, picks)
     output.check(out, "run")
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
@@ -117,7 +118,7 @@ def repeat(
     source = next(own, case.name)
     words = ["crossbody", "run", source, "--variant", case.variant]
     words += [word for pair in pairs for word in ("--set", pair)]
-    words += [word for pair in settings for word in ("--setting", pair)]
+    words += [word for pair in settings for word in ("--set-engine", pair)]
     words += ["--rtol", f"{rtol:g}"] if rtol is not None else []
     return shlex.join(words + installed.options())
 
