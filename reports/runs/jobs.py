@@ -22,6 +22,7 @@ from crossbody.cases import (
     UnknownName,
     Value,
 )
+from crossbody.cases.files.case import rubbing
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
@@ -182,6 +183,7 @@ def run_case(
     watch.limited(label, TRUTHS * limit)
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} cannot be had. {why}")
+    case = _with_friction(case) if truth is None else case
     truth = truth_of(case) if truth is None else truth
     if case.file and truth.trajectory.outcome is Outcome.INCONSISTENT:
         raise CaseUnsupported(f"{case.label}: {truth.trajectory.message}")
@@ -200,6 +202,18 @@ def run_case(
     watch.unlimited()
     _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def _with_friction(case: Case) -> Case:
+    """Return a file's case with the friction of its contacts where its motion comes to one; else as it is.
+
+    Engines without friction run what never comes to any.
+    """
+    rubs = rubbing(case)
+    if rubs is None:
+        return case
+    run = engines.load("reference").prepare(case, "compiled").run()
+    return rubs if run.outcome is Outcome.INCONSISTENT else case
 
 
 def ended(case: Case, pick: Pick, why: str) -> Entry:
