@@ -346,6 +346,22 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
     return 0
 
 
+@cli.command()
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
+@click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")
+@click.option(
+    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=20.0, show_default=True, metavar="S",
+    help="A reader that has not come back by then is ended, s.",
+)
+@speaks
+def audit(file: Path, engines: tuple[str, ...], without: str, limit: float) -> int:
+    """Say whether every engine's own reader makes the same robot of FILE (MJCF or URDF), where not, and why."""
+    from crossbody.reports.commands.audit import audit as work
+
+    return work(file, engines, without, limit)
+
+
 cli.add_command(replay)
 cli.add_command(identify)
 

@@ -1,0 +1,84 @@
+"""`crossbody audit`: the published robots, what it prints, and its exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from places import ROBOTS
+
+from crossbody.reports.cli import main
+from crossbody.reports.importers.audit import audited
+from crossbody.reports.importers.compare import NONE, OK, WRONG
+
+ARM = """<mujoco model="arm"><worldbody><body name="arm"><joint name="arm" axis="0 1 0"/>
+<inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .01"/></body></worldbody></mujoco>"""
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(str(end.value.code)), out, err
+
+
+@pytest.mark.parametrize("path", sorted(ROBOTS.glob("*/*.xml")), ids=lambda path: path.stem)
+def test_mujoco_and_our_tree_agree_on_every_published_robot(path: Path) -> None:
+    """The two yardsticks: whatever another reader is held to, they are the same to 1e-9."""
+    [(_, _, rows)] = audited(path, ["mujoco"], seconds=60.0)
+    assert {row.verdict for row in rows} <= {OK, NONE}, [row for row in rows if row.verdict not in (OK, NONE)]
+
+
+def test_what_is_known_of_pinocchio_and_a_published_robot() -> None:
+    """The pose of a body that is fixed to the world is left out: all that stands on it is turned."""
+    [(_, _, rows)] = audited(ROBOTS / "universal_robots_ur5e" / "ur5e.xml", ["pinocchio"], seconds=60.0)
+    assert [(row.quantity, row.where) for row in rows if row.verdict == WRONG] == [("frames", "base")]
+
+
+def test_a_table_of_80_columns_and_what_is_wrong_beneath_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.replace("<joint", '<joint frictionloss=".5" armature=".2"'))
+    code, out, err = run(["audit", str(path), "-e", "mujoco", "-e", "pinocchio"], capsys)
+    assert code == 0, out + err
+    assert max(map(len, out.splitlines())) <= 80
+    assert "mujoco: reads the same robot" in err
+    lines = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.startswith(("M ", "loops "))}
+    assert lines == {"M": ["ok", "ok"], "loops": ["-", "-"]}
+
+
+def test_rows_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    code, out, _ = run(["audit", str(path), "-e", "mujoco", "--json"], capsys)
+    assert code == 0
+    assert {"engine", "version", "reader", "quantity", "where", "value", "expected", "difference", "verdict", "cause",
+            "file", "line"} <= set(json.loads(out)[0])  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("<mujoco><worldbody/></mujoco>", "no joint"),
+    ("<mujoco>", "MuJoCo's compiler refuses it"),
+    ("<robot><link/></robot>", "MuJoCo's compiler refuses it"),
+    ("", "MuJoCo's compiler refuses it"),
+])  # fmt: skip
+def test_a_file_that_is_none_is_one_sentence(
+    text: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(text)
+    code, out, err = run(["audit", str(path), "-e", "mujoco"], capsys)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_wrong_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    code, _, err = run(["audit", str(tmp_path / "none.xml")], capsys)
+    assert code == 2
+    assert "none.xml" in err
+    code, _, err = run(["audit", str(path), "-e", "bullet"], capsys)
+    assert code == 2
+    assert "pinocchio" in err
