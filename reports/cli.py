@@ -351,7 +351,12 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
 @click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
 @click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")
 @click.option(
-    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=20.0, show_default=True, metavar="S",
+    "--time-limit",
+    "limit",
+    type=click.FloatRange(0.0, min_open=True),
+    default=20.0,
+    show_default=True,
+    metavar="S",
     help="A reader that has not come back by then is ended, s.",
 )
 @speaks

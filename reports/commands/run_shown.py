@@ -23,6 +23,8 @@ WIDTH = 120
 """Of the table in a file or a pipe."""
 NAMED = 3
 """Runs that the sentence names; the table and the lines below it have all."""
+MANY = 4
+"""Cases that are named of those that an engine could not run."""
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
 COLOURS = {"within": "green", "known": "yellow", "outside": "red"}
@@ -176,11 +178,16 @@ def _unit(row: Row) -> str:
 
 
 def _absent(runs: Sequence[_Run]) -> list[str]:
-    """One line an engine that could not run, and why."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """One line a reason for which engines could not run."""
+    found: dict[str, list[_Run]] = {}
     for run in filter(_skipped, runs):
-        found.setdefault((run.who, run.rows[0]["why"]), []).append(run.label)
+        found.setdefault(run.rows[0]["why"], []).append(run)
     return [
-        f"skipped: {who} on {labels[0] if len(labels) == 1 else f'{len(labels)} cases'}. {why}"
-        for (who, why), labels in found.items()
+        f"skipped: {', '.join(dict.fromkeys(run.who for run in mine))} on {_places(mine)}. {why}"
+        for why, mine in found.items()
     ]
+
+
+def _places(runs: Sequence[_Run]) -> str:
+    labels = list(dict.fromkeys(run.label for run in runs))
+    return ", ".join(labels) if len(labels) <= MANY else f"{len(labels)} cases"
