@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import click
 
 from crossbody.reports import voice
 from crossbody.reports.judging.parts import PARTS, part_of
+from crossbody.reports.judging.told import EngineRun, runs_of, sentence
 from crossbody.reports.judging.verdict import Regression, Row, Word
-from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import html
 from crossbody.reports.pages.results import Times
 
-WRONG = (Word.CRASHED, Word.OUTSIDE)
 WIDTH = 120
 """Of the table in a file or a pipe."""
-NAMED = 3
-"""Runs that the sentence names; the table and the lines below it have all."""
 MANY = 4
 """Cases that are named of those that an engine could not run."""
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
@@ -32,33 +27,6 @@ LEFT_OUT = ("in all [s]", "importer", "within", "step", "model", "known", "time 
 """Columns that go, in this order, where the table is too wide."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Run:
-    """Rows of one engine on one case."""
-
-    label: str
-    who: str
-    rows: Sequence[Row]
-
-    @property
-    def wrong(self) -> list[Row]:
-        """Rows that are outside or crashed, the farthest out first."""
-        return sorted((row for row in self.rows if row["verdict"] in WRONG), key=_share, reverse=True)
-
-
-def _share(row: Row) -> float:
-    """How many times its limit a number is; infinite where there is no number or it may not be any."""
-    off = abs(row["value"] - (row["expected"] if math.isfinite(row["expected"]) else 0.0))
-    return off / row["limit"] if row["limit"] > 0.0 and math.isfinite(off) else math.inf
-
-
-def _runs(rows: Iterable[Row]) -> list[_Run]:
-    found: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        found.setdefault((f"{row['case']}:{row['variant']}", f"{row['engine']}:{row['profile']}"), []).append(row)
-    return [_Run(label, who, mine) for (label, who), mine in found.items()]
-
-
 def counted(rows: Sequence[Row]) -> str:
     """Return how many rows have each verdict."""
     return ", ".join(f"{count} {word}" for word, count in Counter(row["verdict"] for row in rows).most_common())
@@ -66,7 +34,7 @@ def counted(rows: Sequence[Row]) -> str:
 
 def show(rows: Sequence[Row], times: Times) -> None:
     """Print who is off and by how much, a line a run, every row that is wrong, and what could not run."""
-    runs = _runs(rows)
+    runs = runs_of(rows)
     if not voice.quiet():
         click.echo(f"{sentence(runs)}\n\n{table(runs, times, _width())}\n\n{counted(rows)}")
     for run in runs:
@@ -83,38 +51,9 @@ def _width() -> int:
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
 
 
-def sentence(runs: Sequence[_Run]) -> str:
-    """Say who is within all limits, who is off, by how much and by which part of its error."""
-    ran = [run for run in runs if not run.who.startswith(TRUTH) and any(r["verdict"] != Word.SKIPPED for r in run.rows)]
-    off = sorted((run for run in runs if run.wrong), key=lambda run: -_share(run.wrong[0]))
-    known = [run.who for run in ran if any(row["verdict"] == Word.EXPECTED for row in run.rows)]
-    within = len(ran) - len([run for run in off if run in ran])
-    text = f"{within} of {len(ran)} runs are within all limits"
-    text += f", {len(known)} with known deviations ({', '.join(dict.fromkeys(known))})." if known else "."
-    if off:
-        more = f"; and {len(off) - NAMED} more" if len(off) > NAMED else ""
-        text += f" Off: {'; '.join(_off(run) for run in off[:NAMED])}{more}."
-    return text
-
-
-def _off(run: _Run) -> str:
-    """The farthest number of a run, in a few words."""
-    row, share = run.wrong[0], _share(run.wrong[0])
-    who = run.who.removesuffix(":")
-    size = f"{row['value']:.2g}, {share:.2g} times its limit" if math.isfinite(share) else row["verdict"]
-    return f"{who} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
-
-
-def _blamed(run: _Run, metric: str) -> str:
-    """The largest part of an error, where its parts are told."""
-    values = {row["metric"]: abs(row["value"]) for row in run.rows if math.isfinite(row["value"])}
-    parts = {part: values[name] for part in PARTS if (name := part_of(metric, part)) in values}
-    return f", mostly its {max(parts, key=lambda part: parts[part])}" if parts else ""
-
-
-def table(runs: Sequence[_Run], times: Times, width: int) -> str:
+def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
     """Lay out a line a run below the name of its case; columns that say nothing, or do not fit, are left out."""
-    runs = [run for run in runs if (run.label, run.who) in times or not _skipped(run)]
+    runs = [run for run in runs if (run.label, run.who) in times or not run.skipped]
     columns = {name: [_error(run, metric) for run in runs] for name, metric in SHOWN.items()}
     walls = [times.get((run.label, run.who), (None, None)) for run in runs]
     columns["time [ms]"] = [_number(None if wall is None else 1e3 * wall) for wall, _ in walls]
@@ -135,10 +74,6 @@ def table(runs: Sequence[_Run], times: Times, width: int) -> str:
     return "\n".join(lines)
 
 
-def _skipped(run: _Run) -> bool:
-    return all(row["verdict"] == Word.SKIPPED for row in run.rows)
-
-
 def _says(cell: str) -> bool:
     return cell not in ("-", "0", "")
 
@@ -152,7 +87,7 @@ def _cell(head: str, cells: Sequence[str], i: int) -> str:
     return "  " + (click.style(text, fg=COLOURS[head]) if head in COLOURS and cells[i] != "0" else text)
 
 
-def _error(run: _Run, metric: str) -> str:
+def _error(run: EngineRun, metric: str) -> str:
     """A number in two digits, or below what it is known to."""
     row: Mapping[str, float] = next((row for row in run.rows if row["metric"] == metric), {})
     below, number = html.bounded(row.get("value"), row.get("known"))
@@ -163,12 +98,12 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
 
 
-def _wrong(run: _Run, row: Row) -> str:
+def _wrong(run: EngineRun, row: Row) -> str:
     number = f" {row['value']:.4g}{_unit(row)}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
     return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}. {row['why']}"
 
 
-def _lost(run: _Run, row: Row) -> str:
+def _lost(run: EngineRun, row: Row) -> str:
     value = f"{row['value']:.4g}{_unit(row)}, band {row['band']:.3g}"
     return f"more than a stored run gave: {run.label} {run.who} {row['metric']} {value}"
 
@@ -177,10 +112,10 @@ def _unit(row: Row) -> str:
     return "" if row["unit"] in ("1", "") else f" {row['unit']}"
 
 
-def _absent(runs: Sequence[_Run]) -> list[str]:
+def _absent(runs: Sequence[EngineRun]) -> list[str]:
     """One line a reason for which engines could not run."""
-    found: dict[str, list[_Run]] = {}
-    for run in filter(_skipped, runs):
+    found: dict[str, list[EngineRun]] = {}
+    for run in (run for run in runs if run.skipped):
         found.setdefault(run.rows[0]["why"], []).append(run)
     return [
         f"skipped: {', '.join(dict.fromkeys(run.who for run in mine))} on {_places(mine)}. {why}"
@@ -188,6 +123,6 @@ def _absent(runs: Sequence[_Run]) -> list[str]:
     ]
 
 
-def _places(runs: Sequence[_Run]) -> str:
+def _places(runs: Sequence[EngineRun]) -> str:
     labels = list(dict.fromkeys(run.label for run in runs))
     return ", ".join(labels) if len(labels) <= MANY else f"{len(labels)} cases"

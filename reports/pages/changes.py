@@ -19,7 +19,7 @@ WORDS = columns(
 )  # fmt: skip
 VALUES = columns(
     label="Case", who="Engine", metric="Metric", value_before=("Before", Kind.NUMBER), value=("Now", Kind.NUMBER),
-    limit=("Limit", Kind.NUMBER), unit="Unit", moved=("Moved by, of the limit [1]", Kind.NUMBER),
+    limit=("Limit", Kind.NUMBER), unit="Unit", moved=("Moved by, of the limit", Kind.NUMBER),
 )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from crossbody.reports.commands import run_shown
 from crossbody.reports.judging.parts import part_of
+from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.verdict import Row, Verdict, Word
 
 NARROW = 62
@@ -25,10 +26,6 @@ def row(engine: str, metric: str, value: float, verdict: Word, limit: float = ma
     ).row()  # fmt: skip
 
 
-def runs(rows: list[Row]) -> list[run_shown._Run]:
-    return run_shown._runs(rows)
-
-
 errors = st.floats(1e-300, 1e300) | st.just(math.nan) | st.just(math.inf) | st.floats(-1e3, 1e3)
 
 
@@ -39,7 +36,7 @@ def test_the_table_fits_and_loses_no_digit(given_: list[tuple[float, float, floa
         rows += [row(f"engine{i}", "position", error, Word.WITHIN),
                  row(f"engine{i}", part_of("position", "step"), step, Word.INFO)]  # fmt: skip
         times["ball:v", f"engine{i}:matched"] = wall, 2.0 * wall
-    heads, _, *lines = click.unstyle(run_shown.table(runs(rows), times, width)).splitlines()
+    heads, _, *lines = click.unstyle(run_shown.table(runs_of(rows), times, width)).splitlines()
     assert max(map(len, (heads, *lines))) <= width
     names = [head for head in heads.replace("in all", "all").split() if head[0] != "["]
     for line, (error, step, _) in zip(lines, given_, strict=True):
@@ -55,7 +52,7 @@ def test_columns_go_before_digits_and_errors_go_last() -> None:
     times = {("ball:v", "mujoco:matched"): (12.5, 80.0)}
     shown = [
         [head for head in (*run_shown.LEFT_OUT, "position", "outside") if head in table.splitlines()[0]]
-        for table in (run_shown.table(runs(rows), times, width) for width in range(200, 20, -1))
+        for table in (run_shown.table(runs_of(rows), times, width) for width in range(200, 20, -1))
     ]
     assert "position" in shown[-1]
     assert len(shown[0]) == len(run_shown.LEFT_OUT) + 1, "nothing is within: the column says nothing"
@@ -69,7 +66,7 @@ def test_the_sentence_names_who_is_off_by_how_much_and_by_which_part() -> None:
         row("mujoco", part_of("position", "model"), -4.9e-3, Word.INFO),
         row("mujoco", part_of("position", "step"), 1e-4, Word.INFO),
     ]  # fmt: skip
-    text = run_shown.sentence(runs(rows))
+    text = sentence(runs_of(rows))
     assert text.startswith("1 of 2 runs are within all limits.")
     assert "mujoco:matched on ball:v (position 0.005, 50 times its limit, mostly its model)" in text
 
@@ -77,7 +74,7 @@ def test_the_sentence_names_who_is_off_by_how_much_and_by_which_part() -> None:
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_what_has_no_number_is_off_the_farthest(value: float) -> None:
     rows = [row("a", "position", 1.0, Word.OUTSIDE, 1e-9), row("b", "lam_impulse", value, Word.OUTSIDE, 1.0)]
-    assert "Off: b:matched on ball:v (lam_impulse outside); a:matched" in run_shown.sentence(runs(rows))
+    assert "Off: b:matched on ball:v (lam_impulse outside); a:matched" in sentence(runs_of(rows))
 
 
 def test_an_engine_that_is_absent_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
