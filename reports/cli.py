@@ -343,7 +343,12 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
 @click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
 @click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")
 @click.option(
-    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=20.0, show_default=True, metavar="S",
+    "--time-limit",
+    "limit",
+    type=click.FloatRange(0.0, min_open=True),
+    default=20.0,
+    show_default=True,
+    metavar="S",
     help="A reader that has not come back by then is ended, s.",
 )
 @speaks
@@ -352,6 +357,27 @@ def audit(file: Path, engines: tuple[str, ...], without: str, limit: float) -> i
     from crossbody.reports.commands.audit import audit as work
 
     return work(file, engines, without, limit)
+
+
+@cli.command()
+@click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
+@click.option("--feature", default="", metavar="TEXT", help="Features alone whose name has TEXT in it.")
+@click.option(
+    "--time-limit",
+    "limit",
+    type=click.FloatRange(0.0, min_open=True),
+    default=20.0,
+    show_default=True,
+    metavar="S",
+    help="A reader that has not come back by then is ended, s.",
+)
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
+def conformance(engines: tuple[str, ...], feature: str, limit: float, out: Path) -> int:
+    """Show what every engine's own reader makes of each feature of robot files, by one small file a feature."""
+    from crossbody.reports.commands.conformance import conformance as work
+
+    return work(engines, feature, limit, out, _command())
 
 
 cli.add_command(replay)

@@ -35,10 +35,7 @@ def audit(path: Path, engines: Sequence[str], without: str, seconds: float) -> i
     """
     if not path.is_file():
         raise UnknownName("robot file", str(path), ())
-    wanted = tuple(dict.fromkeys(engines)) or importers.names()
-    for name in wanted:
-        if name not in importers.names():
-            raise UnknownName("importer", name, importers.names())
+    wanted = importers.known(engines)
     found: Audit | None = None
     rows: list[Row] = []
     for audit_of, name, own in audited(path, wanted, without, seconds):
