@@ -29,7 +29,8 @@ class Feature:
         text: the smallest file that has it.
         scene: what it means.
         about: quantities by which a reader is judged.
-        finds: paths of ElementTree by which a file is seen to use it; empty for what has none.
+        finds: paths of ElementTree by which a file is seen to use it; behind a ! children that are not there; empty
+            for what no path tells.
         rule: what the format says, in a sentence.
         rewrite: how to write it so that every reader reads the same; empty where there is no such way.
         files: what else stands beside it, name -> text.
@@ -217,9 +218,11 @@ def _joints() -> list[Feature]:
     z = {"axis": (0.0, 0.0, 1.0)}
     bare = '<joint name="elbow"/>'
     return [
-        _written("arm", mjcf(), arm()),
+        _written("arm", mjcf(), arm(), ".//inertial[@diaginertia]", "An <inertial> says mass, centre and moments."),
         _written("no model name", mjcf(model=""), arm(), rule="The attribute model of <mujoco> may be left out.",
             rewrite='Write <mujoco model="NAME">.'),
+        _written("integrator", mjcf(head='<option integrator="implicitfast"/>'), arm(), "option[@integrator]",
+            "The integrator is MuJoCo's own and no physics of the robot.", "Leave it out for other readers."),
         _written("axis of the main class", mjcf(head='<default><joint axis="0 1 0"/></default>', elbow=bare),
             arm(elbow={"axis": (0.0, 1.0, 0.0)}), "default/joint[@axis]", AXIS_RULE, AXIS_WAY),
         _written("axis of a class", mjcf(head='<default><default class="a"><joint axis="0 1 0"/></default></default>',
@@ -241,8 +244,8 @@ def _joints() -> list[Feature]:
         _written("class without a joint of its own",
             mjcf(head='<default><default class="a"><joint axis="0 1 0"/><default class="b"><geom type="box"/>'
             '</default></default></default>',
-            elbow='<joint name="elbow" class="b"/>'), arm(elbow={"axis": (0.0, 1.0, 0.0)}), "default/default/default",
-            AXIS_RULE, AXIS_WAY),
+            elbow='<joint name="elbow" class="b"/>'), arm(elbow={"axis": (0.0, 1.0, 0.0)}),
+            ".//default/default/default!joint", AXIS_RULE, AXIS_WAY),
         _written("joint position of a class", mjcf(head='<default><joint pos=".1 0 .05"/></default>'),
             arm(shoulder={"anchor": (0.1, 0.0, 0.05)}, elbow={"anchor": (0.1, 0.0, 0.05)}), ".//default/joint[@pos]",
             AXIS_RULE, AXIS_WAY),
@@ -334,7 +337,8 @@ def _poses() -> list[Feature]:
         of("two axes that are not perpendicular", 'xyaxes="0 2 0 -1 1 0"', turned(("z", 90)), ".//body[@xyaxes]"),
         of("direction of z", 'zaxis="1 0 0"', turned(("y", 90)), ".//body[@zaxis]"),
         _written("fixed body with a pose under the world", mjcf(before=fixed, behind="</body>"),
-            arm().replace(bodies=(root, replace(UPPER, parent="root"), LOWER)), "worldbody/body[@pos]",
+            arm().replace(bodies=(root, replace(UPPER, parent="root"), LOWER)),
+            "worldbody/body[@pos]!joint,freejoint | worldbody/body[@quat]!joint,freejoint",
             "A body without joints stands in its parent at its pose.", "Put its pose into that of the bodies on it."),
         _written("fixed body in the tree",
             mjcf(lower_inertial=LOWER_INERTIAL + f'<body name="hand" pos="0 .1 -.3" quat="{hw!r} {hx!r} {hy!r} '
@@ -490,6 +494,14 @@ def _forces() -> list[Feature]:
         _written("bounds of a slide",
             mjcf(elbow='<joint name="elbow" type="slide" axis="1 0 0" range="-.2 .3" limited="true"/>'),
             arm(elbow={"type": "slide", "range": (-0.2, 0.3)}), ".//joint[@type='slide'][@range]", about=("limits",)),
+        elbow("bounds beside a reference", 'range="-30 60" ref="20"', ".//joint[@ref][@range]",
+            {"range": (-30 * turn, 60 * turn), "reference": 20 * turn}, "limits",
+            "A range is that of the coordinate, which is ref at the pose of the file.", "Leave ref out."),
+        _written("bounds of the class around a class",
+            mjcf(head='<default><default class="a"><joint range="-30 60"/><default class="b"><geom type="box"/>'
+            "</default></default></default>", elbow='<joint name="elbow" class="b" axis="1 0 0"/>'),
+            arm(elbow={"range": (-30 * turn, 60 * turn)}), ".//default/default/default!joint", AXIS_RULE,
+            "Write it at the joint itself.", ("limits",)),
         _written("bounds of a class", mjcf(head='<default><joint range="-30 60"/></default>'),
             arm(shoulder={"range": (-30 * turn, 60 * turn)}, elbow={"range": (-30 * turn, 60 * turn)}),
             ".//default/joint[@range]", AXIS_RULE, "Write it at the joint itself.", ("limits",)),
@@ -581,7 +593,7 @@ def _urdf() -> list[Feature]:
     plain = urdf_arm()
     free = {"range": (-np.inf, np.inf)}
     return [
-        of("arm", urdf(), plain),
+        of("arm", urdf(), plain, "link/inertial", "An <inertial> says mass, centre and moments."),
         of("origin of a joint with angles", urdf(elbow=elbow('<origin xyz="0 .05 -.4" rpy=".3 .4 .5"/>' + x)),
             urdf_arm(lower={"orientation": quaternion(fixed_rpy)}), ".//joint/origin[@rpy]",
             "rpy are turns about fixed x, y and z."),
