@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 from pathlib import Path
 
 import pytest
-from places import ROBOTS
+import yaml
+from places import ROBOTS, ROOT
 
 from crossbody.reports.cli import main
 from crossbody.reports.importers.audit import audited
 from crossbody.reports.importers.causes import advice, explained
 from crossbody.reports.importers.compare import NONE, OK, WRONG, Row
 from crossbody.reports.importers.told import markdown, sarif
+
+pytest_plugins = ["pytester"]
 
 ARM = """<mujoco model="arm"><worldbody><body name="arm"><joint name="arm" axis="0 1 0"/>
 <inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .01"/></body></worldbody></mujoco>"""
@@ -127,3 +132,29 @@ def test_explain_sarif_and_markdown_from_the_command_line(tmp_path: Path, capsys
     code, _, err = run(["audit", str(path), "-e", "mujoco", "--sarif", str(tmp_path / "none" / "a")], capsys)
     assert code == 2
     assert "cannot be written" in err
+
+
+def test_one_pytest_item_a_reader_and_quantity(pytester: pytest.Pytester) -> None:
+    pytester.makefile(".xml", arm=ARM.replace("<worldbody>", '<option gravity="0 0 -3"/><worldbody>'))
+    found = pytester.runpytest_subprocess(
+        "--crossbody-audit", "arm.xml", "--crossbody-engine", "mujoco", "--crossbody-engine", "pinocchio", "-rA"
+    )
+    counts = found.parseoutcomes()
+    assert counts["failed"] == 3  # gravity, bias and energy
+    found.stdout.fnmatch_lines(["PASSED *arm.xml::mujoco::gravity", "FAILED *arm.xml::pinocchio::gravity*"])
+    found = pytester.runpytest_subprocess("--crossbody-audit", "none.xml")
+    found.stdout.fnmatch_lines(["*There is no robot file*"])
+
+
+@pytest.mark.parametrize(("gravity", "code"), [("0 0 -9.81", 0), ("0 0 -3", 1)])
+def test_the_steps_of_the_action_run_as_a_script(gravity: str, code: int, tmp_path: Path) -> None:
+    """What a GitHub runner does with a composite action: its shell, its inputs in the environment."""
+    step = yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"][-1]
+    (tmp_path / "arm.xml").write_text(ARM.replace("<worldbody>", f'<option gravity="{gravity}"/><worldbody>'))
+    given = {"FILES": "arm.xml", "ENGINES": "mujoco pinocchio", "SARIF": "told", "GITHUB_STEP_SUMMARY": "summary.md"}
+    done = subprocess.run(["bash", "-eo", "pipefail", "-c", step["run"]], cwd=tmp_path, env=os.environ | given,
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == code, done.stdout + done.stderr
+    assert "### arm.xml" in (tmp_path / "summary.md").read_text()
+    results = json.loads((tmp_path / "told" / "arm.xml.sarif").read_text())["runs"][0]["results"]
+    assert bool(results) == bool(code)
