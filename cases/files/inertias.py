@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.files.warned import captured
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Vector
 
 
@@ -65,3 +68,48 @@ def together(parts: Sequence[Inertia]) -> Inertia:
 def six(about: Floats) -> Vector:
     """Return xx, yy, zz, xy, xz, yz."""
     return tuple(about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist())
+
+
+SOLIDS = {2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
+"""MuJoCo's number of a type -> ours."""
+CHANGING = ("settotalmass", "boundmass", "boundinertia", "balanceinertia", "fusestatic")
+"""What a compiler may be told to do with inertias behind their computation."""
+
+
+def of_shapes(path: Path) -> dict[str, Inertia]:
+    """Return the inertias of the named bodies of an MJCF that are those of their shapes alone, in closed form.
+
+    Bodies with a shape that is none of `SOLIDS`, or a shell, are left to the compiler; so is a file of which meshes that
+    are only drawn are not there.
+    """
+    import mujoco
+
+    try:
+        with captured():
+            spec = mujoco.MjSpec.from_file(str(path))
+            model = spec.compile()
+    except ValueError:
+        return {}
+    compiler = spec.compiler
+    if any(getattr(compiler, name) > 0 for name in CHANGING):
+        return {}
+    always = int(compiler.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
+    never = int(compiler.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE)
+    first, last = compiler.inertiagrouprange
+    found: dict[str, Inertia] = {}
+    for body in spec.bodies:
+        geoms = [geom for geom in body.geoms if first <= geom.group <= last]
+        if body.name and geoms and not never and (always or not body.explicitinertial):
+            parts = [_of_geom(model, geom) for geom in geoms]
+            if None not in parts and any(part and part.mass > 0.0 for part in parts):
+                found[body.name] = together([part for part in parts if part])
+    return found
+
+
+def _of_geom(model: Any, geom: Any) -> Inertia | None:
+    kind = SOLIDS.get(int(model.geom_type[geom.id]))
+    if kind is None or int(geom.typeinertia) != 0:
+        return None
+    volume, unit = solid(kind, model.geom_size[geom.id])
+    mass = geom.density * volume if math.isnan(geom.mass) else geom.mass
+    return placed(float(mass), unit, model.geom_pos[geom.id], matrices(np.array(model.geom_quat[geom.id])))

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 from crossbody.cases.files.conformance import FEATURES, Feature
-from crossbody.cases.files.reading import read, scene_of
 from crossbody.engines.importers import mujoco as own
 from crossbody.engines.importers.process import measured
 from crossbody.reports.cli import main
-from crossbody.reports.importers.audit import of_scene
+from crossbody.reports.importers.audit import of_scene, opened
 from crossbody.reports.importers.compare import NONE, OK, UNSUPPORTED, WRONG, Row, rows
 from crossbody.reports.importers.conformance import judged, written
 
@@ -46,7 +45,7 @@ def test_our_own_reading_is_what_the_format_means(feature: Feature, tmp_path: Pa
     """What `crossbody audit` holds readers to on a user's file is right on every feature."""
     path = written(feature, tmp_path)
     audit = of_scene(path, feature.scene)
-    mine = of_scene(path, scene_of(path, read(path)[0]))
+    mine = opened(path)
     told = [
         row for row in rows("ours", mine.wanted, audit.wanted, audit.job["joints"]) if row.quantity in feature.about
     ]
