@@ -359,12 +359,43 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
     metavar="S",
     help="A reader that has not come back by then is ended, s.",
 )
+@click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
+@click.option("--sarif", type=click.Path(path_type=Path), metavar="F", help="Write the findings as SARIF too.")
+@click.option("--markdown", type=click.Path(path_type=Path), metavar="F", help="Write a summary in Markdown too.")
 @speaks
-def audit(file: Path, engines: tuple[str, ...], without: str, limit: float) -> int:
+def audit(
+    file: Path, engines: tuple[str, ...], without: str, limit: float, explain: bool, sarif: Path | None,
+    markdown: Path | None,
+) -> int:  # fmt: skip
     """Say whether every engine's own reader makes the same robot of FILE (MJCF or URDF), where not, and why."""
+    from crossbody.reports.commands.audit import Ask
     from crossbody.reports.commands.audit import audit as work
 
-    return work(file, engines, without, limit)
+    asked = Ask(
+        path=file, engines=engines, without=without, seconds=limit, explain=explain, sarif=sarif, markdown=markdown
+    )
+    return work(asked)
+
+
+@cli.command()
+@click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
+@click.option("--feature", default="", metavar="TEXT", help="Features alone whose name has TEXT in it.")
+@click.option(
+    "--time-limit",
+    "limit",
+    type=click.FloatRange(0.0, min_open=True),
+    default=20.0,
+    show_default=True,
+    metavar="S",
+    help="A reader that has not come back by then is ended, s.",
+)
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
+def conformance(engines: tuple[str, ...], feature: str, limit: float, out: Path) -> int:
+    """Show what every engine's own reader makes of each feature of robot files, by one small file a feature."""
+    from crossbody.reports.commands.conformance import conformance as work
+
+    return work(engines, feature, limit, out, _command())
 
 
 cli.add_command(replay)

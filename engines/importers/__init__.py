@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.errors import UnknownName
 from crossbody.cases.registry import Registry
 
 REGISTRY = Registry("importer", __name__, hidden=("process",))
@@ -183,3 +184,15 @@ def _lines(path: Path) -> list[str]:
 def names() -> tuple[str, ...]:
     """Names of all importers, installed or not."""
     return REGISTRY.names()
+
+
+def known(wanted: Sequence[str]) -> tuple[str, ...]:
+    """Return the importers wanted, each once; all of them where none is.
+
+    Raises:
+        UnknownName: for one that there is not.
+    """
+    for name in wanted:
+        if name not in names():
+            raise UnknownName("importer", name, names())
+    return tuple(dict.fromkeys(wanted)) or names()

@@ -24,7 +24,9 @@ class _Robot:
         self.version = dartpy.__version__
         if urdf:
             options = dartpy.utils.DartLoaderOptions(defaultRootJointType=dartpy.utils.DartLoaderRootJointType.FIXED)
-            found = dartpy.utils.DartLoader(options).parseSkeleton(path)
+            loader = dartpy.utils.DartLoader()
+            loader.setOptions(options)
+            found = loader.parseSkeleton(path)
             gravity = np.array([0.0, 0.0, -9.81])  # a URDF has none; DART's World has it along z too, a Skeleton not
             self._s = [found] if found is not None else []
         else:
@@ -62,13 +64,14 @@ class _Robot:
     def _numbers(self) -> dict[str, dict[str, Any]]:
         told: dict[str, dict[str, Any]] = {}
         for j, n in self._joints:
-            single = n == 1
+            bounds = (j.getPositionLowerLimit(0), j.getPositionUpperLimit(0))
+            if n > 1 or (bounds == (0.0, 0.0) and not j.areLimitsEnforced()):
+                bounds = (-np.inf, np.inf)
             values = {
                 "damping": j.getDampingCoefficient(0), "friction": j.getCoulombFriction(0),
                 "stiffness": j.getSpringStiffness(0),
-                "rest": j.getRestPosition(0) if single and j.getSpringStiffness(0) else 0.0,
-                "lower": j.getPositionLowerLimit(0) if single else -np.inf,
-                "upper": j.getPositionUpperLimit(0) if single else np.inf,
+                "rest": j.getRestPosition(0) if n == 1 and j.getSpringStiffness(0) else 0.0,
+                "lower": bounds[0], "upper": bounds[1],
             }  # fmt: skip
             for key, value in values.items():
                 told.setdefault(key, {})[j.getName()] = [float(value)]

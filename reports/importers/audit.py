@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,10 @@ import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.cases.arrays import Floats
+from crossbody.cases.files.inertias import of_shapes, six
 from crossbody.cases.files.reading import findings_of, is_urdf, read, scene_of
 from crossbody.cases.files.text import check_text
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import Body, Scene
 from crossbody.engines.importers import SECONDS, Reading
 from crossbody.reports.importers.compare import Row, rows
 from crossbody.reports.importers.expected import expected, job_of
@@ -89,8 +90,20 @@ def opened(path: Path, without: str = "") -> Audit:
     scene = scene_of(path, model)
     if not scene.joints:
         raise SceneError(f"{path} has no joint: there is no motion in which readers could differ; valid: one at least.")
+    scene = scene if is_urdf(path) else with_closed_forms(path, scene)
     keys = [np.array(key) for key in model.key_qpos[:KEYS]]
     return of_scene(path, scene, keys, (*told, *findings_of(path)))
+
+
+def with_closed_forms(path: Path, scene: Scene) -> Scene:
+    """Return the scene with inertias of shapes as we compute them: what the compiler makes of them is seen then."""
+    own = of_shapes(path)
+
+    def of(body: Body) -> Body:
+        mass, com, about = own[body.name]
+        return replace(body, mass=mass, com=tuple(com.tolist()), inertia=six(about))
+
+    return scene.replace(bodies=tuple(of(body) if body.name in own else body for body in scene.bodies))
 
 
 def of_scene(path: Path, scene: Scene, keys: Sequence[Floats] = (), findings: tuple[str, ...] = ()) -> Audit:

@@ -118,13 +118,12 @@ def _row(engine: str, found: Mapping[str, Any], quantity: str, gap: Gap | None, 
         return Row(**common, **numbers)
     if hidden:
         return Row(**common, where=gap.where, expected=_number(gap.expected), verdict=UNSUPPORTED, why=hidden[0])
-    said = said_of(quantity, found["told"])
+    said = said_of(WORDS.get(quantity, ""), found["told"])
     return Row(**common, **numbers, verdict=UNSUPPORTED if said else WRONG, why=said)
 
 
-def said_of(quantity: str, told: Sequence[str]) -> str:
-    """Return the line in which an importer says that it leaves a quantity out; empty where there is none."""
-    words = WORDS.get(quantity)
+def said_of(words: str, told: Sequence[str]) -> str:
+    """Return the line in which an importer says that it leaves something out, by a pattern; empty where none does."""
     lines = (line for line in told if words and SAID.search(line) and re.search(words, line, re.I))
     return next(lines, "")
 
