@@ -10,7 +10,7 @@ from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import share
-from crossbody.reports.judging.verdict import Word
+from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages.html import bounded, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
@@ -29,10 +29,6 @@ KEY = (
     "energy_integrator",
 )
 """Metrics that stand first in the table of a case."""
-
-
-Row = Mapping[str, Any]
-"""A verdict as a plain row, with `who` (engine:profile)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ from statistics import median
 from typing import Any
 
 from crossbody.reports.figures.section import Kind, Section, Table, columns
-from crossbody.reports.judging.verdict import Word
+from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
@@ -45,16 +45,16 @@ def engines(found: Results) -> Section:
     return Section(name="engines", title="Engines", text=f"{TEXT} {BENCH if ratios else ''}".strip(), tables=(table,))
 
 
-def _cells(found: Results) -> dict[str, dict[str, Sequence[Mapping[str, Any]]]]:
+def _cells(found: Results) -> dict[str, dict[str, Sequence[Row]]]:
     """Rows of every engine and, of those, of every case."""
-    cells: dict[str, dict[str, Sequence[Mapping[str, Any]]]] = {}
+    cells: dict[str, dict[str, Sequence[Row]]] = {}
     for label, rows in found.rows.items():
         for who, mine in grid.of_engine(rows).items():
             cells.setdefault(who, {})[label] = mine
     return {who: cells[who] for who in grid.names({"who": who} for who in cells)}
 
 
-def _row(found: Results, who: str, mine: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]:
+def _row(found: Results, who: str, mine: Mapping[str, Sequence[Row]]) -> dict[str, Any]:
     words = Counter(grid.worst(rows)[0] for rows in mine.values())
     errors = [
         float(row["value"]) for rows in mine.values() for row in rows
