@@ -62,6 +62,7 @@ def audited(
         SceneError: for a file that cannot be the yardstick, before any importer is asked.
     """
     check_text(path)
+    left_out = {word.strip() for word in without.split(",")}
     readings = [Reading(name, path, is_urdf(path), seconds) for name in engines]
     try:
         found = audit or opened(path, without)
@@ -77,7 +78,8 @@ def audited(
             if answer["status"] == "absent":
                 found.absent[name] = answer["why"]
             else:
-                yield found, name, rows(name, answer, found.wanted, found.job["joints"])
+                told = rows(name, answer, found.wanted, found.job["joints"])
+                yield found, name, [row for row in told if row.quantity not in left_out]
 
 
 def opened(path: Path, without: str = "") -> Audit:
