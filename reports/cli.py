@@ -423,6 +423,15 @@ def log_info(path: Path, columns: str | None, part: int | None, draft: bool, mem
     return info(path, columns, part, draft, memory)
 
 
+@cli.command()
+@speaks
+def warm() -> int:
+    """Compile ahead what runs need, on all processors."""
+    from crossbody.reports.commands.warm import warm as work
+
+    return work()
+
+
 @cli.group(invoke_without_command=True)
 @click.pass_context
 def cache(context: click.Context) -> None:
