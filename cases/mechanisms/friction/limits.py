@@ -38,7 +38,8 @@ def limits(
         known_least=creeps * (1.0 - NEAR), known_size=creeps * (1.0 + NEAR),
     )  # fmt: skip
     return replace(
-        case, title=title, closed_form=motion if motion.presses else None, units={name: one.unit for name, one in parameters.items()},
+        case, title=title, closed_form=motion if motion.presses else None,
+        units={name: one.unit for name, one in parameters.items()},
         limits=(
             *case.limits,
             Limit(metric="creep_speed", value=held, why=HELD),
