@@ -44,7 +44,6 @@ def limits(
             *case.limits,
             Limit(metric="creep_speed", value=held, why=HELD),
             *((predicted,) if creeps else ()),
-            Limit(metric="event_gap", value=1.0, engine="mujoco", profile="default", covers_none=True, known=OWN),
             Limit(metric="*", engine="mujoco", profile="default", covers_none=True, known=OWN),
         ),
     )  # fmt: skip
