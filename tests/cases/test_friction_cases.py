@@ -14,6 +14,7 @@ from crossbody.cases import Case, InvalidValue, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.mechanisms.friction.rocking import flat_at
 from crossbody.reports import metrics
+from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word, judge
 from crossbody.reports.measuring.truth import from_run, sample_times
 
@@ -167,6 +168,24 @@ def test_files_move_as_scenes_do(name: str, variant: str, tmp_path: Path) -> Non
     of_file = cases.from_file(str(path), friction=1, t_end=case.t_end)
     assert np.abs(of_file.law.a0 - case.law.a0).max() < 1e-8
     agree(case, ran(of_file))
+
+
+LEG = """<mujoco><compiler angle="radian"/><worldbody><geom name="floor" type="plane" size="5 5 1"/>
+  <body name="thigh" pos=".1 0 1.22"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
+  <joint name="turn" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.5" size=".04" mass="3"/>
+  <body name="shank" pos="0 0 -.5"><joint name="knee" axis="0 1 0" range="-2 0" limited="true"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -.5" size=".04" mass="2"/><body name="foot" pos="0 0 -.5">
+  <geom name="foot" type="capsule" fromto="-.13 0 -.1 .13 0 -.1" size=".06" mass="2"/></body></body></body>
+  </worldbody></mujoco>"""
+
+
+def test_a_bound_that_bears_nothing_beside_a_contact_that_does_pulls_by_rounding_alone(tmp_path: Path) -> None:
+    """A leg falls upright on its foot: the knee stays at its bound, and nothing presses it there."""
+    path = tmp_path / "leg.xml"
+    path.write_text(LEG)
+    truth = truth_of(cases.from_file(str(path), friction=1, t_end=0.3))
+    assert truth.trajectory.lam.max() > 100.0
+    assert truth.trusted == math.inf, truth.source
 
 
 def test_a_creep_that_is_predicted_has_two_bounds() -> None:
