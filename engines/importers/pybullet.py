@@ -18,7 +18,7 @@ class _Robot:
         "rest": "PyBullet's joints have no springs.", "actuators": "PyBullet drives joints, not actuators of a file.",
         "energy": "PyBullet tells no energy.",
     }  # fmt: skip
-    precision = 1e-6
+    precision = 1e-5
     loops = 0
 
     def __init__(self, path: str) -> None:

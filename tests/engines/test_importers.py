@@ -17,7 +17,7 @@ from crossbody.reports.importers.audit import audited
 from crossbody.reports.importers.compare import FAILED, UNSUPPORTED, WRONG
 
 KINDS = """<mujoco model="robot"><compiler autolimits="true"/><worldbody>
-  <body name="base" pos=".1 .2 1" quat="1 .2 .3 .4"><freejoint name="base"/>
+  <body name="base" pos=".1 .2 1"><freejoint name="base"/>
     <inertial pos=".01 .02 .03" mass="2" fullinertia=".2 .3 .25 .01 .02 .03"/>
     <body name="arm" pos=".3 0 0"><joint name="arm" type="hinge" axis="0 1 0" pos=".1 0 0"/>
       <inertial pos=".1 0 .05" mass="1" diaginertia=".1 .2 .15"/>
@@ -38,7 +38,7 @@ def robot(tmp_path: Path) -> Path:
 def as_dart_reads_it(text: str) -> str:
     """Return the file with the only inertias and the only form of a free joint that DART 6.20's reader knows."""
     text = re.sub(r"<inertial[^>]*>", '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>', text)
-    return text.replace('<freejoint name="base"/>', '<joint name="base" type="free"/>')
+    return text.replace('1"><freejoint name="base"/>', '1" quat="1 .2 .3 .4"><joint name="base" type="free"/>')
 
 
 @pytest.mark.parametrize("engine", importers.names())
