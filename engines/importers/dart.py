@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("mjcf", "urdf"), "dartpy"
+FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "dartpy", "dartpy"
 KINDS = {"FreeJoint": "free", "BallJoint": "ball", "RevoluteJoint": "hinge", "PrismaticJoint": "slide"}
 
 

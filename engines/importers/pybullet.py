@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("urdf",), "pybullet"
+FORMATS, PACKAGE, MODULE = ("urdf",), "pybullet", "pybullet"
 KINDS = {0: "hinge", 1: "slide", 2: "ball"}
 FIXED = 4
 

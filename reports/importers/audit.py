@@ -67,6 +67,8 @@ def audited(
     """
     check_text(path)
     left_out = {word.strip() for word in without.split(",")}
+    if is_urdf(path):
+        left_out.add("actuators")  # of transmissions, which move nothing by themselves
     with TemporaryDirectory(prefix="crossbody-audit-") as folder:
         given = meshless(path, Path(folder)) if is_urdf(path) and without_meshes(without) else path
         readings = [Reading(name, given, is_urdf(path), seconds) for name in engines]

@@ -14,6 +14,8 @@ from crossbody.cases.arrays import Floats
 
 TOLERANCE = 1e-9
 """Of the largest entry: the same physics."""
+FLOOR = 1e-4
+"""Part of the largest force that is the scale of the smallest ones: rounding is that of the sums they stand in."""
 OK, WRONG, UNSUPPORTED, FAILED, NONE = "ok", "wrong", "unsupported", "failed", "-"
 QUANTITIES = (
     "reading", "coordinates", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping", "springs",
@@ -147,7 +149,12 @@ def _gaps(
         names = [name for name, _, kind in joints for _ in range({"free": 6, "ball": 3}.get(kind, 1))]
         yield "inertia", _inertia(found["inertias"], wanted["inertias"])
         for key, gap in (("M", _matrix), ("gravity", _forces), ("bias", _forces)):
-            yield key, gap(_states(found, key, names), _states(wanted, key, names), names)
+            yield (
+                key,
+                gap(
+                    _states(found, key, names), _states(wanted, key, names), names, 1.0 if found["precision"] else FLOOR
+                ),
+            )
         yield "energy", _energy(found, wanted, names)
         yield "frames", _frames(found["states"], wanted["states"])
     for key in ("armature", "damping", "springs", "limits", "friction"):
@@ -170,21 +177,23 @@ def _states(answer: Mapping[str, Any], key: str, names: Sequence[str]) -> Floats
     return found - np.diag(_armature(answer, names)) if key == "M" else found
 
 
-def _matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str]) -> Gap | None:
+def _matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float) -> Gap | None:
     if found is None or wanted is None:
         return None
     size = np.sqrt(np.abs(np.einsum("kii->ki", wanted)))
-    scale = np.maximum(size[:, :, None] * size[:, None, :], 1e-9 * float(np.abs(wanted).max(initial=1e-300)))
+    scale = np.maximum(
+        size[:, :, None] * size[:, None, :], min(floor, 1e-5) * float(np.abs(wanted).max(initial=1e-300))
+    )
     off = np.nan_to_num(np.abs(found - wanted) / scale, nan=math.inf)
     k, i, j = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
     where = names[i] if i == j else f"{names[i]}, {names[j]}"
     return Gap(float(off[k, i, j]), where, float(found[k, i, j]), float(wanted[k, i, j]))
 
 
-def _forces(found: Floats | None, wanted: Floats | None, names: Sequence[str]) -> Gap | None:
+def _forces(found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float) -> Gap | None:
     if found is None or wanted is None:
         return None
-    scale = np.maximum(np.abs(wanted).max(axis=0), 1e-4 * float(np.abs(wanted).max(initial=0.0)))
+    scale = np.maximum(np.abs(wanted).max(axis=0), floor * float(np.abs(wanted).max(initial=0.0)))
     scale = np.where(scale > 0.0, scale, 1.0)
     off = np.nan_to_num(np.abs(found - wanted) / scale, nan=math.inf)
     k, i = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
