@@ -148,13 +148,12 @@ def _gaps(
     if not off:
         names = [name for name, _, kind in joints for _ in range({"free": 6, "ball": 3}.get(kind, 1))]
         yield "inertia", _inertia(found["inertias"], wanted["inertias"])
-        for key, gap in (("M", _matrix), ("gravity", _forces), ("bias", _forces)):
-            yield (
-                key,
-                gap(
-                    _states(found, key, names), _states(wanted, key, names), names, 1.0 if found["precision"] else FLOOR
-                ),
-            )
+        floor = 1.0 if found["precision"] else FLOOR
+        M = _states(wanted, "M", names)
+        yield "M", _matrix(_states(found, "M", names), M, names, floor)
+        moved = _moved(wanted, M)
+        for key in ("gravity", "bias"):
+            yield key, _forces(_states(found, key, names), _states(wanted, key, names), names, floor, moved)
         yield "energy", _energy(found, wanted, names)
         yield "frames", _frames(found["states"], wanted["states"])
     for key in ("armature", "damping", "springs", "limits", "friction"):
@@ -190,10 +189,19 @@ def _matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str], f
     return Gap(float(off[k, i, j]), where, float(found[k, i, j]), float(wanted[k, i, j]))
 
 
-def _forces(found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float) -> Gap | None:
+def _moved(wanted: Mapping[str, Any], M: Floats | None) -> float:
+    """Return the size of forces at the velocities of the states, where there are no larger ones."""
+    v = np.array([state["v"] for state in wanted["states"]])
+    return 0.0 if M is None else float(np.abs(M).max(initial=0.0) * (v**2).max(initial=0.0))
+
+
+def _forces(
+    found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float, moved: float
+) -> Gap | None:  # fmt: skip
     if found is None or wanted is None:
         return None
-    scale = np.maximum(np.abs(wanted).max(axis=0), floor * float(np.abs(wanted).max(initial=0.0)))
+    largest = max(float(np.abs(wanted).max(initial=0.0)), moved)
+    scale = np.maximum(np.abs(wanted).max(axis=0), floor * largest)
     scale = np.where(scale > 0.0, scale, 1.0)
     off = np.nan_to_num(np.abs(found - wanted) / scale, nan=math.inf)
     k, i = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
