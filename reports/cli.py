@@ -154,7 +154,11 @@ _LIMIT = click.option(
 @cli.command()
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
-@click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@click.option(
+    "--set-engine", "settings", metavar="[E[:PROFILE].]K=V", multiple=True,
+    help="Setting of one engine, or of all that have it; repeatable.",
+)  # fmt: skip
+@click.option("--dry-run", "dry", is_flag=True, help="Say what would be run, and run nothing.")
 @click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
 @click.option(
     "--jobs",
@@ -171,9 +175,13 @@ _LIMIT = click.option(
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
     rtol: float | None, settings: tuple[str, ...], strict: bool, limit: float, against: Path | None,
-    others: tuple[Path, ...], jobs: int,
+    others: tuple[Path, ...], jobs: int, dry: bool,
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
+    if dry:
+        from crossbody.reports.commands.planned import tell
+
+        return tell(names, wanted, variant, pairs, settings)
     from crossbody.reports.commands.run import run as work
 
     return work(
