@@ -271,6 +271,12 @@ def _joints() -> list[Feature]:
         _written("joint of type free", mjcf(shoulder='<joint name="shoulder" type="free"/>'),
             arm(shoulder={"type": "free"}), ".//joint[@type='free']",
             'Both <freejoint/> and <joint type="free"/> make a free body.', 'Write <joint type="free"/>.'),
+        _written("free body that is turned",
+            mjcf(upper='pos=".1 .2 1" euler="20 30 40"', shoulder='<joint name="shoulder" type="free"/>'),
+            arm(shoulder={"type": "free"}, upper=turned(("x", 20), ("y", 30), ("z", 40))), ".//freejoint/..[@quat] | "
+            ".//freejoint/..[@euler] | .//joint[@type='free']/..[@quat] | .//joint[@type='free']/..[@euler]",
+            "Positions of a free body are the world's, however it stands in the file.",
+            "Leave the body upright, and turn it by a keyframe."),
         _written("free joint without a name", mjcf(shoulder="<freejoint/>"), arm(shoulder={"type": "free",
             "name": "joint0"}), ".//freejoint"),
         _written("two joints in a body",

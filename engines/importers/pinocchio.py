@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("mjcf", "urdf"), "pin"
+FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "pin", "pinocchio"
 NO_SPRINGS = "Pinocchio's model has no springs."
 
 
