@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -75,7 +74,7 @@ def run(
 def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> None:
     """Print the verdicts of a folder."""
     if voice.as_json():
-        print(json.dumps([{name: voice.finite(value) for name, value in row.items()} for row in rows]))
+        print(voice.plain_rows_as_json(rows))
         return
     if controlled and not voice.quiet():
         show_controllers(made)
