@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -87,7 +88,7 @@ def test_wrong_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture
     path.write_text(ARM)
     code, _, err = run(["audit", str(tmp_path / "none.xml")], capsys)
     assert code == 2
-    assert "none.xml" in err
+    assert "There is no robot file" in err
     code, _, err = run(["audit", str(path), "-e", "bullet"], capsys)
     assert code == 2
     assert "pinocchio" in err
@@ -153,7 +154,13 @@ def test_the_steps_of_the_action_run_as_a_script(gravity: str, code: int, tmp_pa
     """What a GitHub runner does with a composite action: its shell, its inputs in the environment."""
     step = yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"][-1]
     (tmp_path / "arm.xml").write_text(ARM.replace("<worldbody>", f'<option gravity="{gravity}"/><worldbody>'))
-    given = {"FILES": "arm.xml", "ENGINES": "mujoco pinocchio", "SARIF": "told", "GITHUB_STEP_SUMMARY": "summary.md"}
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # the Action installs it there
+    given = {"PATH": path} | {
+        "FILES": "arm.xml",
+        "ENGINES": "mujoco pinocchio",
+        "SARIF": "told",
+        "GITHUB_STEP_SUMMARY": "summary.md",
+    }
     done = subprocess.run(["bash", "-eo", "pipefail", "-c", step["run"]], cwd=tmp_path, env=os.environ | given,
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == code, done.stdout + done.stderr
