@@ -75,7 +75,7 @@ def save(path: Path, trace: Trace) -> None:
 
 
 def _column(values: Floats) -> pa.Array:
-    """Return the bytes of an array as a column; `pa.array` imports pandas (.3 s) to see whether it is one of its own."""
+    """Return the bytes of an array as a column: `pa.array` imports pandas (.3 s) to see whether it is one of its."""
     held = pa.py_buffer(np.ascontiguousarray(values))
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, held])
 
@@ -95,7 +95,8 @@ def _blocks(data: pa.Table) -> dict[str, Floats]:
         block = found.setdefault(name.rstrip("0123456789"), [])
         if name[-1].isdigit() and not name.endswith(f"{len(block)}"):
             raise ValueError(f"its column {name!r} is out of order")
-        block.append(np.from_dlpack(column.combine_chunks()))  # `to_numpy` imports pandas
+        values: Floats = np.from_dlpack(column.combine_chunks())  # `to_numpy` imports pandas
+        block.append(values)
     return {name: np.stack(block, axis=1) for name, block in found.items()}
 
 
