@@ -42,9 +42,8 @@ class EngineRun:
     @property
     def unbounded(self) -> Row | None:
         """The number beyond its limit of which it is known that it may be, not how far: of position if there is one."""
-        beyond = [
-            row for row in self.rows if row["verdict"] == Word.INFO and row["limit"] is not None and share(row) > 1.0
-        ]
+        loose = [row for row in self.rows if row["verdict"] == Word.INFO and (row["limit"] or 0.0) > 0.0]
+        beyond = [row for row in loose if 1.0 < share(row) < math.inf]
         return max(beyond, key=lambda row: (row["metric"] == "position", share(row)), default=None)
 
     @property
