@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba import float64
 
 from crossbody.reference import ahead
 from crossbody.reference.cache import compiled
@@ -18,7 +19,7 @@ def test_others_are_begun_where_code_is_compiled_and_not_where_it_is_read_back(
 ) -> None:
     monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path))
     begun: list[int] = []
-    found = [compiled(doubled, ["float64(float64)"], beside=lambda: begun.append(1))(2.0) for _ in range(2)]
+    found = [compiled(doubled, [float64(float64)], beside=lambda: begun.append(1))(2.0) for _ in range(2)]
     assert (found, begun) == ([4.0, 4.0], [1])
 
 
