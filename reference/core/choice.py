@@ -46,7 +46,7 @@ def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
 
 @compiled
 def longest_step(s: Any, m: Model, w: Work) -> float:
-    """The longest step that may be tried: an explicit one is stable for the active rows.
+    """The longest step that may be tried: an explicit one is stable for the active rows, and for slips that turn.
 
     Beyond that what the error estimate lets pass is far larger inside the step, where events are located: the dense
     output of a decayed pole p departs from it by 300 times the estimate at |p| h = 16, by 10 at the limit.
@@ -56,7 +56,7 @@ def longest_step(s: Any, m: Model, w: Work) -> float:
         return float(s.h_max)
     s.row_rate = _row_rate(s, w)
     if s.frictional:
-        s.turning_rate = ask(TURNING_RATE, s, m, w, NOTHING)
+        s.row_rate = max(s.row_rate, ask(TURNING_RATE, s, m, w, NOTHING))
     return float(min(s.h_max, STABILITY_LIMIT / s.row_rate) if s.row_rate > 0.0 else s.h_max)
 
 
@@ -79,8 +79,7 @@ def choose_method(s: Any, w: Work) -> None:
     if s.method == EXPLICIT:
         if s.hold > 0:
             s.hold -= 1
-        rate = max(s.row_rate, s.turning_rate) if s.frictional else s.row_rate
-        s.stalled = s.stalled + 1 if s.hs * rate > STALLED_PART * STABILITY_LIMIT else 0
+        s.stalled = s.stalled + 1 if s.hs * s.row_rate > STALLED_PART * STABILITY_LIMIT else 0
         if s.implicit and s.hold == 0 and s.stalled >= STALLED_STEPS:
             s.method, s.have_jacobian = IMPLICIT, 0
             s.explicit_rate = s.hs / EXPLICIT_COST

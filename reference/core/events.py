@@ -15,10 +15,11 @@ from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
-from crossbody.reference.core.friction import WATCH, ask
+from crossbody.reference.core.friction import NOTHING, TURNS_ASIDE, WATCH, ask
 from crossbody.reference.core.guards import (
     CATCH,
     CONE,
+    DRIFT,
     HANDOVER,
     JAM,
     LEAVE,
@@ -47,6 +48,7 @@ from crossbody.reference.core.layout import (
     NOT_FINITE,
     SLIP,
     STICK,
+    TOO_LONG,
     Model,
     Work,
 )
@@ -85,10 +87,11 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
         if not second >= place:  # NaN too
             w.kind[i] = other
             place = second
-    if other == STOP:
-        second = first_below(K, s, m, w, mode, JAM, i)
+    if other in (STOP, CONE):
+        third = JAM if other == STOP else DRIFT
+        second = first_below(K, s, m, w, mode, third, i)
         if not second >= place:
-            w.kind[i] = JAM
+            w.kind[i] = third
             return second
     return place
 
@@ -179,7 +182,11 @@ def _all_free(s: Any, m: Model, mode: Bytes) -> bool:
 
 @compiled
 def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
-    """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 0 or a negative code."""
+    """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all.
+
+    Returns:
+        0, TOO_LONG where the step must be taken anew and shorter, or a negative code.
+    """
     s.theta = NEVER
     if s.ng > 0:
         code = _scan_switches(K, s, m, w, mode)
@@ -219,7 +226,17 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             s.theta = min(s.theta, w.hit[i])
     if s.theta <= 1.0:
         _tie(s, w)
+        if s.frictional and _turns_aside(K, s, m, w):
+            return TOO_LONG
     return 0
+
+
+@compiled
+def _turns_aside(K: Any, s: Any, m: Model, w: Work) -> bool:
+    """Whether what seems to be a stop at s.theta is a slip that has turned by a right angle."""
+    dense.state(s, m, w, s.theta, w.ys)
+    K.gaps(s.t_old + s.theta * s.hs, w.ys[: s.nq], w.ys[s.nq :], m.p, w.gap, w.rate)
+    return bool(ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0)
 
 
 @compiled
@@ -260,10 +277,10 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return FREE
     if kind == HANDOVER:
         return CONTACT
-    if kind == CONE:
+    if kind in (CONE, DRIFT):
         return SLIP
-    if kind == STOP:  # else it has turned by more than a right angle within a step
-        return STICK if active_mode(s, m, w, i) == STICK else int(mode[i])
+    if kind == STOP:
+        return STICK
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
         return int(mode[i])
     if s.frozen and m.beta[i, 0] > 0.0:

@@ -10,7 +10,6 @@ from crossbody.reference.core.friction import (
     BEGIN_SLIP,
     DECIDE,
     FACTOR,
-    FOLLOW_TURNS,
     HOLDS_ON,
     MARGIN,
     RENEW,
@@ -19,7 +18,10 @@ from crossbody.reference.core.friction import (
     STIFFNESS,
     TURN_PART,
     TURNING_RATE,
+    TURNS_ASIDE,
     WATCH,
+    slip,
+    small_slip,
 )
 from crossbody.reference.core.layout import Model, Work
 
@@ -38,7 +40,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     HOLDS_ON        1 if contact i, which sticks, surely does so throughout the step
     BEGIN           of a run: forget what another one left
     RENEW           directions of slip after a step
-    FOLLOW_TURNS    those that have turned by a right angle, where a step is cut
+    TURNS_ASIDE     1 if a contact whose slip falls to zero along its direction of reference has one across it there
     BEGIN_SLIP      of contacts that have reached their bounds, there
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
     """
@@ -59,10 +61,10 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         return float(coulomb.turn_part(s, m, w, i))
     elif what == RENEW:
         coulomb.renew(s, m, w, w.rates[0])
-    elif what == FOLLOW_TURNS:
-        coulomb.follow_turns(s, m, w)
+    elif what == TURNS_ASIDE:
+        return 1.0 if coulomb.turns_aside(s, m, w) else 0.0
     elif what == STANDS:
-        return 1.0 if coulomb.slip_velocity(m, i, w.rate) <= coulomb.stopped_slip(s) else 0.0
+        return 1.0 if slip(m, w, i, w.rate) <= small_slip(s) else 0.0
     elif what == HOLDS_ON:
         return 1.0 if coulomb.holds_on(s, m, w, i) else 0.0
     elif what == BEGIN_SLIP:
