@@ -359,6 +359,13 @@ class Case:
         return self.mechanism == "scene"
 
     @property
+    def rubs(self) -> bool:
+        """Whether contacts of its scene have friction."""
+        from crossbody.cases.scene_contacts import frictional  # which needs scenes, and these this module's errors
+
+        return self.general and self.scene is not None and frictional(self.scene) is not None
+
+    @property
     def label(self) -> str:
         """Name and variant in one word."""
         return f"{self.name}:{self.variant}"

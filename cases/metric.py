@@ -23,7 +23,7 @@ class CaseMetric:
         unit: SI unit, "1" for a ratio or a count.
         number: of (run, case), the number itself; None where there is none, NaN where the run does not show it.
         signal: of (run, case), values (n, k) at the run's samples: the number is their largest difference from the
-            truth's, on arcs between matched events.
+            truth's, on arcs between matched events; None where there are none.
         instants: of (run, case), times (m,), s, in order: the number is their largest difference from the truth's, None
             where the truth has none or another number of them.
         always: whether every run is measured; else where the case claims or limits it.
@@ -32,7 +32,7 @@ class CaseMetric:
     doc: str
     unit: str = "1"
     number: Callable[[Trajectory, Case], float | None] | None = None
-    signal: Callable[[Trajectory, Case], Floats] | None = None
+    signal: Callable[[Trajectory, Case], Floats | None] | None = None
     instants: Callable[[Trajectory, Case], Floats] | None = None
     always: bool = False
 

@@ -13,7 +13,7 @@ from crossbody.engines.contract import QUANTITIES, Engine, Run
 __all__ = ["QUANTITIES", "Engine", "Run", "load", "names", "summary"]
 
 
-REGISTRY = Registry("engine", __name__, hidden=("contract", "equations", "linear", "nearest", "settings"))
+REGISTRY = Registry("engine", __name__, hidden=("contract", "equations", "importers", "linear", "nearest", "settings"))
 
 
 def names() -> tuple[str, ...]:

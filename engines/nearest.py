@@ -28,6 +28,8 @@ ROUND = ("box", "capsule", "hull")
 NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Of each axis in a vector product."""
 UP = np.array([0.0, 0.0, 1.0])
+TURNED = np.array([[0.8, -0.6, 0.0], [0.48, 0.64, -0.6], [0.36, 0.48, 0.8]])
+"""Axes, by rows, in those of a shape, against whose last a frame of normals has its pole."""
 ENDS = np.array([-1.0, 1.0])[:, None] * UP
 RIM = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Points of a rim on which a cylinder stands, in the order of their rows."""
@@ -66,6 +68,28 @@ def lying(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Po
         return np.zeros(np.shape(sine), dtype=bool)
     low, high = overlap(at, sizes[0][..., 1], by, sizes[1][..., 1])
     return np.asarray((low <= high) & (crossing(at, by) <= sine) & (aslant(at, by) <= STEEPEST))
+
+
+def across(kind: str, one: Floats, two: Floats, normal: Floats) -> Floats:
+    """Return the two directions (2, 3) across a normal along which tangential rows are counted.
+
+    Over a plane they are its x and y; else Frisvad's frame of the normal in axes of the second shape that are turned
+    so that no symmetry meets its pole (`crossbody.reference.tree.pair_slip`).
+
+    Args:
+        kind: type of the first shape.
+        one: its rotation (3, 3).
+        two: that of the second shape.
+        normal: from the first shape to the second (3,).
+    """
+    if kind == "plane":
+        return np.asarray(one.T[:2])
+    X, Y, Z = TURNED @ two.T
+    a, b, c = normal @ X, normal @ Y, 1.0 + normal @ Z
+    return np.array([
+        (1.0 - a * a / c) * X - a * b / c * Y - a * Z,
+        -a * b / c * X + (1.0 - b * b / c) * Y - b * Z,
+    ])  # fmt: skip
 
 
 def tilt(floor: Pose, at: Pose) -> Floats:

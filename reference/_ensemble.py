@@ -7,23 +7,43 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 from queue import SimpleQueue
 from typing import Any, Unpack
 
+import numba
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases.arrays import frozen, numbers
 from crossbody.cases.control import Control
 from crossbody.cases.entry_points import checked_arguments
+from crossbody.reference import kernels
 from crossbody.reference._check import check_once
-from crossbody.reference._program import address, kept_with_kernels
+from crossbody.reference._program import (
+    ADDRESSES,
+    advance,
+    advance_address,
+    bound,
+    control,
+    dynamics,
+    energy,
+    gaps,
+    power,
+    rows,
+    solve,
+    switch,
+    velocity,
+    watch,
+)  # fmt: skip
 from crossbody.reference._run import OUTCOMES, CompiledRun
 from crossbody.reference._system import System, initial_modes
-from crossbody.reference.cache import embedding
-from crossbody.reference.core.layout import MORE, open_buffers, open_model, open_work
+from crossbody.reference.cache import compiled
+from crossbody.reference.core._struct import TABLE
+from crossbody.reference.core.layout import MORE, STATE, open_buffers, open_model, open_work
 from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.options import Chosen, Options, checked
 from crossbody.reference.start import check_starts
@@ -99,8 +119,7 @@ def ensemble(
     spaces: SimpleQueue[CompiledRun] = SimpleQueue()
     for _ in range(count):
         spaces.put(_space(system, job, settings))
-    loop = _loop(tuple(system.kernels.values()))
-    job.call(loop, spaces, 0, 0)  # compiles
+    loop = bound(_loop(), kernels.NAMES, tuple(system.kernels.values()), advance_address())
     edges = np.unique(np.linspace(0, job.size, count * CHUNKS + 1).astype(int))
     began = time.perf_counter()
     with ThreadPoolExecutor(count) as pool:
@@ -178,37 +197,43 @@ class _Job:
         )  # fmt: skip
 
 
-@kept_with_kernels
-def _loop(functions: tuple[Any, ...]) -> Any:
-    """The program over a range of runs, without the interpreter's lock."""
-    advance = address()
-    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = functions
+def _runs(at, first, last, template, state, model, work, buffers, p, laws, starts, modes, out, counts, limit):  # type: ignore[no-untyped-def]  # fmt: skip
+    """The program over a range of runs."""
+    go = advance(at[10])
+    m, w, b = open_model(model), open_work(work), open_buffers(buffers)
+    s = state[0]
+    for r in range(first, last):
+        state[0] = template[0]
+        # Entry by entry: what an array of another shape would be told takes seconds to compile.
+        for i in range(len(m.p)):
+            m.p[i] = p[r, i]
+        for i in range(len(modes)):
+            b.mode[i] = modes[i]
+            for j in range(3):
+                m.alpha[i, j], m.beta[i, j] = laws[r, 0, i, j], laws[r, 1, i, j]
+        for i in range(len(w.y)):
+            w.y[i] = starts[r, i]
+        for z in (w.u, w.s, w.z):
+            z.fill(0.0)
+        code = MORE
+        while code == MORE and s.steps < limit:
+            code = go(
+                dynamics(at[0]), gaps(at[1]), rows(at[2]), energy(at[3]), power(at[4]), velocity(at[5]), solve(at[6]),
+                control(at[7]), watch(at[8]), switch(at[9]), state, model, work, buffers, min(SLICE, limit - s.steps),
+            )  # fmt: skip
+        out[r, 0] = s.t
+        for i in range(len(w.y)):
+            out[r, 1 + i] = w.y[i]
+        counts[r, 0], counts[r, 1], counts[r, 2] = code, s.steps, s.events + s.dropped
 
-    def runs(first, last, template, state, model, work, buffers, p, laws, starts, modes, out, counts, limit):  # type: ignore[no-untyped-def]  # fmt: skip
-        m, w, b = open_model(model), open_work(work), open_buffers(buffers)
-        s = state[0]
-        for r in range(first, last):
-            state[0] = template[0]
-            # Entry by entry: what an array of another shape would be told takes seconds to compile.
-            for i in range(len(m.p)):
-                m.p[i] = p[r, i]
-            for i in range(len(modes)):
-                b.mode[i] = modes[i]
-                for j in range(3):
-                    m.alpha[i, j], m.beta[i, j] = laws[r, 0, i, j], laws[r, 1, i, j]
-            for i in range(len(w.y)):
-                w.y[i] = starts[r, i]
-            for z in (w.u, w.s, w.z):
-                z.fill(0.0)
-            code = MORE
-            while code == MORE and s.steps < limit:
-                code = advance(
-                    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch,
-                    state, model, work, buffers, min(SLICE, limit - s.steps),
-                )  # fmt: skip
-            out[r, 0] = s.t
-            for i in range(len(w.y)):
-                out[r, 1 + i] = w.y[i]
-            counts[r, 0], counts[r, 1], counts[r, 2] = code, s.steps, s.events + s.dropped
 
-    return embedding(runs, nogil=True)
+@cache
+def _loop() -> Any:
+    """Those runs without the interpreter's lock."""
+    word, lines, state = types.int64, types.float64[:, ::1], numba.typeof(np.zeros(1, STATE))
+    laws = types.float64[:, :, :, ::1]
+    signature = types.void(
+        ADDRESSES, word, word, state, state, TABLE, TABLE, TABLE, lines, laws, lines, types.int8[::1], lines,
+        types.int64[:, ::1], word,
+    )  # fmt: skip
+    return compiled(_runs, [signature], nogil=True)

@@ -1,20 +1,23 @@
-"""The compiled loop with its one fixed signature: compiled once, for every mechanism."""
+"""The compiled loop with its one fixed signature: compiled once, for every mechanism.
+
+Compiled code takes the kernels of a mechanism by their addresses, in one array: ten functions handed over from Python
+cost more than a short run, and to name them as constants is to compile anew in every process.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache, wraps
-from sys import modules
+from functools import cache, partial
 from typing import Any
 
 import numba
 import numpy as np
-from numba import types
+from numba.core import cgutils, types
+from numba.extending import intrinsic
 
 from crossbody.reference import kernels
-from crossbody.reference.cache import compiled, embedding
+from crossbody.reference.cache import compiled
 from crossbody.reference.core import advance as core
-from crossbody.reference.core import friction_answers
 from crossbody.reference.core._struct import TABLE
 from crossbody.reference.core.layout import MODEL, STATE, WORK
 
@@ -40,6 +43,8 @@ _FRICTION = types.float64(types.int64, _state().dtype, MODEL, WORK, types.int64)
 @cache
 def _friction() -> Any:
     """What answers for contacts with friction, from the cache or compiled once a scene has some."""
+    from crossbody.reference.core import friction_answers
+
     return compiled(friction_answers.answer, [_FRICTION])
 
 
@@ -49,82 +54,61 @@ def friction_code() -> int:
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
-class Address(types.WrapperAddressProtocol):  # type: ignore[misc]
-    """A compiled function by its address.
-
-    Named as such in other compiled code it is called, not compiled with it once more: that took seconds.
-    """
-
-    def __init__(self, function: Any, signature: Any) -> None:
-        self._signature = signature
-        self._compiled = function.overloads[signature.args]  # the code lives as long as its address is known
-
-    def __wrapper_address__(self) -> int:
-        """Where it stands, callable from C."""
-        name = self._compiled.fndesc.llvm_cfunc_wrapper_name
-        return int(self._compiled.library.get_pointer_to_function(name))
-
-    def signature(self) -> Any:
-        """What it takes and returns."""
-        return self._signature
+ADDRESSES = types.int64[::1]
 
 
-def addresses(names: Sequence[str], functions: Sequence[Any]) -> list[Address]:
-    """Kernels by their names, to be named in other compiled code."""
-    return [Address(function, kernels.REAL[name]) for name, function in zip(names, functions, strict=True)]
+def at_address(signature: Any) -> Any:
+    """Return what makes a function of an address, in compiled code: it is called as from C."""
+    kind = types.FunctionType(signature)
+
+    @intrinsic
+    def function(typingctx: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+            made = cgutils.create_struct_proxy(kind)(context, builder)
+            made.c_addr = builder.inttoptr(args[0], cgutils.voidptr_t)
+            return made._getvalue()
+
+        return kind(types.int64), generate
+
+    return function
+
+
+def address(function: Any, signature: Any) -> int:
+    """Return where a compiled function stands, callable from C as long as it lives."""
+    found = function.overloads[signature.args]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
+
+
+def bound(call: Any, names: Sequence[str], functions: Sequence[Any], program: int) -> Callable[..., Any]:
+    """Return compiled code with its first argument: the addresses of kernels, and behind them of what they are for."""
+    found = [address(function, kernels.REAL[name]) for name, function in zip(names, functions, strict=True)]
+    made = partial(call, np.array([*found, program]))
+    made.functions = tuple(functions)  # type: ignore[attr-defined]  # whose code stands there
+    return made
+
+
+dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = map(at_address, kernels.REAL.values())
+advance = at_address(_signature())
+
+
+def _go(at, state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
+    call = advance(at[10])
+    return call(
+        dynamics(at[0]), gaps(at[1]), rows(at[2]), energy(at[3]), power(at[4]), velocity(at[5]), solve(at[6]),
+        control(at[7]), watch(at[8]), switch(at[9]), state, model, work, buffers, budget,
+    )  # fmt: skip
 
 
 @cache
-def address() -> Address:
-    """The program, to be named in other compiled code."""
-    return Address(program(), _signature())
+def _going() -> Any:
+    return compiled(_go, [types.int64(ADDRESSES, _state(), TABLE, TABLE, TABLE, types.int64)])
 
 
-KEPT = 16  # of what is built from one kernel: a few systems share it
+def advance_address() -> int:
+    """Return where the program stands, for other compiled code."""
+    return address(program(), _signature())
 
 
-def kept_with_kernels(build: Callable[[tuple[Any, ...]], Any]) -> Callable[[tuple[Any, ...]], Any]:
-    """Keep what is built from a system's kernels as long as the kernels live, and no longer.
-
-    It holds the kernels, so that no weak reference would let them go: it hangs on one of them instead, one that is not
-    bound to a module for good, and goes with it.
-    """
-
-    @wraps(build)
-    def kept(functions: tuple[Any, ...]) -> Any:
-        owner = next((function for function in functions if not _permanent(function)), functions[0])
-        found: dict[Any, Any] = vars(owner).setdefault("kept", {})
-        key = (build.__module__, build.__name__, *map(id, functions))  # an id is a name as long as what has it lives
-        if key not in found:
-            built = build(functions)
-            while len(found) >= KEPT:
-                found.pop(next(iter(found)), None)
-            found[key] = built
-        return found[key]
-
-    return kept
-
-
-def _permanent(function: Any) -> bool:
-    """Whether a module holds it under its own name."""
-    home = modules.get(getattr(function, "__module__", None) or "")
-    return getattr(home, getattr(function, "__name__", ""), None) is function
-
-
-@kept_with_kernels
-def entry(functions: tuple[Any, ...]) -> Callable[..., int]:
-    """The program with one system's kernels built in.
-
-    Handing ten functions over from Python costs more than a short run; an entry names their addresses as constants.
-    """
-    advance = address()
-    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = addresses(kernels.NAMES, functions)
-
-    def call(state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
-        return advance(
-            dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch,
-            state, model, work, buffers, budget,
-        )  # fmt: skip
-
-    found: Callable[..., int] = embedding(call, types.int64(_state(), TABLE, TABLE, TABLE, types.int64))
-    return found
+def entry(functions: Sequence[Any]) -> Callable[..., int]:
+    """Return the program for one system's kernels: called with its tables and a number of steps."""
+    return bound(_going(), kernels.NAMES, functions, advance_address())

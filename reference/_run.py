@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -19,7 +18,7 @@ from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._dense import Marks, Motion
 from crossbody.reference._interrupt import LONG_S, Interrupts
-from crossbody.reference._program import entry, friction_code, program
+from crossbody.reference._program import entry, friction_code
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
@@ -100,8 +99,7 @@ class CompiledRun:
         self._modes = initial_modes(system)
         self.callback: Any = None
         self.marks: Marks | None = None
-        kernels = tuple(system.kernels.values())  # step by step 0.5 ms would be lost at each call
-        self.call: Callable[..., int] = entry(kernels) if options.dense else partial(program(), *kernels)
+        self.call = entry(tuple(system.kernels.values()))
 
     def _state_template(self, natural: bool) -> Any:
         system, options = self.system, self.options
@@ -144,8 +142,7 @@ class CompiledRun:
         return int(self.call(self.state, *self.tables, budget))
 
     def warm(self) -> None:
-        """Prepare for many repetitions: build the kernels into the program, and take one step."""
-        self.call = entry(tuple(self.system.kernels.values()))
+        """Prepare for many repetitions: take one step."""
         if not isinstance(self.system.control, Control):  # a controller is asked by runs alone
             self.start()
             self.slice(1)

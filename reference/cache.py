@@ -25,6 +25,7 @@ from numba.core import sigutils, types, typing
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from crossbody.reference import code_store
@@ -54,23 +55,6 @@ class Lean(CPUDispatcher):  # type: ignore[misc]
     def add_overload(self, cres: CompileResult) -> None:
         """Take what was compiled."""
         super().add_overload(cres._replace(type_annotation=""))
-
-
-def embedding(function: Callable[..., Any], signature: Any = None, *, nogil: bool = False) -> Any:
-    """Compile a function that names kernels as constants; it is not kept on disk.
-
-    Args:
-        function: in Python.
-        signature: compiled for at once; without it for that of the first call.
-        nogil: threads may run it side by side.
-    """
-    if numba_config.DISABLE_JIT:
-        return function
-    found = Lean(function, targetoptions={"nopython": True, "nogil": nogil}, pipeline_class=WholePasses)
-    if signature is not None:
-        found.compile(signature)
-        found.disable_compile()
-    return found
 
 
 class Compiled(Lean):
@@ -190,11 +174,11 @@ class _Overloads:
         store = code_store.current() if self.content else None
         if store is None:
             return None
-        target_context.refresh()
         key = self.key(self.content, sig)
         data = store.read(key)
         if data is None:
             return None
+        rtsys.initialize(target_context)  # all that code which is read back needs of what a compiler sets up
         try:
             return CompileResult._rebuild(target_context, *pickle.loads(data))
         except Exception as error:

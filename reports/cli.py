@@ -154,7 +154,11 @@ _LIMIT = click.option(
 @cli.command()
 @_shared
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
-@click.option("--setting", "settings", metavar="K=V", multiple=True, help="Setting of the engines; repeatable.")
+@click.option(
+    "--set-engine", "settings", metavar="[E[:PROFILE].]K=V", multiple=True,
+    help="Setting of one engine, or of all that have it; repeatable.",
+)  # fmt: skip
+@click.option("--dry-run", "dry", is_flag=True, help="Say what would be run, and run nothing.")
 @click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
 @click.option(
     "--jobs",
@@ -171,9 +175,13 @@ _LIMIT = click.option(
 def run(
     names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
     rtol: float | None, settings: tuple[str, ...], strict: bool, limit: float, against: Path | None,
-    others: tuple[Path, ...], jobs: int,
+    others: tuple[Path, ...], jobs: int, dry: bool,
 ) -> int:  # fmt: skip
     """Run cases on engines, judge them, and write the report."""
+    if dry:
+        from crossbody.reports.commands.planned import tell
+
+        return tell(names, wanted, variant, pairs, settings)
     from crossbody.reports.commands.run import run as work
 
     return work(
@@ -336,6 +344,58 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
     elif not quiet():
         click.echo(f"Report: {made}")
     return 0
+
+
+@cli.command()
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
+@click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")
+@click.option(
+    "--time-limit",
+    "limit",
+    type=click.FloatRange(0.0, min_open=True),
+    default=20.0,
+    show_default=True,
+    metavar="S",
+    help="A reader that has not come back by then is ended, s.",
+)
+@click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
+@click.option("--sarif", type=click.Path(path_type=Path), metavar="F", help="Write the findings as SARIF too.")
+@click.option("--markdown", type=click.Path(path_type=Path), metavar="F", help="Write a summary in Markdown too.")
+@speaks
+def audit(
+    file: Path, engines: tuple[str, ...], without: str, limit: float, explain: bool, sarif: Path | None,
+    markdown: Path | None,
+) -> int:  # fmt: skip
+    """Say whether every engine's own reader makes the same robot of FILE (MJCF or URDF), where not, and why."""
+    from crossbody.reports.commands.audit import Ask
+    from crossbody.reports.commands.audit import audit as work
+
+    asked = Ask(
+        path=file, engines=engines, without=without, seconds=limit, explain=explain, sarif=sarif, markdown=markdown
+    )
+    return work(asked)
+
+
+@cli.command()
+@click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
+@click.option("--feature", default="", metavar="TEXT", help="Features alone whose name has TEXT in it.")
+@click.option(
+    "--time-limit",
+    "limit",
+    type=click.FloatRange(0.0, min_open=True),
+    default=20.0,
+    show_default=True,
+    metavar="S",
+    help="A reader that has not come back by then is ended, s.",
+)
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@speaks
+def conformance(engines: tuple[str, ...], feature: str, limit: float, out: Path) -> int:
+    """Show what every engine's own reader makes of each feature of robot files, by one small file a feature."""
+    from crossbody.reports.commands.conformance import conformance as work
+
+    return work(engines, feature, limit, out, _command())
 
 
 cli.add_command(replay)

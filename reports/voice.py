@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -67,6 +68,11 @@ def note(text: str) -> None:
 def rows_as_json(rows: pd.DataFrame) -> str:
     """A table as a JSON list of its rows."""
     return str(rows.to_json(orient="records", double_precision=15))
+
+
+def finite(value: Any) -> Any:
+    """A value as JSON knows it: nothing for a number that is not finite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def told_as_json(tables: Mapping[str, pd.DataFrame]) -> bool:

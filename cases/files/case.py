@@ -21,11 +21,13 @@ from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
-from crossbody.cases.scene_contacts import check_pairs
+from crossbody.cases.scene_contacts import check_pairs, frictional
 from crossbody.cases.scene_rows import law_of, rows_of
 
 REFERENCE_POSE, UNNAMED = "reference", "scene"
 OF_THE_FILE = -1.0
+WHERE_MET = -1
+"""Of the parameter friction: contacts that slide have rows if the motion comes to one."""
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
@@ -36,7 +38,7 @@ PARAMETERS = {
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
     "friction": Parameter(
-        default=False, doc="contacts that slide have rows: the reference alone runs it", low=0, high=1
+        default=WHERE_MET, doc="contacts that slide have rows: 1, 0; -1: if the motion comes to one", low=-1, high=1
     ),
     "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
     "rank": Parameter(default=-1, doc="rows of the loops that hold; -1: those that surely do", low=-1, high=1e6),
@@ -79,7 +81,7 @@ class FileCase:
             q0, v0 = assembled(model, q0, v0)
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         act0 = np.zeros(self.model.na) if index < 0 else self.model.key_act[index]
-        scene = scene_of(self.path, model).replace(friction=bool(p["friction"]))
+        scene = scene_of(self.path, model).replace(friction=p["friction"] == 1)
         scene = overruled(scene, float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
@@ -101,6 +103,22 @@ def open_file(name: str) -> FileCase:
     if not path.is_file():
         raise UnknownName("robot file", name, ())
     return FileCase(path=path)
+
+
+def rubbing(case: Case) -> Case | None:
+    """Return a file's case with the friction of its contacts, if its motion is to tell whether it has rows; else None.
+
+    None too where no contact has friction of a kind that is done.
+    """
+    if case.scene is None or case.parameters.get("friction") != WHERE_MET:
+        return None
+    scene = case.scene.replace(friction=True)
+    if frictional(scene) is None:
+        return None
+    return replace(
+        case, scene=scene, contacts=tuple(rows_of(scene)[0]), law=law_of(scene),
+        parameters={**case.parameters, "friction": 1},
+    )  # fmt: skip
 
 
 def overruled(scene: Scene, a0: float, a1: float) -> Scene:

@@ -60,8 +60,8 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
 
 
 _FRICTION = (
-    "they have friction (without=friction leaves it out of every engine; friction=1 has it in the reference, where "
-    "shapes that slide and neither spin nor roll meet planes, or spheres each other)"
+    "they have friction (without=friction leaves it out of every engine; friction=1 has it in reference:compiled and "
+    "in MuJoCo, where shapes that slide and neither spin nor roll meet planes, or spheres each other)"
 )
 
 

@@ -62,13 +62,13 @@ def _listed(model: Any) -> Iterator[tuple[int, int]]:
     yield from zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
 
 
-def constants_of(model: Any, name: Callable[[int], str]) -> dict[frozenset[str], tuple[Any, Any]]:
-    """Return solref and solimp of every pair of shapes that may touch, by their names."""
+def constants_of(model: Any, name: Callable[[int], str]) -> dict[frozenset[str], tuple[Any, Any, Any]]:
+    """Return solref, solimp and solreffriction of every pair of shapes that may touch, by their names."""
     listed = {
-        frozenset((name(a), name(b))): (model.pair_solref[i], model.pair_solimp[i])
+        frozenset((name(a), name(b))): (model.pair_solref[i], model.pair_solimp[i], model.pair_solreffriction[i])
         for i, (a, b) in enumerate(_listed(model))
     }
-    return {frozenset((name(a), name(b))): _softness(model, a, b) for a, b in _met(model)} | listed
+    return {frozenset((name(a), name(b))): (*_softness(model, a, b), 0.0) for a, b in _met(model)} | listed
 
 
 def _met(model: Any) -> Iterator[tuple[int, int]]:

@@ -19,7 +19,7 @@ from crossbody.cases.errors import SceneError
 from crossbody.cases.files.meshes import supplied
 from crossbody.cases.files.warned import compiled, sentences
 from crossbody.cases.files.without import apart, without_meshes
-from crossbody.cases.scene import Body, Loop, Scene
+from crossbody.cases.scene import Body, Scene
 
 if TYPE_CHECKING:
     import mujoco
@@ -72,6 +72,8 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
         spec = mujoco.MjSpec.from_string(text, assets=files)
         for mesh in spec.meshes:  # whose inertia is not asked for: of one that is open there is none
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        for loop in spec.equalities:
+            loop.name = f"{loop.name1} mimics"
         return apart(spec, without)
 
     model, warned = compiled(path, compiler)
@@ -79,14 +81,11 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:
-    """Return the scene with the inertias of the file, and its mimicking joints as loops."""
+    """Return the scene with the inertias of the file."""
     root = parsed(path)
     links = {link.get("name", ""): link for link in root.findall("link")}
     bodies = tuple(_body(body, links[body.name]) if body.name in links else body for body in scene.bodies)
-    known = {joint.name for joint in scene.joints}
-    loops = tuple(_mimic(joint) for joint in root.findall("joint")
-                  if joint.find("mimic") is not None and joint.get("name") in known)  # fmt: skip
-    return scene.replace(bodies=bodies, loops=(*scene.loops, *loops))
+    return scene.replace(bodies=bodies)
 
 
 def findings(path: Path) -> list[str]:
@@ -122,14 +121,6 @@ def _body(body: Body, link: ElementTree.Element) -> Body:
     mass, com, J = inertial(link)
     six = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
     return replace(body, mass=mass, com=tuple(com), inertia=six)
-
-
-def _mimic(joint: ElementTree.Element) -> Loop:
-    name, mimic = joint.get("name", ""), joint.find("mimic")
-    factor, offset = (_number(name, mimic, key, value) for key, value in (("multiplier", 1.0), ("offset", 0.0)))
-    second = mimic.get("joint", "") if mimic is not None else ""
-    return Loop(name=f"{name} mimics", type="joint", first=name, second=second,
-                polynomial=(offset, factor, 0.0, 0.0, 0.0))  # fmt: skip
 
 
 def _number(where: str | None, element: Any, key: str, default: float = 0.0) -> float:

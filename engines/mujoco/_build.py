@@ -163,7 +163,7 @@ def _add_corners(spec: Any, bodies: Mapping[str, Any], contact: Contact) -> None
     _add_shape(spec, bodies, contact.first)
     shape = contact.second
     at = np.array(shape.position) + np.array(shape.corners) @ matrices(np.array(shape.orientation)).T
-    for row, name, corner in zip(contact.rows, corner_names(shape), at, strict=True):
+    for row, name, corner in zip(contact.normals, corner_names(shape), at, strict=True):
         _add_shape(spec, bodies, Shape(name=name, body=shape.body, size=(POINT, 0.0, 0.0), position=corner))
         _add_pair(spec, contact, row, name)
 
@@ -195,7 +195,8 @@ def _add_shape(spec: Any, bodies: Mapping[str, Any], shape: Shape) -> None:
 
 def _add_pair(spec: Any, contact: Contact, name: str, second: str) -> None:
     spec.add_pair(
-        name=name, geomname1=contact.first.name, geomname2=second, condim=1,
+        name=name, geomname1=contact.first.name, geomname2=second,
+        condim=contact.pair.dimension if contact.friction > 0.0 else 1, friction=contact.pair.friction,
         margin=contact.pair.margin, solref=_solref(contact.pair.law), solimp=IMPEDANCE,
     )  # fmt: skip
 

@@ -62,9 +62,11 @@ def rebuilt(scene: Scene, model: Any) -> Any:
     for i in range(model.ngeom):
         if spec.mesh(named(i)) is not None:
             _join(made, int(made.mesh(named(i)).id), model, int(model.geom_dataid[i]))
-    soft = constants_of(model, named)
+    soft, stated = constants_of(model, named), {frozenset((pair.first, pair.second)): pair for pair in scene.pairs}
     for i in range(made.npair):
-        made.pair_solref[i], made.pair_solimp[i] = soft[frozenset((_geom(made, 1, i), _geom(made, 2, i)))]
+        both = frozenset((_geom(made, 1, i), _geom(made, 2, i)))
+        made.pair_solref[i], made.pair_solimp[i], made.pair_solreffriction[i] = soft[both]
+        made.pair_dim[i] = stated[both].dimension  # of a coefficient of 0 MuJoCo makes 1e-5
     return made
 
 

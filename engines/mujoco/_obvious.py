@@ -15,14 +15,13 @@ from crossbody.engines._log import Modes
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._rows import Rows
+from crossbody.engines.mujoco._rubs import EDGES
 
 USUAL = 1e4
 """Stiffness over mass of bodies that collide with each other, 1/s^2: about the largest that a step of 2 ms resolves.
 MuJoCo's own constants (solref 0.02 1) would have them stick together."""
 SMALL, SLIGHT = 1e-12, 1e-8
 """Gap that rounding may make of bodies that touch, m or rad; acceleration of the heaviest that its push is then."""
-EDGES = 4
-"""Of the pyramid of friction of a contact with two tangents."""
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 
 

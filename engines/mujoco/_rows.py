@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import mujoco
@@ -12,7 +12,7 @@ from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.scene import Scene
-from crossbody.cases.scene_contacts import Contact
+from crossbody.cases.scene_contacts import WAYS, Contact
 from crossbody.cases.scene_rows import rows_of
 from crossbody.engines._contacts import TOGETHER, Contacts, end_of
 from crossbody.engines._log import Modes, Observe
@@ -20,6 +20,7 @@ from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import corner_names
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._observe import numbers
+from crossbody.engines.mujoco._rubs import Rub, Rubs
 from crossbody.engines.nearest import corners
 
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
@@ -36,6 +37,8 @@ class Rows:
         always: number of rows that are always on; they stand first in both.
         steady: whether what MuJoCo has rows for says which these are: no bound has two ends, no pair two places.
         frictional: whether edges of friction pyramids, whose sum is the normal force, are rows of contacts too.
+        contacts: where the normal rows of contacts stand; behind them are the tangential ones of those with friction.
+        rubs: contacts with friction; rubbing: whether there are any.
     """
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
@@ -54,7 +57,6 @@ class Rows:
         self.sole = {(kind, i): row for (kind, i, _), row in self.places.items() if ends.count((kind, i)) == 1}
         self.cubic, self.forces = np.array([law.a2 for law in rows_of(scene)[1]]), Forces(scene)
         self.touching = Contacts(scene)
-        self.nc = row + self.touching.count
         named = mjcf.names(model, "geom")
         self.geoms = {named(i): i for i in range(model.ngeom)}
         self.touches: dict[frozenset[int], tuple[Contact, range]] = {}
@@ -66,6 +68,15 @@ class Rows:
             else:
                 self.touches[frozenset((first, self.geoms[contact.second.name]))] = (contact, rows)
             row += contact.places
+        self.rubbing = any(contact.pair.dimension > 1 for contact in self.touching.all)
+        tangents: dict[int, int] = {}
+        normal, tangent = row - self.touching.count, row
+        for contact in self.touching.all:
+            for k in range(contact.places if contact.friction > 0.0 else 0):
+                tangents[normal + k] = tangent + len(WAYS) * k
+            normal, tangent = normal + contact.places, tangent + len(contact.tangents)
+        self.contacts = slice(row - self.touching.count, row)
+        self.nc, self.rubs = tangent, Rubs(model, data, self.geoms, tangents)
         rubs = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
         one_each = len(self.sole) == len(self.places) and all(len(rows) == 1 for _, rows in self.touches.values())
         self.steady, self.only = one_each and not (rubs and self.nc == 1), ((0, 0),)
@@ -78,7 +89,7 @@ class Rows:
     def pair_ids(self) -> list[int]:
         """Return the model's pair of every contact's row, by name: the compiler sorts them by the bodies they join."""
         names = [
-            contact.rows if self.by_corners(contact) else (contact.pair.name,) * contact.places
+            contact.normals if self.by_corners(contact) else (contact.pair.name,) * contact.places
             for contact in self.touching.all
         ]
         return [int(self.model.pair(name).id) for part in names for name in part]
@@ -120,7 +131,9 @@ class Rows:
                 yield j, row
             elif kind in LIMITS:
                 yield j, self._place(j, kind, part)
-            elif (kind == TOUCH or (self.frictional and kind in FRICTIONAL)) and self._geoms(part) in self.touches:
+            elif (kind == TOUCH or (self.frictional and not self.rubbing and kind in FRICTIONAL)) and self._geoms(
+                part
+            ) in self.touches:
                 yield j, self._touch(part)
 
     def lam(self) -> Floats:
@@ -129,7 +142,19 @@ class Rows:
         lam[: self.always] = data.efc_force[: self.always]
         for j, row in self.present():
             lam[row] += data.efc_force[j]
+        for rub in self._rubbing():
+            lam[rub.row] += rub.normal
+            if rub.row in self.rubs.tangents:
+                lam[self.rubs.tangents[rub.row] :][: len(WAYS)] += rub.across
         return lam
+
+    def _rubbing(self) -> Sequence[Rub]:
+        """Return the contacts with friction that MuJoCo has now, also of pairs whose coefficient is 0: it has 1e-5."""
+        if not self.rubbing:
+            return ()
+        there = zip(self.data.contact.dim.tolist(), self.data.contact.efc_address.tolist(), strict=True)
+        known = [i for i, (dim, first) in enumerate(there) if dim > 1 and first >= 0 and self._geoms(i) in self.touches]
+        return self.rubs.at({i: (self.touches[self._geoms(i)][0], self._touch(i)) for i in known})
 
     def jacobian(self) -> Floats:
         """Return H (nc, nv); 0 of a row that is not there."""
@@ -171,17 +196,20 @@ class Rows:
 
     def modes(self) -> Modes:
         """Return the mode of every row: a bound is in contact where it pushes."""
-        lam = self.lam()[self.always :]
-        return (int(Mode.BILATERAL),) * self.always + tuple(int(Mode.CONTACT if x > 0.0 else Mode.FREE) for x in lam)
+        lam = self.lam()[self.always : self.contacts.stop]
+        modes = [int(Mode.BILATERAL)] * self.always + [int(Mode.CONTACT if x > 0.0 else Mode.FREE) for x in lam]
+        for rub in (rub for rub in self._rubbing() if rub.row in self.rubs.tangents and rub.normal > 0.0):
+            modes[rub.row] = int(Mode.SLIP if rub.slides else Mode.STICK)
+        return (*modes, *(modes[row] for row in self.rubs.tangents for _ in WAYS))
 
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
         data = mujoco.MjData(self.model)
 
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
-            first = self.nc - self.touching.count
-            gaps, energy = np.empty((len(q), self.nc)), np.empty((len(q), 2))
-            gaps[:, first:], lengths = self._apart(q, data), np.empty((len(q), self.model.ntendon))
+            first = self.contacts.start
+            gaps, energy = np.zeros((len(q), self.nc)), np.empty((len(q), 2))
+            gaps[:, self.contacts], lengths = self._apart(q, data), np.empty((len(q), self.model.ntendon))
             for i in range(len(q)):
                 data.qpos[:], data.qvel[:] = q[i], v[i]
                 mujoco.mj_fwdPosition(self.model, data)

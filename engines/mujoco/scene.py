@@ -34,6 +34,7 @@ from crossbody.engines.mujoco._rows import Rows
 from crossbody.engines.mujoco._scene import Scene as Prepared
 from crossbody.engines.mujoco._switched import Switched
 
+CONE = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
 FASTEST = 100.0
 """Times the speed that a scene can have: a run has diverged."""
 SLOWEST, OF_RATE, OF_ROWS = 1e-3, 0.02, 0.05
@@ -55,6 +56,12 @@ SOLVES = 4
 """Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
 DEPENDENT = 1e-6
 """Singular value of the loops' rows, over the largest, below which one depends on the others."""
+CONES = {
+    "cone": Parameter(default="own", choices=("own", *CONE), doc="cone of friction; own: the model's"),
+    "impratio": Parameter(default=0.0, doc="friction's stiffness over that of normals; 0: the model's", low=0.0),
+    "noslip": Parameter(default=-1, doc="iterations that take slip out; -1: the model's", low=-1, high=1e6),
+}
+"""Of models with friction."""
 SOFT = "The file's rows are soft: their law varies with depth."
 HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
@@ -65,7 +72,7 @@ def why_not(case: Case, profile: str) -> str | None:
         return (
             "What MuJoCo makes of a robot file by itself is the profile as_is; default is that of scenes without one."
         )
-    if case.scene is not None and (found := frictional(case.scene)):
+    if profile == "matched" and case.scene is not None and (found := frictional(case.scene)):
         return found
     if profile != "as_is":
         return None
@@ -79,10 +86,10 @@ def why_not(case: Case, profile: str) -> str | None:
 
 
 def settings(case: Case, profile: str) -> dict[str, Parameter]:
-    """Return the setting that says who reads the file: MuJoCo, or the project, which builds its scene."""
-    if profile != "as_is":
-        return {}
-    return {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
+    """Return who reads the file, MuJoCo or the project, which builds its scene; and how contacts with friction act."""
+    reader = {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
+    found = reader if profile == "as_is" else {}
+    return found | CONES if case.scene is not None and frictional(case.scene) else found
 
 
 def default_step(case: Case, profile: str) -> float:
@@ -163,7 +170,10 @@ def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
     return found
 
 
-def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared:
+def build(
+    case: Case, profile: str, dt: float, reader: str = "file", cone: str = "own", impratio: float = 0.0,
+    noslip: int = -1,
+) -> Prepared:  # fmt: skip
     """Compile the model of one profile.
 
     Raises:
@@ -178,6 +188,7 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         model = obvious(scene)
     else:
         model = matched(scene)
+    _set_cone(model.opt, cone, impratio, noslip)
     data = mujoco.MjData(model)
     switched = Switched(scene, model, data) if profile == "matched" else None
     rows, acting = switched or (Obvious if profile == "default" else Rows)(scene, model, data), Acting(case)
@@ -197,6 +208,16 @@ def build(case: Case, profile: str, dt: float, reader: str = "file") -> Prepared
         prepared.entered = switched.entered
     prepared.audit = _audit(case, profile, scene, model, rows)
     return prepared
+
+
+def _set_cone(option: Any, cone: str, impratio: float, noslip: int) -> None:
+    """Set what `CONES` are, where they are not the model's own."""
+    if cone != "own":
+        option.cone = CONE[cone]
+    if impratio > 0.0:
+        option.impratio = impratio
+    if noslip >= 0:
+        option.noslip_iterations = noslip
 
 
 def _guard(case: Case, data: Any, rows: Rows) -> Callable[[], bool]:

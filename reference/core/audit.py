@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, pushed, weigh
-from crossbody.reference.core.algebra import ULP
+from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.friction import is_shared
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
 from crossbody.reference.kinds import Bytes
@@ -76,7 +76,7 @@ def begin_account(K: Any, s: Any, m: Model, w: Work) -> None:
     nq = s.nq
     K.energy(w.y[:nq], w.y[nq:], m.p, w.e)
     s.energy_start = w.e[0] + w.e[1]
-    w.ys[:nq] = w.y[:nq]
+    copy(w.y[:nq], w.ys[:nq])
     w.ys[nq:] = 1.0
     K.energy(w.ys[:nq], w.ys[nq:], m.p, w.e)
     s.energy_unit = w.e[0]

@@ -17,7 +17,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, OWN, SMOOTH, accelerate, push_rows
-from crossbody.reference.core.algebra import ULP, factor_lu, solve_lu, solve_schur
+from crossbody.reference.core.algebra import ULP, copy, factor_lu, solve_lu, solve_schur
 from crossbody.reference.core.dop853 import (
     keep_velocity,
     powers,
@@ -80,7 +80,7 @@ def _tangent(K: Any, s: Any, m: Model, w: Work, q: Any) -> None:
 @compiled
 def _displace(s: Any, w: Work, c: int, step: float) -> None:
     """Leave in ys the state moved by a step of position c, or of velocity c - n."""
-    w.ys[:] = w.y
+    copy(w.y, w.ys)
     if c >= s.n:
         w.ys[s.nq + c - s.n] = w.y[s.nq + c - s.n] + step
     elif s.has_velocity:
@@ -134,7 +134,7 @@ def _smooth_part(K: Any, s: Any, m: Model, w: Work) -> int:
         step = 1e-6 * max(1.0, abs(w.y[c] if c < n else w.y[nq + c - n]))
         _displace(s, w, c, step)
         failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:nq], w.ys[nq:], SMOOTH)
-        w.d[:] = w.vd
+        copy(w.vd, w.d)
         _displace(s, w, c, -step)
         failed |= accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.ys[:nq], w.ys[nq:], SMOOTH)
         for a in range(n):
@@ -317,7 +317,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
             watch_gaps(K, s, m, w, s.t + C[stage] * h, stage - 2)
         if s.ng > 0 and 2 <= stage <= 4:
             watch_guards(K, s, m, w, s.t + C[stage] * h, stage - 2)
-    w.y1[:] = w.ys
+    copy(w.ys, w.y1)
     for i in range(s.nz):
         w.z1[i] = w.z[i]
         for j in range(STAGES):

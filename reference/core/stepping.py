@@ -145,5 +145,5 @@ def take_arc(K: Any, s: Any, m: Model, w: Work, b: Buffers, length: float) -> in
     exact.evaluate(s, m, w, s.hs, w.y1)
     s.exact_steps += 1
     if s.ledger:
-        w.z1[:] = w.z
+        copy(w.z, w.z1)
     return _finish(K, s, m, w, b)

@@ -40,7 +40,7 @@ def work_precision(rows: pd.DataFrame) -> go.Figure:
                 error_y={"type": "data", "array": (group["iqr_ms"] / 2).tolist(), "thickness": 1},
             )
         )  # fmt: skip
-    figure.update_xaxes(type="log", title_text="relative error of position and event times [1]", exponentformat="power")
+    figure.update_xaxes(type="log", title_text="relative error of position and event times", exponentformat="power")
     figure.update_yaxes(type="log", title_text="run time, median [ms]", exponentformat="power")
     cases = ", ".join(rows["case"].unique())
     figure.update_layout(title_text=f"Work against precision, {cases}; a cross is a run that failed", height=560)

@@ -15,6 +15,7 @@ from crossbody.cases import CaseUnsupported
 from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import voice
 from crossbody.reports.commands.shared import identity, where
+from crossbody.reports.figures.section import records
 from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison as replay
@@ -250,7 +251,7 @@ def _write(
     name: str,
 ) -> None:
     with output.folder(out, name) as made:
-        study.write(made, [], rows, told)
+        study.write(made, [], records(rows), told)
         tables = {
             "replay": _metrics(found, rows), "findings": replay.findings(found), "residuals": replay.residuals(found),
             "correlations": replay.correlations(found), **more,

@@ -2,40 +2,27 @@
 
 from __future__ import annotations
 
-import math
+import json
 import shlex
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
 from crossbody.cases import Case, InvalidValue, installed
-from crossbody.engines.equations import known, system_of
 from crossbody.reports import voice
+from crossbody.reports.commands.run_shown import counted, show
+from crossbody.reports.commands.shared import OF_USERS, identity, key, where
 from crossbody.reports.judging.audit import SEED
-from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.verdict import Regression, Word, exit_code
+from crossbody.reports.judging.verdict import Row, exit_code
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages import grid, html, results, site
+from crossbody.reports.pages import results, site
 from crossbody.reports.runs import files, jobs, output, store, study, watch
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
 from crossbody.reports.voice import progress
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-from crossbody.reports.commands.shared import OF_USERS, identity, key, where
-
-WRONG = [Word.OUTSIDE, Word.CRASHED]
-WIDTH = 150  # of the table in a file or a pipe
-SHOWN = {"position": "position", **{part_of("position", part): part for part in PARTS}}
-"""Metrics in the terminal and their heads: the parts of the worst error of position add up to it."""
-COLOURS = {Word.WITHIN: "green", Word.CRASHED: "bold red", Word.OUTSIDE: "bold red", Word.EXPECTED: "yellow"}
 
 
 def run(
@@ -57,7 +44,8 @@ def run(
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
         click.echo(f"note: {sentence}", err=True)
-    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--setting")
+    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--set-engine")
+    jobs.check_asked(asked, picks)
     output.check(out, "run")
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
@@ -77,14 +65,21 @@ def run(
                 do(i, tell)
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
-            site.write(made, against=against, others=others)
+            _tell(rows, made, controlled=any(case.control is not None for case in cases))
+            site.write(made, against=against, others=others)  # which takes longer than all but the engines
+    where(out)
+    lost_numbers = (row["regression"] for row in rows) if strict else ()
+    return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
+
+
+def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> None:
+    """Print the verdicts of a folder."""
     if voice.as_json():
-        print(voice.rows_as_json(rows))
-    else:
-        if any(case.control is not None for case in cases) and not voice.quiet():
-            show_controllers(out)
-        show(rows, out)
-    return max(lost, exit_code(rows["verdict"], rows["regression"] if strict else ()))
+        print(json.dumps([{name: voice.finite(value) for name, value in row.items()} for row in rows]))
+        return
+    if controlled and not voice.quiet():
+        show_controllers(made)
+    show(rows, results.times_of(made))
 
 
 def _missing(cases: Sequence[Case], parts: Parts) -> list[int]:
@@ -106,7 +101,11 @@ def _beside(cases: Sequence[Case], parts: Parts, do: Callable[[int], int], at_on
 
 def findings(case: Case) -> tuple[str, ...]:
     """Return sentences on what is strange in a case, and in the equations of a scene with loops."""
-    if case.scene is None or not case.scene.loops or not known(case):
+    if case.scene is None or not case.scene.loops:
+        return case.findings
+    from crossbody.engines.equations import known, system_of
+
+    if not known(case):
         return case.findings
     return (*case.findings, *system_of(case).findings)
 
@@ -119,39 +118,9 @@ def repeat(
     source = next(own, case.name)
     words = ["crossbody", "run", source, "--variant", case.variant]
     words += [word for pair in pairs for word in ("--set", pair)]
-    words += [word for pair in settings for word in ("--setting", pair)]
+    words += [word for pair in settings for word in ("--set-engine", pair)]
     words += ["--rtol", f"{rtol:g}"] if rtol is not None else []
     return shlex.join(words + installed.options())
-
-
-def counted(rows: pd.DataFrame) -> str:
-    """Return how many rows have each verdict."""
-    counts = rows["verdict"].value_counts()
-    return ", ".join(f"{counts[word]} {word}" for word in counts.index)
-
-
-def show(rows: pd.DataFrame, out: Path) -> None:
-    """One line a run with its worst errors and verdicts, every row that is outside, and where the report is."""
-    from rich.console import Console
-
-    console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
-    if not voice.quiet():
-        console.print(_summary(rows, results.times_of(out)))
-        console.print(counted(rows))
-    told = rows[rows["verdict"].isin(WRONG if voice.quiet() else [Word.SKIPPED, *WRONG])]
-    for row in told.to_dict(orient="records"):
-        run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
-        number = (
-            f" {row['value']:.4g} {row['unit']}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
-        )
-        text = f"{row['verdict']}: {run} {row['metric']}{number}. {row['why']}"
-        console.print(text, soft_wrap=True, highlight=False, markup=False)
-    lost = rows[rows["regression"] == Regression.LOST]
-    for row in lost.to_dict(orient="records"):
-        run = f"{row['case']}:{row['variant']} {row['engine']}:{row['profile']}"
-        text = f"more than a stored run gave: {run} {row['metric']} {row['value']:.4g} {row['unit']}"
-        console.print(f"{text}, band {row['band']:.3g}", soft_wrap=True, highlight=False, markup=False)
-    where(out)
 
 
 def show_controllers(out: Path) -> None:
@@ -163,33 +132,3 @@ def show_controllers(out: Path) -> None:
             run = f"{about['case']}:{about['variant']} {about['engine']}:{about['profile']}"
             part = one["control_s"] / one["wall_s"]
             print(f"controller: {run} {1e3 * one['control_s']:.3g} ms, {part:.0%} of the run")
-
-
-def _summary(rows: pd.DataFrame, times: results.Times) -> Any:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("case", "engine"):
-        table.add_column(name, no_wrap=True)
-    for name in (*SHOWN.values(), "run time", "in all", Word.WITHIN, "expected", Word.OUTSIDE):
-        table.add_column(name, justify="right", no_wrap=True)
-    for (case, variant, engine, profile), run in rows.groupby(["case", "variant", "engine", "profile"], sort=False):
-        values = run.drop_duplicates("metric").set_index("metric")[["value", "known"]].T.to_dict()
-        counts = run["verdict"].value_counts()
-        label, who = f"{case}:{variant}", f"{engine}:{profile}"
-        table.add_row(
-            label, who, *(_short(**values.get(metric, {})) for metric in SHOWN),
-            *map(grid.duration, times.get((label, who), (None, None))),
-            *(_count(int(counts.get(word, 0)), word) for word in (Word.WITHIN, Word.EXPECTED, Word.OUTSIDE)),
-        )  # fmt: skip
-    return table
-
-
-def _short(value: float = math.nan, known: float = math.nan) -> str:
-    """A number in two digits, or below what it is known to."""
-    below, number = html.bounded(value, known)
-    return "-" if number != number else f"{below}{number:.1e}"
-
-
-def _count(count: int, word: Word) -> str:
-    return f"[{COLOURS[word]}]{count}[/]" if count else "[dim]0[/]"

@@ -5,16 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from crossbody.cases import Case, installed
 from crossbody.cases.files.reading import SUFFIXES
 from crossbody.reports import voice
 from crossbody.reports.pages import site
-
-if TYPE_CHECKING:
-    pass
-
+from crossbody.reports.runs.provenance import code
 
 OF_USERS = (".py", *SUFFIXES)
 """How names of files end that are cases."""
@@ -22,8 +19,6 @@ OF_USERS = (".py", *SUFFIXES)
 
 def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:
     """What decides what a command computes: the sources too, and case files of one's own."""
-    from crossbody.reports.sweep.store import code
-
     paths = [*(name for name in names if name.endswith(OF_USERS)), *_acting(cases)]
     own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in paths]
     scenes = [[case.label, dict(case.parameters)] for case in cases]

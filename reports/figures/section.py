@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-import pandas as pd
-import plotly.graph_objects as go
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
 
-Figure: TypeAlias = go.Figure | dict[str, Any]
+Figure: TypeAlias = "go.Figure | dict[str, Any]"
 """A figure of plotly, or its data and layout as plain values, which is many times faster."""
 
 

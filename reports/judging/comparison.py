@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from crossbody import engines
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Trajectory, UnknownName
@@ -22,6 +20,7 @@ from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of,
 from crossbody.reports.judging.stored import Deviations, defaults, deviations, differing, words
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import (
+    COLUMNS,
     Regression,
     Verdict,
     Word,
@@ -32,6 +31,9 @@ from crossbody.reports.judging.verdict import (
     limit_for,
 )  # fmt: skip
 from crossbody.reports.measuring.truth import TRUTH, Truth
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
@@ -113,7 +115,10 @@ def compare(
             raise InvalidValue(f"runs holds {shown(run)}; each must be what an engine's prepare returns, or an Entry.")
     truth = truth_of(case) if truth is None else truth
     entries = [_entry(run) for run in runs]
-    return table(judged(case, entries, truth, command))
+    import pandas as pd
+
+    rows = [row.row() for row in judged(case, entries, truth, command)]
+    return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> list[Verdict]:
@@ -121,11 +126,6 @@ def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> 
     check_names(case)
     rows = [row for entry in entries for row in verdicts(case, entry, truth, command)]
     return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command)]
-
-
-def table(rows: Iterable[Verdict]) -> pd.DataFrame:
-    """Verdicts as a tidy table; the columns are there even without a row."""
-    return pd.DataFrame([row.row() for row in rows], columns=list(Verdict.__dataclass_fields__))
 
 
 PART_ROWS = tuple(part_of(metric, part) for metric in SPLIT for part in PARTS)

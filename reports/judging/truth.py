@@ -16,6 +16,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reports.measuring.modes import violated
+from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, sample_times
 
 if TYPE_CHECKING:
@@ -225,7 +226,7 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
 def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) -> float:
     """By how much more than in free flight errors of a scene's start grow: its velocities are put off, on its rows."""
     fastest = float(np.max(np.abs(truth.v), initial=0.0))
-    if not case.general or not truth.outcome.ok or not 0.0 < fastest < math.inf:
+    if not case.general or not truth.outcome.ok or not RESTS < fastest < math.inf:
         return 1.0
     from crossbody.engines import load
     from crossbody.engines.equations import system_of
@@ -262,7 +263,6 @@ def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> 
 def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats]:
     """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
     from crossbody.reports.measuring.alignment import aligned
-    from crossbody.reports.measuring.scale import RESTS
 
     inside, exact = aligned(truth, second)
     scale = max(float(np.max(np.abs(truth.trajectory.q), initial=0.0)), RESTS)

@@ -43,6 +43,10 @@ class Regression(StrEnum):
     LOST = "lost"
 
 
+Row = dict[str, Any]
+"""A verdict as plain values, by the names of `Verdict`."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """One row of the table: what was measured on which run, and what is to be thought of it.
@@ -83,9 +87,13 @@ class Verdict:
     regression: str = ""
     known: float = math.nan
 
-    def row(self) -> dict[str, Any]:
+    def row(self) -> Row:
         """As plain values."""
         return asdict(self) | {"verdict": self.verdict.value, "regression": str(self.regression)}
+
+
+COLUMNS = {name: float if kind == "float" else str for name, kind in Verdict.__annotations__.items()}
+"""What a table of verdicts holds."""
 
 
 def limit_for(limits: Sequence[Limit], metric: str, engine: str, profile: str) -> Limit | None:

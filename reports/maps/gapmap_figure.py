@@ -9,7 +9,7 @@ from plotly.subplots import make_subplots
 from crossbody.reports.figures.styles import COLOURS, DASHES
 from crossbody.reports.maps.gapmap import PATTERN
 
-ROWS = {"energy_created": "energy created / energy in [1]", PATTERN: "pattern distance / speed in [1]"}
+ROWS = {"energy_created": "energy created / energy in", PATTERN: "pattern distance / speed in"}
 
 
 def gap_map(rows: pd.DataFrame) -> go.Figure:
@@ -34,7 +34,7 @@ def gap_map(rows: pd.DataFrame) -> go.Figure:
                 figure.add_trace(trace, row=i, col=counts.index(n) + 1)
     for i, title in enumerate(ROWS.values(), start=1):
         figure.update_yaxes(title_text=title, row=i, col=1)
-    figure.update_xaxes(title_text="s = gap sqrt(a0) / v [1]", row=len(ROWS))
+    figure.update_xaxes(title_text="s = gap sqrt(a0) / v", row=len(ROWS))
     figure.update_layout(title_text="Gap map: energy created, and distance to the ideal pattern", height=760)
     return figure
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import Contact, contacts
-from crossbody.cases.trajectory import Trajectory
+from crossbody.cases.trajectory import Mode, Trajectory
 
 if TYPE_CHECKING:
     from crossbody.reports.measuring.truth import Truth
@@ -32,12 +32,24 @@ def matched(truth: Truth, run: Trajectory) -> _Pairs:
     return pairs
 
 
+def turns(run: Trajectory) -> list[tuple[float, int, Mode]]:
+    """When rows pass from stick to slip or back, where lam jumps: instant, row, and mode behind, in order."""
+    between = {Mode.STICK, Mode.SLIP}
+    return sorted((e.t, e.contact, e.after) for e in run.events if {e.before, e.after} == between)
+
+
 def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
-    """The truth's time of every sample of the run (n,), s; `releases` are laid on those of the truth too."""
+    """The truth's time of every sample of the run (n,), s.
+
+    Where lam jumps besides, at `releases` and between stick and slip, is laid on the truth's too if it is asked for.
+    """
     start, pairs = float(truth.trajectory.t[0]), matched(truth, run)
     knots = [(b.touch, a.touch) for a, b in pairs]
     if releases:
         knots += [(b.release, a.release) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+        mine, theirs = turns(run), turns(truth.trajectory)
+        if [one[1:] for one in mine] == [one[1:] for one in theirs]:
+            knots += [(b[0], a[0]) for a, b in zip(theirs, mine, strict=True)]
     kept = [(start, start)]
     for knot in sorted(knots) if releases else knots:
         if knot[0] > kept[-1][0] and knot[1] > kept[-1][1]:

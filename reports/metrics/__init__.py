@@ -9,7 +9,7 @@ A metric is a module with a docstring whose first line says what it measures, an
 
 and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name. What the runs of
 one mechanism alone show is data of its cases (`crossbody.cases.metric`); what any case may claim of a run alone stands
-together in `_of_run`.
+together in `_of_run`, and what only contacts with friction have in `_of_friction`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
@@ -49,15 +50,19 @@ def names() -> tuple[str, ...]:
 
 def summary(name: str) -> str:
     """What a metric measures, in one line; imports nothing."""
-    return _of_runs().get(name) or _REGISTRY.summary(name)
+    return _of_runs()[name][1] if name in _of_runs() else _REGISTRY.summary(name)
 
 
 @cache
-def _of_runs() -> Mapping[str, str]:
-    """Return the functions of `_of_run` with what they measure."""
-    text = Path(__file__).with_name("_of_run.py").read_text(encoding="utf-8")
-    functions = [node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)]
-    return {node.name: (ast.get_docstring(node) or "").partition("\n")[0] for node in functions}
+def _of_runs() -> Mapping[str, tuple[str, str]]:
+    """Return the functions of the modules that hold several, each with its module and what it measures."""
+    found: dict[str, tuple[str, str]] = {}
+    for module in ("_of_run", "_of_friction"):
+        text = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                found[node.name] = module, (ast.get_docstring(node) or "").partition("\n")[0]
+    return found
 
 
 def load(name: str) -> Metric:
@@ -67,7 +72,7 @@ def load(name: str) -> Metric:
         UnknownName: if there is no such metric; the message lists the names.
     """
     if isinstance(name, str) and name in _of_runs():
-        return _by_claim(name)
+        return _among_others(name)
     try:
         return cast("Metric", _REGISTRY.load(name))
     except UnknownName:
@@ -75,12 +80,15 @@ def load(name: str) -> Metric:
 
 
 @cache
-def _by_claim(name: str) -> Metric:
+def _among_others(name: str) -> Metric:
     from crossbody.cases.metric import CaseMetric  # numpy, without which names are listed
-    from crossbody.reports.metrics import _of_run as own
     from crossbody.reports.metrics._of_case import OfCase
 
-    return OfCase(CaseMetric(doc=summary(name), unit=own.UNITS.get(name, "1"), number=getattr(own, name)))
+    module, doc = _of_runs()[name]
+    own = import_module(f"{__name__}.{module}")
+    how = {own.KINDS.get(name, "number"): getattr(own, name)}
+    metric = CaseMetric(doc=doc, unit=own.UNITS.get(name, "1"), always=own.ALWAYS, **how)
+    return OfCase(metric, jumps=own.ALWAYS)
 
 
 def of(case: Case) -> Mapping[str, Metric]:

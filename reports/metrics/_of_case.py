@@ -15,10 +15,15 @@ if TYPE_CHECKING:
 
 
 class OfCase:
-    """A metric that a case brings along."""
+    """A metric that a case brings along.
 
-    def __init__(self, own: CaseMetric) -> None:
-        self.own, self.UNIT, self.CLAIMED = own, own.unit, not own.always
+    Args:
+        own: the metric.
+        jumps: whether its signal jumps where lam does: releases, and changes from stick to slip, are matched too.
+    """
+
+    def __init__(self, own: CaseMetric, jumps: bool = False) -> None:
+        self.own, self.jumps, self.UNIT, self.CLAIMED = own, jumps, own.unit, not own.always
 
     def measure(self, truth: Truth, run: Trajectory, case: Case) -> float | None:
         """Return the number, or None where the run cannot tell."""
@@ -26,8 +31,12 @@ class OfCase:
         if own.number is not None:
             return own.number(run, case)
         if own.signal is not None:
-            inside, exact = aligned(truth, run)
-            return float(np.max(np.abs(own.signal(run, case)[inside] - own.signal(exact, case)), initial=0.0))
+            values = own.signal(run, case)
+            if values is None:
+                return None
+            inside, exact = aligned(truth, run, releases=self.jumps)
+            theirs = own.signal(exact, case)
+            return None if theirs is None else float(np.max(np.abs(values[inside] - theirs), initial=0.0))
         assert own.instants is not None
         expected, found = own.instants(truth.trajectory, case), own.instants(run, case)
         if len(expected) == 0 or len(expected) != len(found):

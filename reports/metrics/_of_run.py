@@ -13,6 +13,8 @@ UNITS = {
     "final_gap": "m", "final_lam": "N", "separation_gap": "m",
 }  # fmt: skip
 """Of those that are no counts and no ratios."""
+KINDS: dict[str, str] = {}
+ALWAYS = False
 
 
 def bounces(run: Trajectory, case: Case) -> float | None:

@@ -5,7 +5,8 @@ The residual of the law (docs/explanation, contact law), recomputed by us from q
     (H M^-1 H^T) lam = -(H M^-1 f + H'v + a1 h' + a0 h + a2 h^3)
 
 on the rows that the run has closed, with b0 and b1 where they are in COLLISION; of rows that depend on each other the
-part that exerts a force. It tells an engine that follows another law from one that follows this one.
+part that exerts a force. Friction that slides is -mu lam_n s, s along the slip. It tells an engine that follows another
+law from one that follows this one.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.equations import equations, finite, spread
+from crossbody.reports.measuring.friction import off_slip
 from crossbody.reports.measuring.multipliers import told
 
 if TYPE_CHECKING:
@@ -45,6 +47,7 @@ def multipliers(
     rows: NDArray[np.intp],
     fast: NDArray[np.bool_],
     inputs: Inputs | None = None,
+    pushed: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
     """Multipliers that the law asks for with some rows active, and what makes of any the part that exerts a force.
 
@@ -57,6 +60,7 @@ def multipliers(
         rows: active ones (m,).
         fast: which of all rows are in COLLISION.
         inputs: those that act; the case's if not given.
+        pushed: further generalised forces (n,), of rows that slide.
 
     Returns:
         lam (m,), and a projection (m, m).
@@ -67,8 +71,8 @@ def multipliers(
     law = case.law
     a0, a1 = (np.where(fast, b, a)[rows] for a, b in ((law.a0, law.b0), (law.a1, law.b1)))
     a2 = np.where(fast, 0.0, law.a2)[rows]
-    wanted = Hdv + a1 * (H @ v) + a0 * h + a2 * h**3
-    inverse = np.linalg.solve(M, np.column_stack([f[:, None], H.T]))
+    wanted = Hdv + a1 * (H @ v - np.asarray(system.drift)[rows]) + a0 * h + a2 * h**3
+    inverse = np.linalg.solve(M, np.column_stack([(f + pushed)[:, None], H.T]))
     G = H @ inverse[:, 1:]
     size = np.sqrt(np.diag(G))
     size[size == 0.0] = 1.0
@@ -83,11 +87,12 @@ def multipliers(
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples; NaN where lam is not known.
 
-    None where nothing closes, where contacts have friction, and where a controller or discrete variables act that
-    a row of the run does not show.
+    Where contacts slide the law of the other rows is asked for with the friction that the run has, and friction for
+    what it is by the slip. None where nothing closes, and where a controller or discrete variables act that a row of
+    the run does not show.
     """
     system = equations(case)
-    if system is None or (system.control is not None and run.inputs is None) or system.jumps or system.frictional:
+    if system is None or (system.control is not None and run.inputs is None) or system.jumps:
         return None
     known = told(run)
     if known is None or not finite(run):
@@ -99,11 +104,13 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         inputs = system.activations.extended(inputs)
     if inputs is not None:  # where they jump, a sample does not say on which side it stands
         looked &= ~np.isin(run.t, inputs.times)
-    worst, scale = 0.0, 0.0
+    worst, scale = off_slip(run, case), 0.0
+    slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
     for i in spread(run, looked):
-        rows = np.flatnonzero(closed[i])
+        rows = np.flatnonzero(closed[i] & ~slides[i])
         fast = run.mode[i] == Mode.COLLISION
-        lam, moving = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, fast, inputs)
+        pushed = system.constraint(run.q[i])[0][slides[i]].T @ run.lam[i, slides[i]] if slides[i].any() else 0.0
+        lam, moving = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, fast, inputs, pushed)
         worst = max(worst, float(np.max(np.abs(moving @ (run.lam[i, rows] - lam)))))
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / scale if scale else None

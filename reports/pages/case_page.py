@@ -11,7 +11,8 @@ from typing import Any
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.figures.styles import label, style
-from crossbody.reports.judging.verdict import Word
+from crossbody.reports.judging.told import share
+from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import suits
 from crossbody.reports.pages.html import Page
@@ -23,14 +24,14 @@ from crossbody.reports.runs.store import Trace
 PLOTTED = 900_000
 """Room for all plots of a page, bytes; the samples of each line follow from it."""
 RUNS = columns(
-    who="Engine", outcome="Outcome", steps=("Steps [1]", Kind.NUMBER), events=("Transitions [1]", Kind.NUMBER),
+    who="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
     wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
-    samples=("Samples stored [1]", Kind.NUMBER),
+    samples=("Samples stored", Kind.NUMBER),
     settings=("Settings", Kind.LONG),
 )  # fmt: skip
 AUDIT = columns(
     who="Engine", quantity="Quantity", reference="Reference", value="Engine's",
-    difference=("Difference [1]", Kind.NUMBER), tolerance=("Allowed [1]", Kind.NUMBER),
+    difference=("Difference", Kind.NUMBER), tolerance=("Allowed", Kind.NUMBER),
     verdict=("Same", Kind.VERDICT),
 )  # fmt: skip
 AUDIT_TEXT = (
@@ -85,12 +86,12 @@ def _glance(found: Results, case: CaseFiles) -> Section:
 
 def studied(out: Path, about: Mapping[str, Any]) -> list[Section]:
     """What studies in the same folder drew of this case."""
-    mine = [name for name in sections.names() if about.get("case") in getattr(sections.load(name), "CASES", ())]
+    mine = [name for name in sections.names(out) if about.get("case") in getattr(sections.load(name), "CASES", ())]
     return [replace(section, tables=()) for name in mine for section in sections.shown(name, out)]
 
 
 def _verdicts(found: Results, case: CaseFiles) -> Section:
-    rows = found.rows.get(case.label, [])
+    rows = sorted(found.rows.get(case.label, []), key=_far)
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
@@ -99,6 +100,12 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
         },
     )  # fmt: skip
+
+
+def _far(row: Row) -> tuple[int, float]:
+    """The worst word first, and of one word what is farthest out."""
+    word = row["verdict"]
+    return (grid.WORST.index(word), -share(row)) if word in grid.WORST else (len(grid.WORST), 0.0)
 
 
 def _plots(traces: Sequence[Trace]) -> list[Section]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-import pandas as pd
+from crossbody.reports.figures.section import Kind, Section, Table, columns
+from crossbody.reports.judging.verdict import Row
 
-from crossbody.reports.figures.section import Kind, Section, Table, columns, records
-
-KEY = ["case", "variant", "engine", "profile", "metric"]
+KEY = ("case", "variant", "engine", "profile", "metric")
 MOVED = 0.1
 """Share of its limit by which a value must move to be listed."""
 WORDS = columns(
@@ -18,11 +19,11 @@ WORDS = columns(
 )  # fmt: skip
 VALUES = columns(
     label="Case", who="Engine", metric="Metric", value_before=("Before", Kind.NUMBER), value=("Now", Kind.NUMBER),
-    limit=("Limit", Kind.NUMBER), unit="Unit", moved=("Moved by, of the limit [1]", Kind.NUMBER),
+    limit=("Limit", Kind.NUMBER), unit="Unit", moved=("Moved by, of the limit", Kind.NUMBER),
 )  # fmt: skip
 
 
-def changes(now: pd.DataFrame, before: pd.DataFrame, name: str) -> Section:
+def changes(now: Sequence[Row], before: Sequence[Row], name: str) -> Section:
     """The section that says what changed since an earlier run.
 
     Args:
@@ -30,28 +31,39 @@ def changes(now: pd.DataFrame, before: pd.DataFrame, name: str) -> Section:
         before: the earlier ones.
         name: folder of the earlier run.
     """
-    both = now.merge(before, on=KEY, how="outer", suffixes=("", "_before"), indicator=True)
-    kept = both[both["_merge"] == "both"]
-    words = kept[kept["verdict"] != kept["verdict_before"]]
-    moved = moves(kept[kept["verdict"] == kept["verdict_before"]])
-    new, gone = (int((both["_merge"] == side).sum()) for side in ("left_only", "right_only"))
+    known, here = _by_key(before), _by_key(now)
+    kept = [
+        row | {f"{field}_before": known[key][field] for field in ("verdict", "value")}
+        for key, row in here.items()
+        if key in known
+    ]
+    words = [row for row in kept if row["verdict"] != row["verdict_before"]]
+    moved = moves(row for row in kept if row["verdict"] == row["verdict_before"])
     text = (
         f"Against {name}: {len(words)} of {len(kept)} verdicts changed, {len(moved)} values moved by more than "
-        f"{MOVED:.0%} of their limit, {new} rows are new, {gone} are gone."
+        f"{MOVED:.0%} of their limit, {len(here.keys() - known)} rows are new, {len(known.keys() - here)} are gone."
     )
     tables = (
-        Table(title="Verdicts that changed", columns=WORDS, rows=_rows(words)),
-        Table(title="Values that moved", columns=VALUES, rows=_rows(moved)),
+        Table(title="Verdicts that changed", columns=WORDS, rows=words),
+        Table(title="Values that moved", columns=VALUES, rows=moved),
     )
     return Section(name="changes", title="What changed", text=text, tables=[t for t in tables if t.rows])
 
 
-def moves(rows: pd.DataFrame) -> pd.DataFrame:
+def _by_key(rows: Sequence[Row]) -> dict[tuple[str, ...], Row]:
+    return {tuple(row[name] for name in KEY): row for row in rows}
+
+
+def moves(rows: Iterator[Row]) -> list[dict[str, Any]]:
     """Rows whose value moved by more than `MOVED` of their limit, the largest first."""
-    apart = (rows["value"].astype(float) - rows["value_before"].astype(float)).abs()
-    share = apart / rows["limit"].astype(float)
-    return rows.assign(moved=share)[share > MOVED].sort_values("moved", ascending=False)
+    found = [row | {"moved": _share(row)} for row in rows]
+    return sorted((row for row in found if row["moved"] > MOVED), key=lambda row: -row["moved"])
 
 
-def _rows(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    return records(rows.drop(columns=["_merge"], errors="ignore"))
+def _share(row: Row) -> float:
+    """By how much of its limit a value moved; infinite where the limit is 0, nothing where there is no number."""
+    value, before, limit = (row[name] for name in ("value", "value_before", "limit"))
+    if value is None or before is None or limit is None:
+        return 0.0
+    apart = abs(value - before)
+    return apart / limit if limit else math.inf if apart else 0.0

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.verdict import Word
+from crossbody.reports.judging.told import share
+from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages.html import bounded, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
@@ -29,10 +31,6 @@ KEY = (
 """Metrics that stand first in the table of a case."""
 
 
-Row = Mapping[str, Any]
-"""A verdict as a plain row, with `who` (engine:profile)."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
     """One engine in one line.
@@ -42,6 +40,7 @@ class Cell:
         word: verdict, "plain" for a number that is not judged; empty where there is nothing.
         text, small: shown, and below it.
         page, anchor: where it leads: the verdicts of a page, "engine" or "engine~metric".
+        heat: decades from a limit, 0 (nearest) to 6; -1 where there is none.
     """
 
     title: str
@@ -50,16 +49,21 @@ class Cell:
     small: str = ""
     page: str = ""
     anchor: str = ""
+    heat: int = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One line: its name, what stands beside it, the page that it leads to, and a cell for every engine."""
+    """One line: its name, what stands beside it, the page that it leads to, a cell for every engine, and a sketch.
+
+    The sketch is a line of points in a box of 100 by 20, as SVG writes them.
+    """
 
     text: str
     cells: Sequence[Cell]
     small: str = ""
     page: str = ""
+    sketch: str = ""
 
 
 def heads(engines: Sequence[str]) -> list[dict[str, Any]]:
@@ -106,7 +110,17 @@ def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | No
     said = "; ".join(dict.fromkeys(row["why"] for row in rows if row["verdict"] == word and row["why"]))
     title = f"{who} on {label}: {text} {word}. {said[:300]}".strip()
     small = " · ".join(part for part in parts if part)
-    return Cell(title=title, word=word, text=text, small=small, page=page, anchor=who)
+    heat = max((heat_of(row) for row in rows if row["verdict"] == word), default=-1)
+    return Cell(title=title, word=word, text=text, small=small, page=page, anchor=who, heat=heat)
+
+
+def heat_of(row: Row) -> int:
+    """How many decades a judged number is from its limit, as a step of its colour; within, less is more."""
+    if row["verdict"] not in WORST:
+        return -1
+    times = share(row)
+    decades = math.log10(times) if 0.0 < times < math.inf else -math.inf if times == 0.0 else math.inf
+    return int(min(max(decades + 6.0 if row["verdict"] == Word.WITHIN else decades, 0.0), 6.0))
 
 
 def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, float]) -> list[Line]:
@@ -137,12 +151,17 @@ def _cost(wall: float | None, least: float) -> Cell:
 
 def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
     judged = [row for row in rows if row["verdict"] in WORST]
+    far: dict[str, float] = {}
+    for row in judged:
+        far[row["metric"]] = max(far.get(row["metric"], 0.0), share(row))
+    far |= {name: far.get("position", 0.0) for name in SHARES}
     judged += [row for row in rows if judged and row["metric"] in SHARES]
-    units = {row["metric"]: row["unit"] for row in judged or rows}
-    order = sorted(units, key=lambda name: KEY.index(name) if name in KEY else len(KEY))
+    units = {row["metric"]: f"[{row['unit']}]" if row["unit"] not in ("", "1") else "" for row in judged or rows}
+    first = [name for name in KEY if name in units]
+    order = sorted(units, key=lambda name: (-far.get(name, 0.0), first.index(name) if name in first else len(first)))
     values = {who: {row["metric"]: row for row in mine[who]} for who in engines}
     return [
-        Line(text=name, small=f"[{units[name]}]", cells=[_value(values[who].get(name), page) for who in engines])
+        Line(text=name, small=units[name], cells=[_value(values[who].get(name), page) for who in engines])
         for name in order
     ]
 
@@ -153,9 +172,11 @@ def _value(row: Row | None, page: str) -> Cell:
     limit = row["limit"]
     allowed = f", limit {number(limit)}" if limit is not None and limit == limit else ""
     below, value = bounded(row["value"], row["known"])
-    title = f"{row['who']}, {row['metric']}: {below}{number(value)} {row['unit']}{allowed}. {row['why']}"
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    title = f"{row['who']}, {row['metric']}: {below}{number(value)}{unit}{allowed}. {row['why']}"
     anchor = f"{row['who']}~{row['metric']}"
-    return Cell(title=title, word=row["verdict"], text=below + short(value), page=page, anchor=anchor)
+    text = below + short(value)
+    return Cell(title=title, word=row["verdict"], text=text, page=page, anchor=anchor, heat=heat_of(row))
 
 
 def short(value: float | None) -> str:

@@ -15,7 +15,6 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from crossbody.reports.figures.section import Figure, Kind, Section
 
@@ -85,7 +84,7 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
         inside = f"#{page}--{anchor}" if anchor else f"#{page}"
         return inside if single else f"{page}.html{inside if anchor else ''}"
 
-    inline = {"style": _text("page.css"), "script": _script(), "plotly": get_plotlyjs()} if single else {}
+    inline = {"style": _text("page.css"), "script": _script(), "plotly": _plotly()} if single else {}
     inline = {key: text.replace("</script", "<\\/script") for key, text in inline.items()}
     scripts = [THEME, *(inline[key] for key in ("script", "plotly") if single)]
     template = environment().get_template("page.html")
@@ -121,7 +120,7 @@ def policy(scripts: Sequence[str], single: bool) -> str:
 def assets(pages_drawn: bool) -> dict[str, str]:
     """The files that all pages of a folder share, by name."""
     shared = {SCRIPT: _script(), STYLE: _text("page.css")}
-    return shared | ({PLOTLY: get_plotlyjs()} if pages_drawn else {})
+    return shared | ({PLOTLY: _plotly()} if pages_drawn else {})
 
 
 def _drawn(page: Page) -> bool:
@@ -130,6 +129,13 @@ def _drawn(page: Page) -> bool:
 
 def _text(name: str) -> str:
     return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+@cache
+def _plotly() -> str:
+    from plotly.offline import get_plotlyjs
+
+    return str(get_plotlyjs())
 
 
 @cache

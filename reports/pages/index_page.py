@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+import numpy as np
+
 from crossbody.reports.figures.section import Section
+from crossbody.reports.judging.told import WRONG, runs_of, sentence, share
 from crossbody.reports.judging.verdict import Word
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
 from crossbody.reports.pages.changes import changes
 from crossbody.reports.pages.html import Page
+from crossbody.reports.pages.known import deviations
+from crossbody.reports.pages.precision import overview
 from crossbody.reports.pages.results import CaseFiles, Results
 from crossbody.reports.pages.summary import engines
+from crossbody.reports.runs.store import load
+from crossbody.reports.runs.thin import keep
 
 SHOWN = 100
 """Cases on one page of the index."""
+SKETCHED = 80
+"""Points of a sketch of a motion."""
 
 
 def index_pages(found: Results) -> list[Page]:
@@ -27,7 +38,7 @@ def index_pages(found: Results) -> list[Page]:
     return [
         Page(
             name=name, title="crossbody" if i == 0 else f"crossbody, cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
-            lead="Which engine to trust for which case, and at what cost." if found.cases else "",
+            lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip
@@ -39,7 +50,8 @@ def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], 
         return shown
     first = [replace(engines(found), template="tiles.html", context=_tiles(found))] if cases else []
     changed = [] if found.base is None else [changes(found.verdicts, found.base, found.base_name)]
-    return [*first, *changed, *shown, provenance(found.told)]
+    known = deviations(found.verdicts)
+    return [*overview(found), *changed, *shown, *first, *known, provenance(found.told)]
 
 
 def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> Section:
@@ -60,18 +72,41 @@ def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
     cells = [
         grid.whole(case.label, case.page, who, mine.get(who, ()), found.walls.get((case.label, who))) for who in shown
     ]
-    return grid.Line(text=case.label, page=case.page, cells=cells)
+    return grid.Line(text=case.label, page=case.page, cells=cells, small=_worst(found, case), sketch=_sketch(case))
+
+
+def _worst(found: Results, case: CaseFiles) -> str:
+    """What is outside the farthest, in a few words."""
+    wrong = [row for row in found.rows.get(case.label, ()) if row["verdict"] in WRONG]
+    if not wrong:
+        return ""
+    row = max(wrong, key=share)
+    return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}"
+
+
+def _sketch(case: CaseFiles) -> str:
+    """The first coordinate of the truth over time, of a motion that is there."""
+    if not case.paths or case.about.get("engine") != TRUTH:
+        return ""
+    run = load(case.paths[0]).run
+    if len(run.t) < 2 or not run.q.shape[1] or not np.isfinite(run.q[:, 0]).all():
+        return ""
+    at = keep(run.t, run.q[:, 0], np.zeros(0), SKETCHED)
+    t, q = run.t[at], run.q[at, 0]
+    low, high = float(q.min()), float(q.max())
+    x = 100.0 * (t - t[0]) / max(t[-1] - t[0], 1e-300)
+    y = 19.0 - 18.0 * (q - low) / (high - low) if high > low else np.full(len(q), 10.0)
+    return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
 
 
 def _tiles(found: Results) -> dict[str, Any]:
     """Counts of all verdicts, and sentences of warning."""
-    counts = found.verdicts["verdict"].value_counts()
-    words = {word: int(counts.get(word, 0)) for word in (*reversed(grid.WORST), Word.SKIPPED.value)}
-    audits = found.verdicts[found.verdicts["metric"] == "audit"]["verdict"]
-    failed = int((audits == Word.OUTSIDE.value).sum())
+    counts = Counter(row["verdict"] for row in found.verdicts)
+    words = {word: counts[word] for word in (*reversed(grid.WORST), Word.SKIPPED.value)}
+    failed = sum(row["metric"] == "audit" and row["verdict"] == Word.OUTSIDE for row in found.verdicts)
     tiles = [
         {"value": len(found.cases), "title": "cases", "word": ""},
-        {"value": found.verdicts["who"].nunique(), "title": "engines with profile", "word": ""},
+        {"value": len({row["who"] for row in found.verdicts}), "title": "engines with profile", "word": ""},
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if failed:

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from crossbody.reports.figures.section import Figure, Plot, Section
 from crossbody.reports.figures.styles import COLOURS
+from crossbody.reports.pages.results import Results
 from crossbody.reports.pages.sheet import plain
 from crossbody.reports.runs.study import read_json
 
@@ -20,6 +19,10 @@ RUNS = (
     "Each engine once, at its own setting: lower left is better. An engine without a position to compare is not shown, "
     "one that is not finite is a cross at the right edge. Whole lines over ladders of tolerances and steps: "
     "crossbody bench, then crossbody report --with."
+)
+ALL = (
+    "Every engine on every case, each at its own setting: lower left is better. A click on a name of the legend hides "
+    "that engine, a double click shows it alone."
 )
 LADDERS = (
     "A line an engine, a point for every tolerance or step: lower left is better. Choose an error, then go up: the "
@@ -37,10 +40,12 @@ def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: M
         walls: run time of each engine, s.
     """
     ladders = _ladders(out, label)
-    if ladders is not None:
+    if ladders:
+        import pandas as pd
+
         from crossbody.reports.bench.figure import work_precision
 
-        return [_section(work_precision(ladders), LADDERS)]
+        return [_section(work_precision(pd.DataFrame(ladders)), LADDERS)]
     points = [
         (row["who"], float(row["value"]), 1e3 * walls[row["who"]]) for row in rows
         if row["metric"] == "position" and row["value"] is not None and walls.get(row["who"])
@@ -48,17 +53,55 @@ def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: M
     return [_section(scatter(points), RUNS)] if points else []
 
 
+def overview(found: Results) -> list[Section]:
+    """The section of the index: every engine on every case, if there is anything to show."""
+    points: dict[str, list[tuple[str, float, float]]] = {}
+    for label, rows in found.rows.items():
+        for row in rows:
+            wall = found.walls.get((label, row["who"]))
+            if row["metric"] == "position" and row["value"] is not None and wall:
+                points.setdefault(row["who"], []).append((label, max(row["value"], FLOOR), 1e3 * wall))
+    if not points:
+        return []
+    if len(found.rows) == 1:
+        return [_section(scatter([(who, error, ms) for who, ((_, error, ms),) in points.items()]), RUNS)]
+    return [_section(cloud(points), ALL)]
+
+
+def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
+    """One mark a case, a colour and a symbol an engine.
+
+    Args:
+        points: engine -> case, error of position (relative), run time in ms.
+    """
+    data = [
+        {
+            "type": "scatter", "mode": "markers", "x": [error for _, error, _ in mine], "y": [ms for *_, ms in mine],
+            "name": plain(who), "meta": who, "text": [plain(label) for label, *_ in mine],
+            "hovertemplate": "%{text}<br>error %{x:.2g}, %{y:.3g} ms<extra>" + plain(who) + "</extra>",
+            "marker": {"size": 9, "color": COLOURS[i % len(COLOURS)], "symbol": SYMBOLS[i % len(SYMBOLS)],
+                       "opacity": 0.8},
+        }
+        for i, (who, mine) in enumerate(points.items(), start=1)
+    ]  # fmt: skip
+    every = [one for mine in points.values() for one in mine]
+    layout = {
+        "title": {"text": "Run time against error of position, a mark a case"}, "height": 460, "showlegend": True,
+        "xaxis": _decades("relative error of position", [error for _, error, _ in every]),
+        "yaxis": _decades("run time [ms]", [ms for *_, ms in every]),
+    }  # fmt: skip
+    return {"data": data, "layout": layout}
+
+
 def _section(figure: Figure, text: str) -> Section:
     plots = (Plot(name="plot-precision", figure=figure),)
     return Section(name="precision", title="Run time against error", text=text, plots=plots)
 
 
-def _ladders(out: Path, label: str) -> pd.DataFrame | None:
+def _ladders(out: Path, label: str) -> list[dict[str, Any]]:
     if not (out / "bench.json").is_file():
-        return None
-    rows = pd.DataFrame(read_json(out / "bench.json")["rows"])
-    mine = rows[rows["case"] == label] if len(rows) else rows
-    return mine if len(mine) else None
+        return []
+    return [row for row in read_json(out / "bench.json")["rows"] if row["case"] == label]
 
 
 def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
@@ -81,7 +124,7 @@ def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
     ]  # fmt: skip
     layout = {
         "title": {"text": "Run time against error of position"}, "height": 420, "showlegend": False,
-        "xaxis": _decades("relative error of position [1]", [max(error, FLOOR) for error in finite]),
+        "xaxis": _decades("relative error of position", [max(error, FLOOR) for error in finite]),
         "yaxis": _decades("run time [ms]", [ms for _, _, ms in points]),
     }  # fmt: skip
     return {"data": data, "layout": layout}

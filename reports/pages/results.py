@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from pyarrow import ArrowException
 
 from crossbody.cases import OutputError
-from crossbody.reports.figures.section import records
-from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.judging.verdict import COLUMNS, Row, Word
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.runs.files import listed
 from crossbody.reports.runs.output import is_staged, recover
 from crossbody.reports.runs.store import Trace, load, peek
 from crossbody.reports.runs.study import check_fields, read_json
 
-COLUMNS = tuple(Verdict.__dataclass_fields__)
 NUMBER = (int, float, type(None))
-NUMBERS = ("value", "expected", "limit", "compared", "band", "known")
-JUDGED = {name: NUMBER if name in NUMBERS else (str,) for name in COLUMNS}
+JUDGED = {name: NUMBER if kind is float else (str,) for name, kind in COLUMNS.items()}
 AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
 Times = dict[tuple[str, str], tuple[float, float | None]]
 """(case:variant, engine:profile) -> run time, and what it took in all where that is told, s."""
@@ -65,13 +61,13 @@ class Results:
     """
 
     out: Path
-    verdicts: pd.DataFrame
+    verdicts: Sequence[Row]
     rows: Mapping[str, list[dict[str, Any]]]
     audits: Mapping[str, list[dict[str, Any]]]
     told: Mapping[str, Any]
     cases: tuple[CaseFiles, ...]
     walls: Mapping[tuple[str, str], float]
-    base: pd.DataFrame | None = None
+    base: Sequence[Row] | None = None
     base_name: str = ""
 
     @property
@@ -97,21 +93,21 @@ def read(out: Path, against: Path | None = None) -> Results:
     cases, times = _cases(out, verdicts)
     base = None if against is None else verdicts_of(against)
     return Results(
-        out=out, verdicts=verdicts, rows=_by(records(verdicts), "label"), audits=audits, told=told,
+        out=out, verdicts=verdicts, rows=_by(verdicts, "label"), audits=audits, told=told,
         cases=cases, walls={one: wall for one, (wall, _) in times.items()}, base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
 
 
-def _by(rows: Iterable[dict[str, Any]], key: str) -> dict[str, list[dict[str, Any]]]:
-    """Rows by the value of one column: pandas would look through all of them for every case."""
-    found: dict[str, list[dict[str, Any]]] = {}
+def _by(rows: Iterable[Row], key: str) -> dict[str, list[Row]]:
+    """Rows by the value of one column."""
+    found: dict[str, list[Row]] = {}
     for row in rows:
         found.setdefault(row[key], []).append(row)
     return found
 
 
-def verdicts_of(out: Path) -> pd.DataFrame:
+def verdicts_of(out: Path) -> list[Row]:
     """Verdicts of a folder, with the case's label and the engine's as columns of their own.
 
     Raises:
@@ -120,20 +116,20 @@ def verdicts_of(out: Path) -> pd.DataFrame:
     if out.is_dir() and not is_staged(out):
         recover(out)
     table = read_json(out / "verdicts.json")
-    rows = pd.DataFrame(table["rows"])
-    if rows.empty:
-        return pd.DataFrame(columns=[*COLUMNS, "label", "who"])
-    if lacking := [name for name in COLUMNS if name not in rows]:
+    rows: list[Row] = table["rows"]
+    if lacking := [name for name in COLUMNS if any(name not in row for row in rows)]:
         versions = table.get("provenance", {}).get("versions", {})
         by = versions.get("crossbody", "another version") if isinstance(versions, dict) else "another version"
         raise OutputError(
             f"{out} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; run the cases again."
         )
-    check_fields(out / "verdicts.json", table["rows"], JUDGED)
-    return rows.assign(label=rows["case"] + ":" + rows["variant"], who=rows["engine"] + ":" + rows["profile"])
+    check_fields(out / "verdicts.json", rows, JUDGED)
+    return [
+        row | {"label": f"{row['case']}:{row['variant']}", "who": f"{row['engine']}:{row['profile']}"} for row in rows
+    ]
 
 
-def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], Times]:
+def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], Times]:
     """Every case that has a verdict or a motion, and the run times with what each engine took in all."""
     paths: dict[str, list[Path]] = {}
     abouts: dict[str, Mapping[str, Any]] = {}
@@ -152,7 +148,7 @@ def _cases(out: Path, verdicts: pd.DataFrame) -> tuple[tuple[CaseFiles, ...], Ti
         paths.setdefault(label, []).append(path)
         abouts.setdefault(label, about)
         times[label, who] = told["wall_s"], about.get("took_s")
-    labels = dict.fromkeys([*verdicts["label"], *paths])
+    labels = dict.fromkeys([*(row["label"] for row in verdicts), *paths])
     wanted = _wanted(verdicts)
     found = tuple(
         CaseFiles(
@@ -169,10 +165,10 @@ def times_of(out: Path) -> Times:
     return _cases(out, verdicts_of(out))[1]
 
 
-def _wanted(verdicts: pd.DataFrame) -> dict[str, list[str]]:
+def _wanted(verdicts: Sequence[Row]) -> dict[str, list[str]]:
     """Engines whose motion should be there, by case."""
-    ran = verdicts[verdicts["verdict"] != Word.SKIPPED.value].drop_duplicates(["label", "who"])
-    return {str(label): list(group["who"]) for label, group in ran.groupby("label", sort=False)}
+    ran = _by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
+    return {label: list(dict.fromkeys(row["who"] for row in rows)) for label, rows in ran.items()}
 
 
 def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:

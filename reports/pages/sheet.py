@@ -18,8 +18,9 @@ FINE = 2e-5
 """Distance of samples over the horizon below which times are written in double precision."""
 EVENTS, SHARE = 40, 0.4
 """Events around which all samples stay, the first of them where there are very many, and their share of a line."""
-TOP, BOTTOM, PLOT, CLOSE, APART = 34, 50, 128, 16, 46
-"""Above and below the plots of a figure, a plot, between plots of one group, between groups (with times), pixels."""
+TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46
+"""Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one group, between groups
+(with times), pixels."""
 
 
 class Sheet:
@@ -75,17 +76,18 @@ class Sheet:
         """Axes of the plots that are drawn, and the height of the figure, pixels."""
         last = [i + 1 == len(drawn) or row // self.group != drawn[i + 1] // self.group for i, row in enumerate(drawn)]
         below = [APART if end else CLOSE for end in last[:-1]] + [0]
-        inside = PLOT * len(drawn) + sum(below)
+        heights = [TALL if row in self.decades else PLOT for row in drawn]
+        inside = sum(heights) + sum(below)
         axes: dict[str, Any] = {}
         top = 0
         for i, row in enumerate(drawn):
-            span = [1.0 - (top + PLOT) / inside, 1.0 - top / inside]
+            span = [1.0 - (top + heights[i]) / inside, 1.0 - top / inside]
             axes |= _pair(number(i + 1), self.rows[row], [max(span[0], 0.0), span[1]], last[i])
             if i + 1 == len(drawn):
                 axes[f"xaxis{number(i + 1)}"]["title"] = {"text": "time [s]"}
             if row in self.decades:
-                axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 5, "exponentformat": "power"}
-            top += PLOT + below[i]
+                axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 9, "exponentformat": "power"}
+            top += heights[i] + below[i]
         return axes, TOP + inside + BOTTOM
 
 

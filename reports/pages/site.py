@@ -138,7 +138,7 @@ def _put(out: Path, files: dict[str, str]) -> None:
 
 
 def _studies(found: Results) -> Iterator[Page]:
-    for name in studies.names():
+    for name in studies.names(found.out):
         if shown := studies.shown(name, found.out):
             yield Page(name=name, title=studies.load(name).TITLE, sections=[*shown, *_origin(found, shown)])
 

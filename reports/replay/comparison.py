@@ -11,8 +11,7 @@ import pandas as pd
 
 from crossbody.cases import Limit
 from crossbody.hw import Comparison, Fit, Log, Prediction
-from crossbody.reports.judging.comparison import table
-from crossbody.reports.judging.verdict import Verdict, Word, limit_for
+from crossbody.reports.judging.verdict import COLUMNS, Verdict, Word, limit_for
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.replay import limits
 from crossbody.reports.runs.store import Trace, save
@@ -69,7 +68,7 @@ def verdicts(found: Comparison, command: str, given: Sequence[Limit] = (), fit: 
         row(engine, profile, metric="-", value=np.nan, unit="", verdict=Word.SKIPPED, why=why)
         for (engine, profile), why in found.skipped.items()
     ]
-    return table(rows)
+    return pd.DataFrame([row.row() for row in rows], columns=list(COLUMNS))
 
 
 def findings(found: Comparison) -> pd.DataFrame:

@@ -43,7 +43,7 @@ def correlation(rows: pd.DataFrame) -> go.Figure:
             )  # fmt: skip
         band = float(chosen["band"].iloc[0])
         figure.add_hrect(y0=-band, y1=band, fillcolor="#888888", opacity=0.25, line_width=0, row=place, col=1)
-        figure.update_yaxes(range=[-1.05, 1.05], title_text="[1]", row=place, col=1)
+        figure.update_yaxes(range=[-1.05, 1.05], row=place, col=1)
     figure.update_xaxes(title_text="lag [averages of residuals]", row=len(kinds), col=1)
     figure.update_layout(title_text="Correlation of the residuals; 99 % band in grey", height=130 + 150 * len(kinds))
     return figure

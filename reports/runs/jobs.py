@@ -22,6 +22,7 @@ from crossbody.cases import (
     UnknownName,
     Value,
 )
+from crossbody.cases.files.case import rubbing
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
@@ -37,7 +38,7 @@ LOOSER = 10.0
 MANY_STEPS, HALVINGS = 10_000, 5
 """A step is halved twice for its study, and up to five times while that takes no more steps; a run that has more by
 itself is studied at twice and four times its step."""
-_EXAMPLES = {"--set": "a1=0", "--setting": "dt=1e-4"}
+_EXAMPLES = {"--set": "a1=0", "--set-engine": "dt=1e-4"}
 TRUTHS = 3.0
 """A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
 ENOUGH = 2000
@@ -160,7 +161,8 @@ def run_case(
         wanted: on which engines.
         rtol: tolerance for the engines that have one.
         tell: is told what is being done.
-        settings: of the engines, by name; each takes those that it knows.
+        settings: of the engines, by name; each takes those that it knows, and of those behind its own name and a dot
+            ("mujoco.dt", "mujoco:matched.dt") all.
         truth: of the case, where it is known already.
         limit: time after which an engine that has not come back is ended with its process, s; from the command line.
         refine: whether the parts of errors are told even where no limit judges one.
@@ -181,6 +183,7 @@ def run_case(
     watch.limited(label, TRUTHS * limit)
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} cannot be had. {why}")
+    case = _with_friction(case) if truth is None else case
     truth = truth_of(case) if truth is None else truth
     if case.file and truth.trajectory.outcome is Outcome.INCONSISTENT:
         raise CaseUnsupported(f"{case.label}: {truth.trajectory.message}")
@@ -194,11 +197,23 @@ def run_case(
         watch.limited(label, limit)
         why = watch.lost(label)
         began = perf_counter()
-        entry = ended(case, pick, why) if why else _entry(case, pick, asked, reference, refine)
+        entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine)
         entries.append(replace(entry, took_s=perf_counter() - began))
     watch.unlimited()
     _check_known(settings or {}, entries)
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def _with_friction(case: Case) -> Case:
+    """Return a file's case with the friction of its contacts where its motion comes to one; else as it is.
+
+    Engines without friction run what never comes to any.
+    """
+    rubs = rubbing(case)
+    if rubs is None:
+        return case
+    run = engines.load("reference").prepare(case, "compiled").run()
+    return rubs if run.outcome is Outcome.INCONSISTENT else case
 
 
 def ended(case: Case, pick: Pick, why: str) -> Entry:
@@ -211,11 +226,37 @@ def ended(case: Case, pick: Pick, why: str) -> Entry:
     return Entry(engine=pick.engine, profile=pick.profile, run=run, settings={})
 
 
+def of_pick(settings: Mapping[str, Value], pick: Pick) -> dict[str, Value]:
+    """The settings that an engine is given: those of all, over them its own, over them its profile's."""
+    found = {name: value for name, value in settings.items() if "." not in name}
+    for who in (pick.engine, f"{pick.engine}:{pick.profile}"):
+        found |= {name.removeprefix(f"{who}."): value for name, value in settings.items() if name.startswith(f"{who}.")}
+    return found
+
+
 def _check_known(settings: Mapping[str, Value], entries: Sequence[Entry]) -> None:
-    ran = [entry.settings for entry in entries if entry.run is not None]
     for name in settings:
-        if ran and not any(name in known for known in ran):
-            raise UnknownName("setting of these engines", name, {key for known in ran for key in known})
+        who, _, key = name.rpartition(".")
+        meant = [one for one in entries if who in ("", one.engine, f"{one.engine}:{one.profile}")]
+        ran = [entry.settings for entry in meant if entry.run is not None]
+        if ran and not any(key in known for known in ran):
+            whose = who or "these engines"
+            raise UnknownName(f"setting of {whose}", key, {known for settings in ran for known in settings})
+
+
+def check_asked(settings: Mapping[str, Value], wanted: Sequence[Pick]) -> None:
+    """Check that the engines whose settings are given are run.
+
+    Raises:
+        UnknownName: for an engine that is not, or a profile that it does not have.
+    """
+    for who in {name.rpartition(".")[0] for name in settings} - {""}:
+        name, profile = parse_engine(who)
+        known = {pick.engine for pick in wanted}
+        if name not in known:
+            raise UnknownName("engine (of a setting)", name, known)
+        if profile is not None and profile not in engines.load(name).profiles:
+            raise UnknownName(f"profile of {name}", profile, engines.load(name).profiles)
 
 
 def _reference_audit(case: Case) -> Mapping[str, Any]:

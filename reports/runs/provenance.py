@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import subprocess
 import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -45,6 +47,17 @@ def provenance(command: str, **more: Any) -> dict[str, Any]:
         "plugins": installed.digests(),
         **more,
     }
+
+
+@cache
+def code() -> str:
+    """Digest of the sources that decide what comes out: of runs, and of how they are judged."""
+    found, reports = hashlib.sha256(), Path(__file__).parents[1]
+    for folder in ("../cases", "../engines", "../reference", "../hw", "judging", "metrics", "sweep"):
+        root = reports / folder
+        for path in sorted(root.rglob("*.py")):
+            found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    return found.hexdigest()[:16]
 
 
 def _versions() -> Mapping[str, str]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -17,52 +17,62 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import contacts
 from crossbody.cases.scene_plain import plain
-from crossbody.reports.judging.comparison import Entry, judged, table
-from crossbody.reports.judging.verdict import Verdict
+from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import TRUTH, Truth
 from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, save
 from crossbody.reports.runs.thin import keep
+from crossbody.reports.voice import finite
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CASE = "case.json"
-AUDIT = ["case", "engine", "profile", "quantity", "reference", "value", "difference", "tolerance", "same"]
+AUDIT = {
+    **dict.fromkeys(("case", "engine", "profile", "quantity", "reference", "value"), str), "difference": float,
+    "tolerance": float, "same": bool,
+}  # fmt: skip
+_ARROW = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
 
 
-def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> pd.DataFrame:
+def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> list[Row]:
     """Verdicts of all cases; `commands` names what reproduces each case (by its label)."""
-    return table(
-        row
+    return [
+        row.row()
         for result in results
         for row in judged(result.case, result.entries, result.truth, commands[result.case.label])
-    )
+    ]
 
 
-def write(out: Path, results: Sequence[CaseResult], rows: pd.DataFrame, provenance: Mapping[str, Any]) -> None:
+def write(out: Path, results: Sequence[CaseResult], rows: Sequence[Row], provenance: Mapping[str, Any]) -> None:
     """Write everything but the page into a folder."""
-    write_table(out / "verdicts", rows, provenance)
-    write_table(out / "audit", _audit(results), provenance)
-    (out / "provenance.json").write_text(json.dumps(provenance, indent=2, default=str), encoding="utf-8")
+    _write_judged(out, rows, _audit(results), provenance)
     _save_traces(out, [trace for result in results for trace in _traces(result)])
 
 
-def write_case(made: Path, result: CaseResult, command: str) -> pd.DataFrame:
+def _write_judged(out: Path, rows: Sequence[Row], audited: Sequence[Row], provenance: Mapping[str, Any]) -> None:
+    write_rows(out / "verdicts", rows, COLUMNS, provenance)
+    write_rows(out / "audit", audited, AUDIT, provenance)
+    (out / "provenance.json").write_text(json.dumps(provenance, indent=2, default=str), encoding="utf-8")
+
+
+def write_case(made: Path, result: CaseResult, command: str) -> list[Row]:
     """Write the verdicts, audit and motions of one case into a folder of their own; the verdicts."""
     judged = judge([result], {result.case.label: command})
-    told = {"verdicts": judged.to_dict(orient="records"), "audit": _audit([result]).to_dict(orient="records")}
+    told = {"verdicts": judged, "audit": _audit([result])}
     (made / CASE).write_text(json.dumps(told, default=_plain), encoding="utf-8")
     _save_traces(made, _traces(result))
     return judged
 
 
-def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) -> pd.DataFrame:
+def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) -> list[Row]:
     """Join the folders of `write_case` into one study, as `write` does of results in memory; its verdicts."""
     told = [_read_case(part) for part in parts]
-    rows = pd.DataFrame([row for one in told for row in one["verdicts"]], columns=list(Verdict.__dataclass_fields__))
-    write_table(out / "verdicts", rows, provenance)
-    write_table(out / "audit", pd.DataFrame([r for one in told for r in one["audit"]], columns=AUDIT), provenance)
-    (out / "provenance.json").write_text(json.dumps(provenance, indent=2, default=str), encoding="utf-8")
+    rows = [row for one in told for row in one["verdicts"]]
+    _write_judged(out, rows, [row for one in told for row in one["audit"]], provenance)
     (out / "traces").mkdir()
     traces = [part / "traces" / name for part in parts for name in files.listed(part, "traces")]
     for i, trace in enumerate(traces):
@@ -91,25 +101,41 @@ def _save_traces(out: Path, traces: Sequence[Trace]) -> None:
 
 def write_table(stem: Path, rows: pd.DataFrame, provenance: Mapping[str, Any]) -> None:
     """One table as Parquet (provenance in its metadata), CSV and JSON (provenance beside the rows)."""
+    rows.to_csv(stem.with_suffix(".csv"), index=False)
+    plain = json.loads(rows.to_json(orient="records", double_precision=15))
+    _write_both(stem, pa.Table.from_pandas(rows, preserve_index=False), plain, provenance)
+
+
+def write_rows(stem: Path, rows: Sequence[Row], kinds: Mapping[str, type], provenance: Mapping[str, Any]) -> None:
+    """The same of plain rows whose columns are known."""
+    plain = [{name: finite(row[name]) for name in kinds} for row in rows]
+    columns = {
+        name: pa.array([row[name] for row in rows], _ARROW[kind], from_pandas=True) for name, kind in kinds.items()
+    }
+    with stem.with_suffix(".csv").open("w", encoding="utf-8", newline="") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerow(kinds)
+        lines.writerows(["" if value != value else value for value in (row[name] for name in kinds)] for row in rows)
+    _write_both(stem, pa.table(columns), plain, provenance)
+
+
+def _write_both(stem: Path, arrow: pa.Table, plain: Sequence[Row], provenance: Mapping[str, Any]) -> None:
     told = json.dumps(provenance, default=str)
-    arrow = pa.Table.from_pandas(rows, preserve_index=False)
     metadata = {**(arrow.schema.metadata or {}), b"provenance": told.encode()}
     pq.write_table(arrow.replace_schema_metadata(metadata), stem.with_suffix(".parquet"))
-    rows.to_csv(stem.with_suffix(".csv"), index=False)
-    content = {"provenance": json.loads(told), "rows": json.loads(rows.to_json(orient="records", double_precision=15))}
+    content = {"provenance": json.loads(told), "rows": plain}
     stem.with_suffix(".json").write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
-def _audit(results: Sequence[CaseResult]) -> pd.DataFrame:
-    rows = [
+def _audit(results: Sequence[CaseResult]) -> list[Row]:
+    return [
         {
             "case": result.case.label, "engine": entry.engine, "profile": entry.profile, "quantity": row.quantity,
             "reference": row.theirs, "value": row.mine, "difference": row.difference, "tolerance": row.tolerance,
-            "same": row.ok,
+            "same": bool(row.ok),
         }
         for result in results for entry in result.entries for row in entry.audit
     ]  # fmt: skip
-    return pd.DataFrame(rows, columns=AUDIT)
 
 
 def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:

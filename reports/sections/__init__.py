@@ -35,9 +35,17 @@ class Study(Protocol):
 _REGISTRY = Registry("study", __name__)
 
 
-def names() -> tuple[str, ...]:
-    """Names of all studies; imports none of them."""
-    return _REGISTRY.names()
+def names(out: Path | None = None) -> tuple[str, ...]:
+    """Names of all studies; imports none of them.
+
+    Args:
+        out: leave out those of ours that have no table in this folder: its name begins with that of its study.
+    """
+    known = _REGISTRY.names()
+    if out is None:
+        return known
+    own = _REGISTRY.own()
+    return tuple(name for name in known if name not in own or any(out.glob(f"{name}*.json")))
 
 
 def load(name: str) -> Study:

@@ -22,13 +22,13 @@ COLUMNS = columns(
     observable=("Observable", Kind.NUMBER), growth=("Growth [1/s]", Kind.NUMBER),
 )  # fmt: skip
 ENGINES = columns(
-    place="Equilibrium", engine="Engine", way="Way", slope=("Slope [1]", Kind.NUMBER), poles=("Poles [1]", Kind.NUMBER),
-    unexplained=("Unexplained [1]", Kind.NUMBER), limit=("Limit [1]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
+    place="Equilibrium", engine="Engine", way="Way", slope=("Slope", Kind.NUMBER), poles=("Poles", Kind.NUMBER),
+    unexplained=("Unexplained", Kind.NUMBER), limit=("Limit", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
     why=("Why", Kind.LONG),
 )  # fmt: skip
 COEFFICIENTS = columns(
     place="Equilibrium", axis="Axis", **{"s^2": ("s^2 [1/s]", Kind.NUMBER), "s": ("s [1/s^2]", Kind.NUMBER)},
-    **{"1": ("1 [1/s^3]", Kind.NUMBER)}, coupling=("Coupling [1]", Kind.NUMBER),
+    **{"1": ("1 [1/s^3]", Kind.NUMBER)}, coupling=("Coupling", Kind.NUMBER),
 )  # fmt: skip
 LIMITS = columns(
     place="Equilibrium", parameter="Parameter", value=("Limit of stability", Kind.NUMBER), unstable="Unstable",

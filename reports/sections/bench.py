@@ -17,20 +17,20 @@ TEXT = (
     "that it builds."
 )
 ORDERS = columns(
-    case="Case", who="Engine", knob="Setting", order=("Observed order [1]", Kind.NUMBER),
-    promised=("Promised order [1]", Kind.NUMBER), says=("Says", Kind.LONG),
+    case="Case", who="Engine", knob="Setting", order=("Observed order", Kind.NUMBER),
+    promised=("Promised order", Kind.NUMBER), says=("Says", Kind.LONG),
 )  # fmt: skip
 TIMINGS = columns(
     case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER), against="Against the truth of",
-    tier="Tier", error=("Error [1]", Kind.NUMBER), error_q=("Position [1]", Kind.NUMBER),
-    error_v=("Velocity [1]", Kind.NUMBER), error_impulse=("Impulse [1]", Kind.NUMBER),
-    error_energy=("Energy [1]", Kind.NUMBER), error_times=("Event times [s]", Kind.NUMBER),
-    error_between=("Position on one grid [1]", Kind.NUMBER),
-    honesty=("Error over tolerance [1]", Kind.NUMBER), median_ms=("Median [ms]", Kind.NUMBER),
+    tier="Tier", error=("Error", Kind.NUMBER), error_q=("Position", Kind.NUMBER),
+    error_v=("Velocity", Kind.NUMBER), error_impulse=("Impulse", Kind.NUMBER),
+    error_energy=("Energy", Kind.NUMBER), error_times=("Event times [s]", Kind.NUMBER),
+    error_between=("Position on one grid", Kind.NUMBER),
+    honesty=("Error over tolerance", Kind.NUMBER), median_ms=("Median [ms]", Kind.NUMBER),
     iqr_ms=("IQR [ms]", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER),
     native_ms=("Its own loop [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
     interpreted=("Interpreted", Kind.LONG),
-    cores=("Cores [1]", Kind.NUMBER),
+    cores=("Cores", Kind.NUMBER),
     repeats=("Repeats", Kind.NUMBER), outcome="Outcome",
 )  # fmt: skip
 

@@ -17,8 +17,8 @@ TEXT = (
     "on an engine does. All values are ratios to what came in. A run that failed is a cross, never dropped."
 )
 COLUMNS = columns(
-    n=("Balls", Kind.NUMBER), who="Engine", machine="Law or rule", most=("Most energy created [1]", Kind.NUMBER),
-    at_s=("at s [1]", Kind.NUMBER), at_touch="Touching, nearest to", ideal_from=("Ideal from s [1]", Kind.NUMBER),
+    n=("Balls", Kind.NUMBER), who="Engine", machine="Law or rule", most=("Most energy created", Kind.NUMBER),
+    at_s=("at s", Kind.NUMBER), at_touch="Touching, nearest to", ideal_from=("Ideal from s", Kind.NUMBER),
     failed=("Failed", Kind.NUMBER), why=("Says", Kind.LONG),
 )  # fmt: skip
 

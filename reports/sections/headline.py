@@ -18,10 +18,10 @@ TEXT = (
     "steps natively, without record, events, and what of the law is Python."
 )
 COLUMNS = columns(
-    case="Case", who="Engine", tier="Tier", against="Against the truth of", best_error=("Best error [1]", Kind.NUMBER),
+    case="Case", who="Engine", tier="Tier", against="Against the truth of", best_error=("Best error", Kind.NUMBER),
     engine_ms=("Its run [ms]", Kind.NUMBER), reference_ms=("Reference [ms]", Kind.NUMBER),
-    ratio=("Ratio [1]", Kind.NUMBER), ratio_call=("Ratio of the Python calls [1]", Kind.NUMBER),
-    ratio_native=("Its own loop alone [1]", Kind.NUMBER), least_ratio=("Least ratio [1]", Kind.NUMBER),
+    ratio=("Ratio", Kind.NUMBER), ratio_call=("Ratio of the Python calls", Kind.NUMBER),
+    ratio_native=("Its own loop alone", Kind.NUMBER), least_ratio=("Least ratio", Kind.NUMBER),
     interpreted=("Interpreted in its run", Kind.LONG), ahead="Ahead at every error", says=("Says", Kind.LONG),
 )  # fmt: skip
 

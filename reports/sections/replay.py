@@ -20,7 +20,7 @@ METRICS = columns(
     expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER), verdict="Verdict",
 )  # fmt: skip
 FINDINGS = columns(
-    what="Check", channel="Channel", row=("Row [1]", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)
+    what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)
 )
 
 

@@ -31,7 +31,7 @@ def stress_map(cells: pd.DataFrame) -> go.Figure:
         row, column = i // 2 + 1, i % 2 + 1
         figure.add_trace(_field(group, i == 0), row=row, col=column)
         figure.add_trace(_failed(group), row=row, col=column)
-        figure.update_yaxes(type="log", title_text="rtol [1]" if knob == "rtol" else "dt [s]", row=row, col=column)
+        figure.update_yaxes(type="log", title_text="rtol" if knob == "rtol" else "dt [s]", row=row, col=column)
         figure.update_xaxes(type="log", title_text="a0 [1/s^2]", row=row, col=column)
     figure.update_xaxes(exponentformat="power")
     figure.update_yaxes(exponentformat="power", dtick=1)

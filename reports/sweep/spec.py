@@ -67,7 +67,7 @@ class Spec:
         for name, value in (self.parameters if parameters is None else parameters).items():
             words += ["--set", f"{name}={_text(value)}"]
         for name, value in settings.items():
-            words += ["--setting", f"{name}={_text(value)}"]
+            words += ["--set-engine", f"{name}={_text(value)}"]
         return shlex.join(words + installed.options())
 
 

@@ -7,7 +7,6 @@ import json
 import os
 import pickle
 from collections.abc import Mapping, Sequence
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,27 +14,15 @@ from typing import Any
 import pandas as pd
 from pyarrow import ArrowException
 
-from crossbody import cases, engines, hw, reference
 from crossbody.cases import OutputError, installed
-from crossbody.reports import judging, metrics, sweep
 from crossbody.reports.runs import files, manifest, output
+from crossbody.reports.runs.provenance import code
 from crossbody.reports.sweep.execute import COLUMNS, TIMES
 from crossbody.reports.sweep.spec import Spec
 
 STRESS = "stress"
 """The study's name; its parts and what says which sweep they are of are no tables, and stay when these are replaced."""
 SWEEP, PARTS = "sweep.json", "parts"
-
-
-@cache
-def code() -> str:
-    """Digest of the sources that decide what comes out: of runs, and of how they are judged."""
-    found = hashlib.sha256()
-    for package in (cases, engines, reference, hw, judging, metrics, sweep):
-        root = Path(next(iter(package.__path__)))
-        for path in sorted(root.rglob("*.py")):
-            found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
-    return found.hexdigest()[:16]
 
 
 def identity(specs: Sequence[Spec], chunk: int, about: Mapping[str, Any]) -> dict[str, Any]:

@@ -35,6 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     for option, text, word in (
         ("case", case, "CASE[:VARIANT]"),
         ("engine", engine, "E[:PROFILE]"),
+        ("audit", "a robot file that every engine's own reader is to read alike; repeatable", "FILE"),
     ):
         group.addoption(f"--crossbody-{option}", action="append", default=[], metavar=word, help=text)
         parser.addini(f"crossbody_{option}s", f"where --crossbody-{option} is not given: {text}", type="linelist")
@@ -62,8 +63,8 @@ def _plug(config: pytest.Config, given: Sequence[Path]) -> None:
         raise pytest.UsageError(str(error)) from None
 
 
-def _generates(config: pytest.Config) -> bool:
-    return bool(config.getoption("--crossbody-case") or config.getini("crossbody_cases"))
+def _generates(config: pytest.Config, what: str) -> bool:
+    return bool(config.getoption(f"--crossbody-{what}") or config.getini(f"crossbody_{what}s"))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -72,10 +73,15 @@ def pytest_make_collect_report(
 ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
     """Put the tests of the cases asked for behind those that pytest finds."""
     report = yield
-    if isinstance(collector, pytest.Session) and report.passed and _generates(collector.config):
-        from crossbody.reports.testing._items import Cases
+    if isinstance(collector, pytest.Session) and report.passed:
+        if _generates(collector.config, "case"):
+            from crossbody.reports.testing._items import Cases
 
-        report.result.append(Cases.from_parent(collector, name=MARKER, nodeid=MARKER))
+            report.result.append(Cases.from_parent(collector, name=MARKER, nodeid=MARKER))
+        if _generates(collector.config, "audit"):
+            from crossbody.reports.testing._audits import Audits
+
+            report.result.append(Audits.from_parent(collector, name=MARKER, nodeid=MARKER))
     return report
 
 

@@ -23,7 +23,8 @@ from places import helped
 
 from crossbody.reference import core, linear, systems
 from crossbody.reference._fingerprint import Unreadable, fingerprint
-from crossbody.reference.cache import embedding
+from crossbody.reference._parts import WholePasses
+from crossbody.reference.cache import Lean
 from crossbody.reference.core._struct import bundle_type
 from crossbody.reference.kernels import NAMES, helper
 
@@ -185,6 +186,10 @@ def test_what_numba_compiles_in_place_of_a_function_counts():
     assert fingerprint(made(1.0)) != fingerprint(made(2.0))
 
 
+def _anew(function: types.FunctionType) -> Lean:
+    return Lean(function, targetoptions={"nopython": True}, pipeline_class=WholePasses)
+
+
 def test_a_helper_that_was_compiled_before_its_constant_changed_has_no_key():
     scope: dict[str, object] = {"G": 1.0}
     exec("def helper(x):\n    return x * G\n", scope)
@@ -192,10 +197,10 @@ def test_a_helper_that_was_compiled_before_its_constant_changed_has_no_key():
     outer = _source("def f(x):\n    return inner(x)\n", inner=inner)
     fingerprint(outer)
     scope["G"] = 2.0
-    assert embedding(outer)(2.0) == 4.0
+    assert _anew(outer)(2.0) == 4.0
     fingerprint(outer)
     scope["G"] = 3.0
-    assert embedding(outer)(2.0) == 4.0  # numba has frozen it
+    assert _anew(outer)(2.0) == 4.0  # numba has frozen it
     with pytest.raises(Unreadable, match="before what it reads changed"):
         fingerprint(outer)
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from crossbody.reference import Options, System, ensemble, kernels, prepare
-from crossbody.reference._program import KEPT, entry, kept_with_kernels
 from crossbody.reference.systems import ball
 
 
@@ -43,26 +42,6 @@ def test_a_deleted_system_goes_with_its_kernels(how: str) -> None:
     left = _used(_system(0.1), how)
     gc.collect()
     assert not any(ref() for ref in left)
-
-
-def test_what_was_compiled_serves_every_system_of_the_same_kernels() -> None:
-    own = [tuple(_ball(dynamics).kernels.values()) for dynamics in [_system(0.5).dynamics] * 2]
-    assert entry(own[0]) is entry(own[1])
-    shipped = [tuple(_ball(ball.KERNELS["dynamics"]).kernels.values()) for _ in range(2)]
-    assert entry(shipped[0]) is entry(shipped[1])
-
-
-def _ball(dynamics: Any) -> System:
-    return System(n=1, parameters=[1.0, 9.81], a0=[1e4], a1=20.0, **ball.KERNELS | {"dynamics": dynamics})
-
-
-def test_one_kernel_in_many_systems_keeps_a_few() -> None:
-    shared = _system(0.0).dynamics
-    built = kept_with_kernels(lambda functions: functions)
-    others = [object() for _ in range(KEPT + 3)]
-    for other in others:
-        built((shared, other))
-    assert len(vars(shared)["kept"]) == KEPT
 
 
 @pytest.mark.bench

@@ -234,3 +234,43 @@ def test_a_benchmark_may_take_the_seconds_and_minutes_that_are_asked_for(monkeyp
     assert call(*asked) == call(*asked, "-e", "fake:off") == 2  # nothing was measured
     assert [limit for limit, _ in given] == [70.0, 70.0]
     assert [(e.climb, e.longest) for _, e in given] == [pytest.approx((3.0, 1.5)), pytest.approx((1.5, 0.75))]
+
+
+@pytest.mark.parametrize(
+    ("given", "steps"),
+    [
+        (("dt=4e-3",), {"exact": 4e-3, "off": 4e-3}),
+        (("fake.dt=4e-3", "dt=1"), {"exact": 4e-3, "off": 4e-3}),
+        (("fake:off.dt=4e-3", "fake.dt=2e-3"), {"exact": 2e-3, "off": 4e-3}),
+    ],
+)
+def test_a_setting_is_given_to_whom_it_names(given: tuple[str, ...], steps: Mapping[str, float]) -> None:
+    words = [word for setting in given for word in ("--set-engine", setting)]
+    call(*LINEAR, "-e", "fake:exact", "-e", "fake:off", *words)
+    rows = pd.read_parquet("out/verdicts.parquet")
+    told = {profile: mine["settings"].iloc[0] for profile, mine in rows[rows["engine"] == "fake"].groupby("profile")}
+    assert told == {profile: f"dt={dt:g}" for profile, dt in steps.items()}
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("fack.dt=1", "Did you mean 'fake'"), ("fake:exakt.dt=1", "Did you mean 'exact'"),
+        ("fake.dd=1", "no setting of fake 'dd'"),
+    ],
+)  # fmt: skip
+def test_a_setting_of_nobody_is_a_sentence(setting: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(*LINEAR, "-e", "fake:exact", "--set-engine", setting) == 2
+    assert words in capsys.readouterr().err
+    assert not Path("out").exists()
+
+
+def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("-e", "fake", "-e", "absent", "--set", "t_end=2", "--set-engine", "fake:off.dt=4e-3", "--dry-run")
+    assert call(*LINEAR, *words) == 0
+    said = capsys.readouterr().out
+    assert "bouncing_ball:linear: 1 velocities, 1 rows, 2 s" in said
+    assert "fake:exact  dt=0.001" in said
+    assert "fake:off  dt=0.004" in said
+    assert "absent:*  skipped: Engine 'absent' needs" in said
+    assert list(Path.cwd().iterdir()) == []

@@ -48,7 +48,7 @@ def test_the_truth_has_no_error(name: str, truth: Truth, case: Case) -> None:
 def test_every_metric_says_what_it_is(name: str, truth: Truth, case: Case) -> None:
     metric = metrics.load(name)
     assert metrics.summary(name).endswith((".", ")"))
-    assert metric.UNIT in ("1", "s", "m", "N", "J", "N s", "rad", "1/s")
+    assert metric.UNIT in ("1", "s", "m", "m/s", "N", "J", "W", "N s", "rad", "1/s")
     value = metric.measure(truth, truth.trajectory, case)
     assert value is None or np.isfinite(value)
 

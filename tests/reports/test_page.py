@@ -14,7 +14,6 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
-import pandas as pd
 import plotly.graph_objects as go
 import pytest
 from ladder import ladder
@@ -22,10 +21,11 @@ from ladder import ladder
 from crossbody.cases import OutputError, load
 from crossbody.reports.bench.order import observed_order
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
-from crossbody.reports.judging.comparison import Entry, table
+from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.told import share
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.verdict import Verdict, Word
-from crossbody.reports.pages import figures, site
+from crossbody.reports.judging.verdict import Row, Verdict, Word
+from crossbody.reports.pages import figures, grid, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.runs import study
@@ -38,7 +38,7 @@ LIMIT = 1.5e6
 """Largest page of a case beside the shared script, bytes."""
 
 
-def made(path: Path, results: Sequence[CaseResult], rows: pd.DataFrame | None = None) -> Path:
+def made(path: Path, results: Sequence[CaseResult], rows: Sequence[Row] | None = None) -> Path:
     commands = {result.case.label: f"crossbody run {result.case.name}" for result in results}
     told = {"command": f"crossbody run {HOSTILE}", "time": "", "versions": {"crossbody": "0.0.1"}}
     with folder(path) as out:
@@ -101,7 +101,7 @@ def test_every_axis_has_its_unit(out: Path) -> None:
         hidden = [k for k, axis in axes.items() if "title" not in axis and axis.get("showticklabels") is not False]
         assert titled
         assert hidden == (["yaxis"] if name == "modes" else []), f"{name}: {hidden} has no title"
-        assert all(re.search(r"\[.+\]", text) for text in titled), titled
+        assert all(re.search(r"\[.+\]|^relative ", text) for text in titled), titled
 
 
 def test_lines_are_told_apart_by_dashes_too(out: Path) -> None:
@@ -226,11 +226,36 @@ def test_a_case_begins_with_every_metric_of_every_engine(out: Path) -> None:
 
 def test_the_index_tells_error_and_cost_of_every_engine(out: Path) -> None:
     text = (out / "index.html").read_text()
-    part = text[text.index('id="index--engines"') : text.index('id="index--matrix"')]
+    part = text[text.index('id="index--engines"') : text.index('id="index--provenance"')]
     errors = {row["engine"]: row["value"] for row in json.loads((out / "verdicts.json").read_text())["rows"]
               if row["metric"] == "position"}  # fmt: skip
     assert f'data-v="{errors["fake"]}"' in part
     assert "skipped" in part
+
+
+@pytest.mark.parametrize("word", [Word.WITHIN, Word.EXPECTED, Word.OUTSIDE])
+def test_a_cell_is_the_warmer_the_farther_out(word: Word) -> None:
+    def heat(value: float) -> int:
+        row = Verdict(case="c", variant="v", engine="e", profile="p", metric="m", value=value, unit="1", limit=1e-6,
+                      tier="A", verdict=word).row()  # fmt: skip
+        return grid.heat_of(row)
+
+    sizes = [0.0, *(1e-6 * 10.0 ** (np.arange(-14, 15) / 2.0 - (7.0 if word is Word.WITHIN else -7.0))), np.inf]
+    steps = [heat(size) for size in sizes]
+    assert steps == sorted(steps)
+    assert {0, 6} <= set(steps) <= set(range(7))
+    assert heat(np.nan) == 6
+
+
+def test_what_is_farthest_out_stands_first(out: Path) -> None:
+    text = (out / CASE).read_text()
+    body = text[text.index('--glance">') :]
+    shown = re.findall(r'<th scope="row">(\w+)', body[body.index("<tbody>") : body.index("</tbody>")])
+    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["verdict"] in grid.WORST]
+    far = {row["metric"]: max(share(each) for each in rows if each["metric"] == row["metric"]) for row in rows}
+    order = [far[name] for name in shown if name in far]
+    assert len(order) > 10
+    assert order == sorted(order, reverse=True)
 
 
 def test_run_time_is_drawn_against_error(out: Path) -> None:
@@ -292,13 +317,13 @@ def changed(out: Path, base: Path) -> str:
     return found.group()
 
 
-def fake_rows(count: int, name: str = "case {}") -> pd.DataFrame:
-    return table(
+def fake_rows(count: int, name: str = "case {}") -> list[Row]:
+    return [
         Verdict(
             case=name.format(i), variant="v", engine="e", profile=f"p{k}", metric="m", value=1.0, unit="1", limit=2.0,
             tier="A", verdict=Word.WITHIN, command="crossbody run",
-        ) for i in range(count) for k in range(3)
-    )  # fmt: skip
+        ).row() for i in range(count) for k in range(3)
+    ]  # fmt: skip
 
 
 def test_a_thousand_cases_are_paged(tmp_path: Path) -> None:

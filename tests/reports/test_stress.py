@@ -540,7 +540,7 @@ def test_the_command_of_a_row_repeats_its_run(capsys: pytest.CaptureFixture[str]
     row = execute(drawn()[0])
     words = shlex.split(row["command"])
     with pytest.raises(SystemExit):
-        main([*words[1:], "--setting", "rtol=1e-8", "--json", "--out", str(tmp_path / "out")])
+        main([*words[1:], "--set-engine", "rtol=1e-8", "--json", "--out", str(tmp_path / "out")])
     told = json.loads(capsys.readouterr().out)
     assert {line["engine"] for line in told} == {"reference", "truth"}
     assert "rtol=1e-08" in told[0]["settings"]

@@ -60,7 +60,7 @@ def test_quiet_says_nothing_where_nothing_is_wrong_and_that_alone_else(capsys: p
     assert Path("out/index.html").is_file()
     assert call("report", "out", "--quiet") == 0
     assert capsys.readouterr().out == ""
-    assert call(*RUN, "-q", "--setting", "rtol=0.1") == 1
+    assert call(*RUN, "-q", "--set-engine", "rtol=0.1") == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines
     assert all(line.startswith("outside: bouncing_ball:linear reference:compiled ") for line in lines)

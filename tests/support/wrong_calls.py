@@ -331,7 +331,7 @@ WORDS = (
     "bouncing_ball", "nonsense", "soft_contact", "delta_impulse", "", "--", "-e", "mujoco", "reference:nonsense",
     "absent",
     "--set", "a1=5", "a1=x", "a1=", "=5", "t_end=1e999", "nonsense=1", "a0=-1", "--variant", "linear", "nonsense",
-    "--rtol", "1e-9", "nan", "0", "-1", "--setting", "dt=0", "rtol=x", "samples=1e99", "--out", "/proc/x", "file",
+    "--rtol", "1e-9", "nan", "0", "-1", "--set-engine", "dt=0", "rtol=x", "samples=1e99", "--out", "/proc/x", "file",
     "folder", "--against", "--with", "--json", "--quiet", "--full", "--repeats", "3", "--skip", "--throughput",
     "--n", "--points", "--runs", "--seed", "--jobs", "--scheduler", "tcp://", "--resume", "--at", "z=0.4", "z=x",
     "--bode", "--locus", "kstar=0..x", "kstar=..", "--map", "--single-file", "info", "--columns", "--part", "--draft",

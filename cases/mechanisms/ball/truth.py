@@ -14,7 +14,6 @@ from functools import cached_property
 from itertools import islice, pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
 from crossbody.cases.arrays import Bytes, Floats
 from crossbody.cases.linear_arc import LinearArc
@@ -73,6 +72,8 @@ def release_time(ball: Ball, h: float, v: float) -> float:
     low = _next_turn(turned, at_top=start > 0.0)
     if math.isinf(low) or float(acceleration(start + low)) + ball.gravity >= 0.0:
         return math.inf
+    from scipy.optimize import brentq  # a quarter of a second, which most variants do not need
+
     root: float = brentq(lambda t: float(acceleration(t)) + ball.gravity, start, start + low, xtol=1e-300, rtol=1e-15)
     return root
 

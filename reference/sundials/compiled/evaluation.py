@@ -19,9 +19,9 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._program import Address, addresses, kept_with_kernels
+from crossbody.reference._program import ADDRESSES, address, at_address, bound
 from crossbody.reference._system import System
-from crossbody.reference.cache import compiled, embedding
+from crossbody.reference.cache import compiled
 from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
 from crossbody.reference.kinds import Array, Floats, Floats2, Index
 
@@ -713,30 +713,30 @@ _ARGUMENTS = (
 )  # fmt: skip
 
 
+dynamics_at, gaps_at, rows_at, power_at, velocity_at, watch_at = (at_address(kernels.REAL[name]) for name in _USED)
+_SIGNATURE = types.int64(*(kernels.function_type(name) for name in _USED), *_ARGUMENTS)
+evaluate_at = at_address(_SIGNATURE)
+
+
+def _evaluate_at(at, what, t, y, out, lines):  # type: ignore[no-untyped-def]
+    call = evaluate_at(at[6])
+    return call(
+        dynamics_at(at[0]), gaps_at(at[1]), rows_at(at[2]), power_at(at[3]), velocity_at(at[4]), watch_at(at[5]),
+        what, t, y, out, lines,
+    )  # fmt: skip
+
+
 @cache
-def _address() -> Address:
-    signature = types.int64(*(kernels.function_type(name) for name in _USED), *_ARGUMENTS)
-    return Address(compiled(evaluate, [signature]), signature)
-
-
-@kept_with_kernels
-def _entry(functions: tuple[Any, ...]) -> Callable[..., int]:
-    """`evaluate` with one system's kernels built in."""
-    general = _address()
-    dynamics, gaps, rows, power, velocity, watch = addresses(_USED, functions)
-
-    def call(what, t, y, out, lines):  # type: ignore[no-untyped-def]
-        return general(dynamics, gaps, rows, power, velocity, watch, what, t, y, out, lines)
-
-    found: Callable[..., int] = embedding(call, types.int64(*_ARGUMENTS))
-    return found
+def _compiled() -> tuple[Any, int]:
+    """`evaluate` as it is called from Python, and where it stands."""
+    call = compiled(_evaluate_at, [types.int64(ADDRESSES, *_ARGUMENTS)])
+    return call, address(compiled(evaluate, [_SIGNATURE]), _SIGNATURE)
 
 
 def entry(system: System) -> Callable[..., int]:
     """The compiled `evaluate(what, t, y, out, lines)` of one system."""
-    functions = system.kernels
-    found: Callable[..., int] = _entry(tuple(functions[name] for name in _USED))
-    return found
+    call, program = _compiled()
+    return bound(call, _USED, [system.kernels[name] for name in _USED], program)
 
 
 def workspace(system: System, p: Floats, u: Floats, terms: int, nz: int) -> tuple[dict[str, Array], Array]:

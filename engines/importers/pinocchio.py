@@ -1,0 +1,108 @@
+"""Pinocchio's readers of robot files: `buildModelAndConstraintsFromMJCF` and `buildModelFromUrdf`, the root fixed."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+FORMATS, PACKAGE = ("mjcf", "urdf"), "pin"
+NO_SPRINGS = "Pinocchio's model has no springs."
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of a joint by Pinocchio's name of its model."""
+    short = name.removeprefix("JointModel")
+    if short == "FreeFlyer":
+        return "free"
+    if short.startswith("Spherical") and "ZYX" not in short:
+        return "ball"
+    if re.fullmatch(r"RUB[XYZ]|RevoluteUnboundedUnaligned", short):
+        return "unbounded"
+    return "hinge" if re.fullmatch(r"R[XYZ]|RevoluteUnaligned", short) else (
+        "slide" if re.fullmatch(r"P[XYZ]|PrismaticUnaligned", short) else short)  # fmt: skip
+
+
+class _Robot:
+    free, ball = "p, xyzw; body, body", "xyzw; body"
+    hidden = {"stiffness": NO_SPRINGS, "rest": NO_SPRINGS, "actuators": "Pinocchio's model has no actuators."}  # noqa: RUF012
+    precision = 0.0
+
+    def __init__(self, path: str, urdf: bool) -> None:
+        import pinocchio as pin
+
+        self._pin = pin
+        self.version = pin.__version__
+        constraints: Any = []
+        if urdf:
+            self._m = pin.buildModelFromUrdf(path)
+        else:
+            self._m, *constraints = pin.buildModelAndConstraintsFromMJCF(path)
+        self._d = self._m.createData()
+        self.nq, self.nv = self._m.nq, self._m.nv
+        self.loops = sum(len(group) for group in constraints)
+        self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
+        self._last: dict[int, str] = {}
+        self.joints = [joint for i in range(1, self._m.njoints) for joint in self._joints(i)]
+        self.actuators: dict[str, list[str]] = {}
+        self.numbers = self._numbers()
+
+    def _joints(self, i: int) -> list[tuple[str, str, str, int, int]]:
+        """Return the joints that one of Pinocchio's is: several of one body are a composite."""
+        model, name = self._m.joints[i], self._m.names[i]
+        bodies = [frame.name for frame in self._bodies if frame.parentJoint == i]
+        body = bodies[0] if bodies else ""
+        parts = list(model.extract().joints) if model.shortname() == "JointModelComposite" else [model]
+        single = len(parts) == 1
+        found = [
+            (name if single else f"{name} {k}", body, kind_of(part.shortname()), part.idx_q, part.idx_v)
+            for k, part in enumerate(parts)
+        ]
+        self._last[i] = found[-1][0]
+        return found
+
+    def _numbers(self) -> dict[str, dict[str, Any]]:
+        m, told = self._m, dict[str, dict[str, Any]]()
+        for name, _, kind, at, dof in self.joints:
+            bounded = kind in ("hinge", "slide")
+            values = {
+                "armature": m.armature[dof], "damping": m.damping[dof], "friction": m.upperDryFrictionLimit[dof],
+                "lower": m.lowerPositionLimit[at] if bounded else -np.inf,
+                "upper": m.upperPositionLimit[at] if bounded else np.inf,
+            }  # fmt: skip
+            for key, value in values.items():
+                large = abs(value) >= np.finfo(float).max
+                told.setdefault(key, {})[name] = [float(np.sign(value) * np.inf if large else value)]
+        return told
+
+    def place(self, q: Any, v: Any) -> None:
+        self._q, self._v = q, v
+        self._pin.framesForwardKinematics(self._m, self._d, q)
+
+    def mass_matrix(self) -> Any:
+        M = np.triu(self._pin.crba(self._m, self._d, self._q))
+        return M + np.triu(M, 1).T
+
+    def bias(self) -> Any:
+        return np.array(self._pin.nonLinearEffects(self._m, self._d, self._q, self._v))
+
+    def energy(self) -> float:
+        kinetic = self._pin.computeKineticEnergy(self._m, self._d, self._q, self._v)
+        return float(kinetic + self._pin.computePotentialEnergy(self._m, self._d, self._q))
+
+    def frames(self) -> Any:
+        placed = {f.name: self._d.oMi[f.parentJoint] * f.placement for f in self._bodies}
+        return {name: (np.array(M.translation), np.array(M.rotation)) for name, M in placed.items()}
+
+    def inertias(self) -> Any:
+        told = []
+        for i in range(1, self._m.njoints):
+            Y = self._d.oMi[i].act(self._m.inertias[i])
+            told.append((self._last[i], float(Y.mass), np.array(Y.lever), np.array(Y.inertia)))
+        return told
+
+
+def open_robot(path: str, urdf: bool) -> _Robot:
+    """Return what Pinocchio makes of a file; a URDF's root is fixed."""
+    return _Robot(path, urdf)

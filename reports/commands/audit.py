@@ -1,0 +1,145 @@
+"""What `crossbody audit` does: a robot file through every importer, told as a table, and what is wrong beneath it."""
+
+from __future__ import annotations
+
+import json
+import os
+import textwrap
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from crossbody.cases import EngineUnavailable, OutputError, UnknownName
+from crossbody.cases.files.reading import is_urdf
+from crossbody.engines import importers
+from crossbody.reports import voice
+from crossbody.reports.importers import told
+from crossbody.reports.importers.audit import Audit, audited
+from crossbody.reports.importers.causes import advice, explained
+from crossbody.reports.importers.compare import FAILED, OK, QUANTITIES, UNSUPPORTED, WRONG, Row
+
+WIDTH, FIRST = 80, 13
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """What is asked for.
+
+    Attributes:
+        path: of the file.
+        engines: names of importers; all of them if there are none.
+        without: what is left out of the yardstick.
+        seconds: what an importer may take.
+        explain: whether causes are looked for.
+        sarif, markdown: files to write.
+    """
+
+    path: Path
+    engines: Sequence[str] = ()
+    without: str = ""
+    seconds: float = importers.SECONDS
+    explain: bool = False
+    sarif: Path | None = None
+    markdown: Path | None = None
+
+
+def audit(ask: Ask) -> int:
+    """Audit one file.
+
+    Returns:
+        1 if a reader makes something else of the file or fails, else 0.
+
+    Raises:
+        CrossbodyError: for wrong use, a file that is none, engines none of which is there.
+    """
+    if not ask.path.is_file():
+        raise UnknownName("robot file", str(ask.path), ())
+    found, rows = read_by_all(ask)
+    if ask.explain or ask.sarif or ask.markdown:
+        rows = explained(ask.path, is_urdf(ask.path), rows, ask.seconds, os.cpu_count() or 1)
+    for file, text in ((ask.sarif, told.sarif), (ask.markdown, told.markdown)):
+        if file is not None:
+            _write(file, text(ask.path, rows))
+    if voice.as_json():
+        print(json.dumps([asdict(row) for row in rows]))
+    else:
+        _show(found, rows)
+        if ask.explain:
+            _explain(ask.path, rows)
+    return int(not told.alike(rows))
+
+
+def read_by_all(ask: Ask) -> tuple[Audit, list[Row]]:
+    """Return the audit of a file and the rows of every importer that is there, in the order asked for."""
+    wanted, found, rows = importers.known(ask.engines), None, list[Row]()
+    for audit_of, name, own in audited(ask.path, wanted, ask.without, ask.seconds):
+        found = audit_of
+        rows += own
+        if len(wanted) > 1:
+            voice.note(f"{name}: {summary(own)}")
+    if found is None:
+        asked = ", ".join(wanted)
+        raise EngineUnavailable(f"None of these is installed: {asked}; pip install 'crossbody[engines]' brings two.")
+    rows.sort(key=lambda row: (wanted.index(row.engine), QUANTITIES.index(row.quantity)))
+    return found, rows
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}.") from None
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Return in a few words what one importer makes of a file."""
+    if rows[0].verdict != OK:
+        return f"{rows[0].verdict}: {rows[0].why}"
+    wrong = [row.quantity for row in rows if row.verdict == WRONG]
+    return f"reads {', '.join(wrong)} differently" if wrong else "reads the same robot"
+
+
+def _show(found: Audit, rows: Sequence[Row]) -> None:
+    if not voice.quiet():
+        scene = found.scene
+        counts = {"joints": len(scene.joints), "degrees of freedom": scene.nv, "loops": len(scene.loops),
+                  "actuators": len(scene.actuators), "states": len(found.job["states"])}  # fmt: skip
+        print(f"{found.path.name}: {', '.join(f'{count} {name}' for name, count in counts.items())}")
+        for text in found.findings:
+            _say(text)
+        print("\n".join(table(rows)))
+    for row in rows:
+        if row.verdict in (WRONG, FAILED) or (row.verdict == UNSUPPORTED and not voice.quiet()):
+            _say(told.sentence(row))
+    for name, why in sorted(found.absent.items()):
+        if not voice.quiet():
+            _say(f"{name} is not there: {why}")
+
+
+def _explain(path: Path, rows: Sequence[Row]) -> None:
+    """Say once for every engine and cause what it is, where, what the format says and how to write it."""
+    causes: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        if row.verdict in (WRONG, FAILED):
+            causes.setdefault((row.engine, row.cause), []).append(row)
+    for (engine, cause), own in causes.items():
+        what = ", ".join(row.quantity for row in own)
+        print()
+        if cause:
+            _say(f"{path.name}:{own[0].line}: {cause} ({engine}: {what})")
+            _say("    " + advice(cause))
+            _say(f"    The smallest file that shows it: crossbody conformance --feature '{cause}' -e {engine}")
+        else:
+            _say(f"{engine}: {what}: no feature of the table that this file uses explains it.")
+
+
+def _say(text: str) -> None:
+    print(textwrap.fill(text, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False))
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """Return lines of 80 columns: quantities down, engines across."""
+    lines = told.grid(rows)
+    width = min((WIDTH - FIRST) // max(len(lines[0]) - 1, 1), 16)
+    made = ["".join([first.ljust(FIRST), *(text[: width - 1].rjust(width) for text in rest)]) for first, *rest in lines]
+    return ["", *(line.rstrip() for line in made), ""]

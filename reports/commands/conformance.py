@@ -1,0 +1,77 @@
+"""What `crossbody conformance` does: every feature of the table through every importer, as a page and tables."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import pandas as pd
+
+from crossbody.cases import EngineUnavailable, UnknownName
+from crossbody.cases.files.conformance import FEATURES
+from crossbody.engines import importers
+from crossbody.reports import voice
+from crossbody.reports.commands.shared import where
+from crossbody.reports.importers.compare import FAILED, OK, UNSUPPORTED, WRONG
+from crossbody.reports.importers.conformance import table
+from crossbody.reports.pages import site
+from crossbody.reports.runs import output, study
+from crossbody.reports.runs.provenance import provenance
+
+STUDY = "conformance"
+
+
+def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, command: str) -> int:
+    """Run the table.
+
+    Args:
+        engines: names of importers; all of them if there are none.
+        part: of the names of the features that are run; empty for all.
+        seconds: what an importer may take for one of them.
+        out: folder to write.
+        command: what was typed, for provenance.
+
+    Returns:
+        0: what engines do is no fault of the run.
+
+    Raises:
+        CrossbodyError: for wrong use.
+    """
+    wanted = importers.known(engines)
+    features = [feature for feature in FEATURES if part in feature.name]
+    if not features:
+        raise UnknownName("feature", part, tuple(feature.name for feature in FEATURES))
+    output.check(out, STUDY)
+    rows, absent = [], dict[str, str]()
+    with voice.progress(len(features) * len(wanted)) as tell:
+        for feature, engine, row in table(features, wanted, seconds, os.cpu_count() or 1):
+            tell(f"{engine}: {feature.name}")
+            if isinstance(row, str):
+                absent[engine] = row
+            else:
+                told = {"feature": feature.name, "format": feature.format, "rule": feature.rule}
+                rows.append(told | asdict(row) | {"rewrite": feature.rewrite, "text": feature.text})
+    if not rows:
+        raise EngineUnavailable(f"None of these is installed: {', '.join(wanted)}.")
+    found, told_by = pd.DataFrame(rows), provenance(command)
+    with output.folder(out, STUDY) as made:
+        study.write(made, [], study.judge([], {}), told_by)
+        study.write_table(made / STUDY, found, told_by)
+        site.write(made)
+    if not voice.told_as_json({STUDY: found}):
+        _show(found, absent, out)
+    return 0
+
+
+def _show(rows: pd.DataFrame, absent: dict[str, str], out: Path) -> None:
+    if not voice.quiet():
+        for engine, own in rows.groupby("engine", sort=False):
+            counts, version = Counter(own["verdict"]), max(own["version"])
+            told = ", ".join(f"{counts[word]} {word}" for word in (OK, WRONG, UNSUPPORTED, FAILED) if counts[word])
+            print(f"{engine} {version}: {told}")
+        for engine, why in sorted(absent.items()):
+            print(f"{engine} is not there: {why}")
+    where(out)

@@ -1,0 +1,45 @@
+"""What `run --dry-run` prints: every case and engine that would be run, with the settings that it would have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import click
+
+from crossbody.cases import Case, CaseUnsupported, Value
+from crossbody.reports.judging.stored import words
+from crossbody.reports.runs import jobs
+
+
+def tell(
+    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], settings: Sequence[str]
+) -> int:
+    """Print what `run` would do with the same words; the exit code.
+
+    Raises:
+        CrossbodyError: for wrong use, as `run` does.
+    """
+    cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
+    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--set-engine")
+    jobs.check_asked(asked, picks)
+    for case in cases:
+        parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
+        click.echo(f"{case.label}: {len(case.v0)} velocities, {len(case.contacts)} rows, {case.t_end:g} s")
+        click.echo(f"  parameters: {parameters}" if parameters else "  no parameters")
+        for pick in (jobs.of_case(one, case) for one in picks):
+            click.echo(f"  {pick.engine}:{pick.profile}  {_settings(case, pick, asked)}".rstrip())
+    return 0
+
+
+def _plain(value: Value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value) or '""'
+
+
+def _settings(case: Case, pick: jobs.Pick, asked: Mapping[str, Value]) -> str:
+    """What an engine would be run with, or why it would not be."""
+    if pick.skipped:
+        return f"skipped: {pick.skipped}"
+    try:
+        return words(jobs.prepare(case, pick, jobs.of_pick(asked, pick)).settings)
+    except CaseUnsupported as error:
+        return f"skipped: {error}"

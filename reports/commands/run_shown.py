@@ -1,0 +1,128 @@
+"""What the command `run` prints: a sentence, a table that fits the terminal, and every row that is wrong."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import click
+
+from crossbody.reports import voice
+from crossbody.reports.judging.parts import PARTS, part_of
+from crossbody.reports.judging.told import EngineRun, runs_of, sentence
+from crossbody.reports.judging.verdict import Regression, Row, Word
+from crossbody.reports.pages import html
+from crossbody.reports.pages.results import Times
+
+WIDTH = 120
+"""Of the table in a file or a pipe."""
+MANY = 4
+"""Cases that are named of those that an engine could not run."""
+SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
+"""Errors in the table by their heads: the parts of the worst error of position add up to it."""
+COLOURS = {"within": "green", "known": "yellow", "outside": "red"}
+LEFT_OUT = ("in all [s]", "importer", "within", "step", "model", "known", "time [ms]")
+"""Columns that go, in this order, where the table is too wide."""
+
+
+def counted(rows: Sequence[Row]) -> str:
+    """Return how many rows have each verdict."""
+    return ", ".join(f"{count} {word}" for word, count in Counter(row["verdict"] for row in rows).most_common())
+
+
+def show(rows: Sequence[Row], times: Times) -> None:
+    """Print who is off and by how much, a line a run, every row that is wrong, and what could not run."""
+    runs = runs_of(rows)
+    if not voice.quiet():
+        click.echo(f"{sentence(runs)}\n\n{table(runs, times, _width())}\n\n{counted(rows)}")
+    for run in runs:
+        for row in run.wrong:
+            click.echo(_wrong(run, row))
+    for run in runs:
+        for row in (row for row in run.rows if row["regression"] == Regression.LOST):
+            click.echo(_lost(run, row))
+    if not voice.quiet():
+        click.echo("".join(f"{text}\n" for text in _absent(runs)), nl=False)
+
+
+def _width() -> int:
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
+
+
+def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
+    """Lay out a line a run below the name of its case; columns that say nothing, or do not fit, are left out."""
+    runs = [run for run in runs if (run.label, run.who) in times or not run.skipped]
+    columns = {name: [_error(run, metric) for run in runs] for name, metric in SHOWN.items()}
+    walls = [times.get((run.label, run.who), (None, None)) for run in runs]
+    columns["time [ms]"] = [_number(None if wall is None else 1e3 * wall) for wall, _ in walls]
+    columns["in all [s]"] = [_number(whole) for _, whole in walls]
+    for name, word in (("within", Word.WITHIN), ("known", Word.EXPECTED), ("outside", Word.OUTSIDE)):
+        columns[name] = [str(sum(row["verdict"] == word for row in run.rows)) for run in runs]
+    columns = {name: cells for name, cells in columns.items() if name == "outside" or any(map(_says, cells))}
+    first = max((len(run.who) for run in runs), default=0) + 2
+    for name in LEFT_OUT:
+        if first + sum(2 + _wide(head, cells) for head, cells in columns.items()) <= width:
+            break
+        columns.pop(name, None)
+    lines = [" " * first + "".join(f"  {head:>{_wide(head, cells)}}" for head, cells in columns.items())]
+    for i, run in enumerate(runs):
+        if i == 0 or run.label != runs[i - 1].label:
+            lines.append(click.style(run.label, bold=True))
+        lines.append(f"  {run.who:<{first - 2}}" + "".join(_cell(head, cells, i) for head, cells in columns.items()))
+    return "\n".join(lines)
+
+
+def _says(cell: str) -> bool:
+    return cell not in ("-", "0", "")
+
+
+def _wide(head: str, cells: Sequence[str]) -> int:
+    return max(map(len, (head, *cells)))
+
+
+def _cell(head: str, cells: Sequence[str], i: int) -> str:
+    text = f"{cells[i]:>{_wide(head, cells)}}"
+    return "  " + (click.style(text, fg=COLOURS[head]) if head in COLOURS and cells[i] != "0" else text)
+
+
+def _error(run: EngineRun, metric: str) -> str:
+    """A number in two digits, or below what it is known to."""
+    row: Mapping[str, float] = next((row for row in run.rows if row["metric"] == metric), {})
+    below, number = html.bounded(row.get("value"), row.get("known"))
+    return "-" if number != number else f"{below}{number:.1e}"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
+
+
+def _wrong(run: EngineRun, row: Row) -> str:
+    number = f" {row['value']:.4g}{_unit(row)}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
+    return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}. {row['why']}"
+
+
+def _lost(run: EngineRun, row: Row) -> str:
+    value = f"{row['value']:.4g}{_unit(row)}, band {row['band']:.3g}"
+    return f"more than a stored run gave: {run.label} {run.who} {row['metric']} {value}"
+
+
+def _unit(row: Row) -> str:
+    return "" if row["unit"] in ("1", "") else f" {row['unit']}"
+
+
+def _absent(runs: Sequence[EngineRun]) -> list[str]:
+    """One line a reason for which engines could not run."""
+    found: dict[str, list[EngineRun]] = {}
+    for run in (run for run in runs if run.skipped):
+        found.setdefault(run.rows[0]["why"], []).append(run)
+    return [
+        f"skipped: {', '.join(dict.fromkeys(run.who for run in mine))} on {_places(mine)}. {why}"
+        for why, mine in found.items()
+    ]
+
+
+def _places(runs: Sequence[EngineRun]) -> str:
+    labels = list(dict.fromkeys(run.label for run in runs))
+    return ", ".join(labels) if len(labels) <= MANY else f"{len(labels)} cases"

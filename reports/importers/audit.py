@@ -1,0 +1,112 @@
+"""One robot file through every importer: what each makes of it beside what the file says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import SceneError
+from crossbody.cases.arrays import Floats
+from crossbody.cases.files.inertias import of_shapes, six
+from crossbody.cases.files.reading import findings_of, is_urdf, read, scene_of
+from crossbody.cases.files.text import check_text
+from crossbody.cases.scene import Body, Scene
+from crossbody.engines.importers import SECONDS, Reading
+from crossbody.reports.importers.compare import Row, rows
+from crossbody.reports.importers.expected import expected, job_of
+
+KEYS = 4
+"""Keyframes at which importers are compared beside the random states."""
+
+
+@dataclass(slots=True)
+class Audit:
+    """A file before its importers.
+
+    Attributes:
+        path: of the file.
+        scene: what it says.
+        job, wanted: states, and what a reader without fault makes of them.
+        findings: sentences on what is strange in the file itself.
+        told: importer -> what it said while it read.
+        absent: importer -> why it is not there.
+    """
+
+    path: Path
+    scene: Scene
+    job: dict[str, Any]
+    wanted: dict[str, Any]
+    findings: tuple[str, ...] = ()
+    told: dict[str, list[str]] = field(default_factory=dict)
+    absent: dict[str, str] = field(default_factory=dict)
+
+
+def audited(
+    path: Path, engines: Sequence[str], without: str = "", seconds: float = SECONDS, audit: Audit | None = None
+) -> Iterator[tuple[Audit, str, list[Row]]]:
+    """Return the audit, and of each importer its rows, as they are there.
+
+    Args:
+        path: of the file.
+        engines: names of importers.
+        without: what is left out of the yardstick, as of a case.
+        seconds: what an importer may take.
+        audit: of the file, where what it says is known already.
+
+    Raises:
+        SceneError: for a file that cannot be the yardstick, before any importer is asked.
+    """
+    check_text(path)
+    readings = [Reading(name, path, is_urdf(path), seconds) for name in engines]
+    try:
+        found = audit or opened(path, without)
+    except BaseException:
+        for reading in readings:
+            reading.abandon()
+        raise
+    with ThreadPoolExecutor(max(len(readings), 1)) as pool:
+        answers = {pool.submit(reading.answer, found.job): reading.name for reading in readings}
+        for done in as_completed(answers):
+            name, answer = answers[done], done.result()
+            found.told[name] = answer["told"]
+            if answer["status"] == "absent":
+                found.absent[name] = answer["why"]
+            else:
+                yield found, name, rows(name, answer, found.wanted, found.job["joints"])
+
+
+def opened(path: Path, without: str = "") -> Audit:
+    """Return what a file says, with the states at which it is compared.
+
+    Raises:
+        SceneError: with what stands against it.
+    """
+    model, told = read(path, without)
+    scene = scene_of(path, model)
+    if not scene.joints:
+        raise SceneError(f"{path} has no joint: there is no motion in which readers could differ; valid: one at least.")
+    scene = scene if is_urdf(path) else with_closed_forms(path, scene)
+    keys = [np.array(key) for key in model.key_qpos[:KEYS]]
+    return of_scene(path, scene, keys, (*told, *findings_of(path)))
+
+
+def with_closed_forms(path: Path, scene: Scene) -> Scene:
+    """Return the scene with inertias of shapes as we compute them: what the compiler makes of them is seen then."""
+    own = of_shapes(path)
+
+    def of(body: Body) -> Body:
+        mass, com, about = own[body.name]
+        return replace(body, mass=mass, com=tuple(com.tolist()), inertia=six(about))
+
+    return scene.replace(bodies=tuple(of(body) if body.name in own else body for body in scene.bodies))
+
+
+def of_scene(path: Path, scene: Scene, keys: Sequence[Floats] = (), findings: tuple[str, ...] = ()) -> Audit:
+    """Return the audit of a file of which a scene says what it means."""
+    job = job_of(scene, keys)
+    return Audit(path=path, scene=scene, job=job, wanted=expected(scene, job), findings=findings)

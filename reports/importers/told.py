@@ -1,0 +1,96 @@
+"""Rows of an audit as others read them: SARIF for code scanning, Markdown for a pull request."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from crossbody.reports.importers.causes import advice
+from crossbody.reports.importers.compare import FAILED, NONE, OK, QUANTITIES, UNSUPPORTED, WRONG, Row
+
+LEVELS = {WRONG: "error", FAILED: "error", UNSUPPORTED: "note"}
+SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+
+
+def sentence(row: Row) -> str:
+    """Return what is wrong, in one sentence."""
+    if row.verdict in (FAILED, UNSUPPORTED):
+        said = "unsupported" if row.verdict == UNSUPPORTED else "failed"
+        return f"{row.engine}: {row.quantity} {said}: {row.why}"
+    values = f" is {row.value:.6g}, and {row.expected:.6g} in the file" if None not in (row.value, row.expected) else ""
+    return f"{row.engine}: {row.quantity}: {row.where}{values}."
+
+
+def cell(row: Row | None) -> str:
+    """Return a row in a few letters: the largest difference where it is wrong."""
+    if row is None:
+        return ""
+    if row.verdict == WRONG:
+        return f"{row.difference:.1e}" if row.difference is not None and row.difference < 1e300 else WRONG
+    return "unsupp." if row.verdict == UNSUPPORTED else row.verdict
+
+
+def grid(rows: Sequence[Row]) -> list[list[str]]:
+    """Return heading, versions and lines: quantities down, engines across."""
+    engines = list(dict.fromkeys(row.engine for row in rows))
+    cells = {(row.quantity, row.engine): row for row in rows}
+    versions = {row.engine: row.version for row in rows if row.version}
+    lines = [["", *engines], ["", *(versions.get(name, "") for name in engines)]]
+    for quantity in QUANTITIES:
+        own = [cells.get((quantity, name)) for name in engines]
+        if any(own):
+            lines.append([quantity, *map(cell, own)])
+    return lines
+
+
+def markdown(path: Path, rows: Sequence[Row]) -> str:
+    """Return a summary of one file."""
+    heading, versions, *lines = grid(rows)
+    names = [f"{name} {number}".strip() for name, number in zip(heading, versions, strict=True)]
+    table = [names, ["---"] * len(names), *lines]
+    told = [f"- {sentence(row)}{_where(row)}" for row in rows if row.verdict in (WRONG, FAILED)]
+    said = "" if told else "Every reader that is there makes the same robot of it.\n"
+    return (
+        f"### {path.name}\n\n"
+        + "\n".join(f"| {' | '.join(line)} |" for line in table)
+        + "\n\n"
+        + "\n".join(told)
+        + said
+        + "\n"
+    )
+
+
+def _where(row: Row) -> str:
+    return f" Line {row.line}: {row.cause}. {advice(row.cause)}" if row.cause else ""
+
+
+def sarif(path: Path, rows: Sequence[Row]) -> str:
+    """Return the findings on one file as SARIF 2.1.0."""
+    off = [row for row in rows if row.verdict in LEVELS]
+    rules = {_rule(row): advice(row.cause) or f"How readers differ in {row.quantity}." for row in off}
+    driver = {
+        "name": "crossbody", "version": version("crossbody"),
+        "rules": [{"id": k, "shortDescription": {"text": k}, "help": {"text": text}} for k, text in rules.items()],
+    }  # fmt: skip
+    run = {"tool": {"driver": driver}, "results": [_result(path, row) for row in off]}
+    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=1)
+
+
+def _rule(row: Row) -> str:
+    return row.cause or row.quantity
+
+
+def _result(path: Path, row: Row) -> dict[str, Any]:
+    place: dict[str, Any] = {"artifactLocation": {"uri": path.as_posix()}, "region": {"startLine": row.line or 1}}
+    return {
+        "ruleId": _rule(row), "level": LEVELS[row.verdict], "message": {"text": sentence(row)},
+        "locations": [{"physicalLocation": place}],
+    }  # fmt: skip
+
+
+def alike(rows: Sequence[Row]) -> bool:
+    """Return whether nothing is wrong, and no reader fails."""
+    return all(row.verdict in (OK, NONE, UNSUPPORTED) for row in rows)

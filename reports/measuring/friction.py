@@ -1,0 +1,125 @@
+"""What contacts with friction do in a motion: how they slip, and what holds them back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import Mode
+from crossbody.cases.arrays import Floats
+from crossbody.cases.scene_contacts import contacts
+from crossbody.reports.measuring.equations import equations
+
+if TYPE_CHECKING:
+    from crossbody.cases import Case, Trajectory
+    from crossbody.reference import System
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rubbing:
+    """Places where a motion may slip: m of them, each a normal row with its tangential ones.
+
+    Attributes:
+        rows (m,): normal rows.
+        pair (m,): which pair of shapes each belongs to.
+        mu (m,): coefficients of friction.
+        slip (n, m, k): velocity of the second shape over the first along the tangential rows, m/s.
+        force (n, m, k): of the first on the second, N.
+        normal (n, m): N.
+    """
+
+    rows: NDArray[np.intp]
+    pair: NDArray[np.intp]
+    mu: Floats
+    slip: Floats
+    force: Floats
+    normal: Floats
+
+    def of_pairs(self, values: Floats) -> Floats:
+        """Return the sums (n, pairs, ...) of values of places (n, m, ...) over those of each pair."""
+        return np.stack([values[:, self.pair == k].sum(axis=1) for k in np.unique(self.pair)], axis=1)
+
+
+SLOW = 1e-3
+"""Part of the largest slip, and of the largest force, below which a direction is not looked at."""
+_LAST: list[tuple[Trajectory, Rubbing]] = []
+"""The motions that were looked at last: every metric asks for the same."""
+
+
+def rubbing(run: Trajectory, case: Case) -> Rubbing | None:
+    """Return where a motion may slip; None where no contact has friction."""
+    system = equations(case)
+    if system is None or not system.frictional:
+        return None
+    for known, found in _LAST:
+        if known is run:
+            return found
+    _LAST[:] = [*_LAST[-3:], (run, _rubbing(run, case, system))]
+    return _LAST[-1][1]
+
+
+def _rubbing(run: Trajectory, case: Case, system: System) -> Rubbing:
+    rows = np.flatnonzero(system.tangents)
+    count = system.tangents[rows][:, None]
+    ways = np.arange(count.max())
+    there = (ways < count).astype(float)
+    tangents = system.tangent[rows][:, None] + np.minimum(ways, count - 1)
+    rates: Floats = np.array([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)])
+    rates -= np.asarray(system.drift, dtype=np.float64)
+    return Rubbing(
+        rows=rows, pair=_pairs(case, len(rows)), mu=system.friction[rows], slip=there * rates[:, tangents],
+        force=there * run.lam[:, tangents], normal=run.lam[:, rows],
+    )  # fmt: skip
+
+
+def _pairs(case: Case, count: int) -> NDArray[np.intp]:
+    """Return which pair of shapes each place belongs to; of equations of one's own each is a pair by itself."""
+    met = contacts(case.scene) if case.general and case.scene is not None else ()
+    found = [k for k, contact in enumerate(met) for _ in range(contact.places if contact.friction > 0.0 else 0)]
+    return np.array(found) if len(found) == count else np.arange(count)
+
+
+def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats, Floats]:
+    """Return where places slide so that their slip has a direction (n, m), and speeds and forces (n, m), m/s and N."""
+    speed, force = np.linalg.norm(found.slip, axis=-1), np.linalg.norm(found.force, axis=-1)
+    slides = (run.mode[:, found.rows] == Mode.SLIP) & (speed > SLOW * speed.max()) & (force > SLOW * force.max())
+    return slides, speed, force
+
+
+def off_slip(run: Trajectory, case: Case) -> float:
+    """Return the largest difference of friction from -mu lam_n s, s along the slip, N; 0 where nothing slides."""
+    found = rubbing(run, case)
+    if found is None:
+        return 0.0
+    slides, speed, _ = sliding(run, found)
+    bound = (found.mu * found.normal)[slides][:, None]
+    off = found.force[slides] + bound * found.slip[slides] / speed[slides][:, None]
+    return float(np.max(np.linalg.norm(off, axis=-1), initial=0.0))
+
+
+def cumulated(run: Trajectory, values: Floats) -> Floats:
+    """Return the integrals (n, ...) of values (n, ...) over time since the start, by the trapezoidal rule."""
+    steps = np.diff(run.t).reshape(-1, *[1] * (values.ndim - 1))
+    pieces: Floats = 0.5 * steps * (values[1:] + values[:-1])
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(pieces, axis=0)])
+
+
+def changes(run: Trajectory, found: Rubbing) -> Iterator[tuple[float, bool]]:
+    """Yield when a pair begins to slide, and when all of its places that touch hold: instant, and whether it slides.
+
+    What it did when it touched last counts where it comes off in between.
+    """
+    for pair in np.unique(found.pair):
+        mode = dict.fromkeys(found.rows[found.pair == pair].tolist(), Mode.FREE)
+        slid: bool | None = None
+        for t, events in groupby((e for e in run.events if e.contact in mode), key=lambda event: event.t):
+            mode |= {event.contact: event.after for event in events}
+            slides = Mode.SLIP in mode.values()
+            if slid is not None and slid != slides and (slides or Mode.STICK in mode.values()):
+                yield t, slides
+            slid = slides if slides or Mode.STICK in mode.values() else slid

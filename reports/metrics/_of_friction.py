@@ -1,0 +1,83 @@
+"""Numbers of contacts with friction, which every run is measured by that has some: every function is a metric."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crossbody.cases import Case, Mode, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.reports.measuring.friction import changes, cumulated, rubbing, sliding
+
+UNITS = {
+    "creep_speed": "m/s", "friction_angle": "rad", "friction_impulse": "N s", "friction_power": "W",
+    "friction_work": "J", "slip_times": "s", "stick_times": "s",
+}  # fmt: skip
+KINDS = {"friction_impulse": "signal", "friction_work": "signal", "slip_times": "instants", "stick_times": "instants"}
+"""How a function is compared with the truth's, as in `CaseMetric`; the others are numbers of the run alone."""
+ALWAYS = True
+
+
+def cone_violation(run: Trajectory, case: Case) -> float | None:
+    """How far friction exceeds mu times the normal force, over the largest bound."""
+    found = rubbing(run, case)
+    if found is None:
+        return None
+    bound = found.mu * found.normal
+    most = float(np.max(bound, initial=0.0))
+    return float(np.max(np.linalg.norm(found.force, axis=-1) - bound, initial=0.0)) / most if most > 0.0 else None
+
+
+def creep_speed(run: Trajectory, case: Case) -> float | None:
+    """Largest slip at the end of contacts that hold: nought where friction holds, whatever the bound on its force."""
+    found = rubbing(run, case)
+    if found is None:
+        return None
+    held = run.mode[-1, found.rows] == Mode.STICK
+    return float(np.linalg.norm(found.slip[-1, held], axis=-1).max()) if held.any() else None
+
+
+def friction_angle(run: Trajectory, case: Case) -> float | None:
+    """Largest angle between friction and what is against the slip, where a contact slides."""
+    found = rubbing(run, case)
+    if found is None:
+        return None
+    slides, speed, force = sliding(run, found)
+    if not slides.any():
+        return None
+    off = found.slip[slides] / speed[slides][:, None] + found.force[slides] / force[slides][:, None]
+    return float(2.0 * np.arcsin(0.5 * np.linalg.norm(off, axis=-1)).max())
+
+
+def friction_impulse(run: Trajectory, case: Case) -> Floats | None:
+    """Impulse of friction of every pair of shapes since the start, against the truth's."""
+    found = rubbing(run, case)
+    return None if found is None else cumulated(run, found.of_pairs(found.force)).reshape(len(run.t), -1)
+
+
+def friction_power(run: Trajectory, case: Case) -> float | None:
+    """Largest power that friction of a pair of shapes gives: nought where it is against the slip."""
+    found = rubbing(run, case)
+    if found is None:
+        return None
+    return float(np.max(found.of_pairs(np.sum(found.force * found.slip, axis=-1)), initial=0.0))
+
+
+def friction_work(run: Trajectory, case: Case) -> Floats | None:
+    """Work of friction of every pair of shapes since the start, against the truth's."""
+    found = rubbing(run, case)
+    return None if found is None else cumulated(run, found.of_pairs(np.sum(found.force * found.slip, axis=-1)))
+
+
+def slip_times(run: Trajectory, case: Case) -> Floats:
+    """Instants at which shapes that held begin to slide, against the truth's."""
+    return _instants(run, case, slides=True)
+
+
+def stick_times(run: Trajectory, case: Case) -> Floats:
+    """Instants at which shapes that slid hold, against the truth's."""
+    return _instants(run, case, slides=False)
+
+
+def _instants(run: Trajectory, case: Case, slides: bool) -> Floats:
+    found = rubbing(run, case)
+    return np.zeros(0) if found is None else np.array([t for t, now in changes(run, found) if now == slides])

@@ -1,0 +1,91 @@
+"""The table of features of robot files: what each means, by two readers that share nothing; what is known of others."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from crossbody.cases.files.conformance import FEATURES, Feature
+from crossbody.engines.importers import mujoco as own
+from crossbody.engines.importers.process import measured
+from crossbody.reports.cli import main
+from crossbody.reports.importers.audit import of_scene, opened
+from crossbody.reports.importers.compare import NONE, OK, UNSUPPORTED, WRONG, Row, rows
+from crossbody.reports.importers.conformance import judged, written
+
+BY_NAME = {feature.name: feature for feature in FEATURES}
+
+
+def each(features: tuple[Feature, ...]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("feature", features, ids=lambda feature: feature.name)
+
+
+def test_there_are_many_features_and_each_has_a_name() -> None:
+    assert len(BY_NAME) == len(FEATURES) >= 60
+
+
+@each(FEATURES)
+def test_mujoco_reads_what_the_format_means(feature: Feature, tmp_path: Path) -> None:
+    """The scene was written by hand, in another language than the file, and knows nothing of MuJoCo."""
+    path = written(feature, tmp_path)
+    audit = of_scene(path, feature.scene)
+    answer = measured(own.open_robot(str(path), urdf=False), audit.job) | {"told": []}
+    told = [row for row in rows("mujoco", answer, audit.wanted, audit.job["joints"]) if row.quantity in feature.about]
+    assert {row.verdict for row in told} <= {OK, NONE}, told
+
+
+REFUSED = ("URDF: floating joint",)
+"""Free joints on a link that is fixed to the world: our reading ends with MuJoCo's own sentence."""
+
+
+@each(tuple(feature for feature in FEATURES if feature.name not in REFUSED))
+def test_our_own_reading_is_what_the_format_means(feature: Feature, tmp_path: Path) -> None:
+    """What `crossbody audit` holds readers to on a user's file is right on every feature."""
+    path = written(feature, tmp_path)
+    audit = of_scene(path, feature.scene)
+    mine = opened(path)
+    told = [
+        row for row in rows("ours", mine.wanted, audit.wanted, audit.job["joints"]) if row.quantity in feature.about
+    ]
+    assert mine.job == audit.job
+    assert {row.verdict for row in told} <= {OK, NONE}, told
+
+
+@pytest.mark.parametrize(("name", "verdict", "quantity"), [
+    ("joint position of a class", WRONG, "M"),
+    ("fixed body with a pose under the world", WRONG, "gravity"),
+    ("frame", WRONG, "coordinates"),
+    ("gravity", WRONG, "gravity"),
+    ("spring", UNSUPPORTED, "springs"),
+    ("euler sequence of moving axes", OK, "reading"),
+])  # fmt: skip
+def test_what_is_known_of_pinocchio(name: str, verdict: str, quantity: str) -> None:
+    """A version of it that reads better ends this test, and the sentence in the changelog."""
+    row = judged(BY_NAME[name], "pinocchio")
+    assert isinstance(row, Row)
+    assert (row.verdict, row.quantity) == (verdict, quantity), row
+
+
+def test_a_page_and_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["conformance", "--feature", "gravity", "-e", "mujoco", "-e", "pinocchio", "--out", str(tmp_path / "out")])
+    assert end.value.code == 0
+    assert "mujoco 4" in capsys.readouterr().out
+    found = json.loads((tmp_path / "out" / "conformance.json").read_text())["rows"]
+    assert {(row["engine"], row["feature"], row["verdict"]) for row in found} == {
+        ("mujoco", "gravity", OK), ("mujoco", "gravity switched off", OK),
+        ("pinocchio", "gravity", WRONG), ("pinocchio", "gravity switched off", WRONG),
+    }  # fmt: skip
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "Readers of robot files" in page
+    assert "gravity switched off" in page
+
+
+def test_a_feature_that_there_is_not_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["conformance", "--feature", "warp drive", "--out", str(tmp_path / "out")])
+    assert end.value.code == 2
+    assert "warp drive" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,130 @@
+"""Metrics of friction: nought of what follows the law, and of what does not exactly what was done to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import G, box_on_floor, sphere_on_floor
+
+from crossbody import cases, engines
+from crossbody.cases import Case, Event, Mode, Tier, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.cases.files.case import case_of
+from crossbody.reports import metrics
+from crossbody.reports.measuring.truth import Truth, from_run
+
+NAMES = (
+    "cone_violation", "creep_speed", "friction_angle", "friction_impulse", "friction_power", "friction_work",
+    "law_residual", "slip_times", "stick_times",
+)  # fmt: skip
+SPEED, MU, RADIUS = 2.0, 0.2, 0.1
+STOP = 2.0 * SPEED / (7.0 * MU * G)
+
+
+def ball(**given: Any) -> Case:
+    """Return a sphere that slides, then rolls."""
+    scene = sphere_on_floor(MU, RADIUS, **given)
+    return case_of(scene, q0=[0, 0, RADIUS, 1, 0, 0, 0], v0=[SPEED, 0, 0, 0, 0, 0], t_end=0.5)
+
+
+CASE = ball()
+RUN = engines.load("reference").prepare(CASE, "compiled", samples=np.linspace(0.0, 0.5, 501)).run()
+TRUTH = from_run(RUN, Tier.A, "itself")
+
+
+def measured(name: str, run: Trajectory = RUN, case: Case = CASE, truth: Truth = TRUTH) -> float | None:
+    """Return one metric."""
+    return metrics.load(name).measure(truth, run, case)
+
+
+def pushed(change: Any) -> Trajectory:
+    """Return the run whose friction (n, 2) is another one."""
+    lam = np.array(RUN.lam)
+    lam[:, 1:] = change(lam[:, 1:])
+    return replace(RUN, lam=lam)
+
+
+def turned(angle: float) -> Any:
+    """Return what turns forces about the normal, rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return lambda force: force @ np.array([[c, s], [-s, c]])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_reference_has_none(name: str) -> None:
+    value = measured(name)
+    assert value is None if name == "slip_times" else abs(value or 0.0) < 1e-9
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_has_no_friction_has_no_such_number(name: str) -> None:
+    case = cases.load("bouncing_ball", "linear", t_end=0.6)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    value = measured(name, run, case, from_run(run, Tier.A, "itself"))
+    assert value is not None if name == "law_residual" else value is None
+
+
+@pytest.mark.parametrize("factor", [1.5, 0.5])
+def test_friction_beyond_its_bound_or_below_it_is_seen(factor: float) -> None:
+    run = pushed(lambda force: factor * force)
+    assert measured("cone_violation", run) == pytest.approx(max(factor - 1.0, 0.0), abs=1e-9)
+    assert measured("law_residual", run) == pytest.approx(MU * abs(factor - 1.0), rel=1e-3)
+    assert measured("friction_impulse", run) == pytest.approx(abs(factor - 1.0) * MU * G * STOP, rel=1e-2)
+    lost = 0.5 * SPEED**2 * 2.0 / 7.0
+    assert measured("friction_work", run) == pytest.approx(abs(factor - 1.0) * lost, rel=1e-2)
+
+
+@pytest.mark.parametrize("angle", [0.1, -0.4, np.pi])
+def test_friction_that_is_not_against_the_slip_is_seen(angle: float) -> None:
+    run = pushed(turned(angle))
+    assert measured("friction_angle", run) == pytest.approx(abs(angle), abs=1e-6)
+    assert measured("cone_violation", run) == pytest.approx(0.0, abs=1e-9)
+    power = MU * G * SPEED if angle == np.pi else 0.0
+    assert measured("friction_power", run) == pytest.approx(power, rel=1e-6, abs=1e-9)
+
+
+def test_creep_is_the_slip_of_what_holds() -> None:
+    slow = replace(RUN, v=RUN.v + np.array([3e-3, 4e-3, 0, 0, 0, 0]))
+    assert measured("creep_speed", slow) == pytest.approx(5e-3, rel=1e-9)
+    slides = RUN.t < 0.2
+    kept = {name: getattr(RUN, name)[slides] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")}
+    early = replace(RUN, ledger=None, **kept)
+    assert measured("creep_speed", early) is None
+
+
+def test_an_instant_that_is_late_is_seen_and_its_jump_is_not() -> None:
+    late = 3e-3
+    rows = {name: getattr(RUN, name) for name in ("q", "v", "gap", "lam", "energy", "mode")}
+    t = np.where(RUN.t >= STOP, np.maximum(RUN.t, STOP + late), RUN.t * (STOP + late) / STOP)
+    events = tuple(replace(e, t=e.t + late) if e.t > 0.0 else e for e in RUN.events)
+    run = replace(RUN, t=t, events=events, **rows)
+    assert measured("stick_times", run) == pytest.approx(late, rel=1e-9)
+    assert measured("friction_impulse", run) == pytest.approx(MU * G * late, rel=1e-2)
+
+
+def test_a_pair_slides_while_a_place_of_it_does() -> None:
+    """Corners that change one after the other are one change of their pair."""
+    scene = box_on_floor(0.3)
+    case = case_of(scene, q0=[0, 0, 0.1, 1, 0, 0, 0], v0=[1, 0, 0, 0, 0, 0], t_end=0.6)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    truth = from_run(run, Tier.A, "itself")
+    held = [e for e in run.events if e.t > 0.0]
+    assert len(held) == 4
+    apart = tuple(e for e in run.events if e.t == 0.0)
+    apart += tuple(replace(e, t=e.t + 1e-3 * k) for k, e in enumerate(held))
+    assert measured("stick_times", replace(run, events=apart), case, truth) == pytest.approx(3e-3, rel=1e-9)
+    again = (*apart, Event(t=0.5, contact=0, before=Mode.STICK, after=Mode.SLIP))
+    assert len(metrics.load("slip_times").own.instants(replace(run, events=again), case)) == 1  # type: ignore[attr-defined]
+
+
+def test_spheres_and_turned_planes_are_measured_alike() -> None:
+    found: list[Floats] = []
+    for turn in (0.0, 0.9):
+        case = ball(turn=turn)
+        run = engines.load("reference").prepare(case, "compiled", samples=np.linspace(0.0, 0.5, 51)).run()
+        values = [measured(name, run, case, from_run(run, Tier.A, "itself")) or 0.0 for name in NAMES]
+        found.append(np.abs(values))
+    assert max(map(np.max, found)) < 1e-9

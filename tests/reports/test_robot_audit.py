@@ -1,0 +1,160 @@
+"""`crossbody audit`: the published robots, what it prints, and its exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+from places import ROBOTS, ROOT
+
+from crossbody.reports.cli import main
+from crossbody.reports.importers.audit import audited
+from crossbody.reports.importers.causes import advice, explained
+from crossbody.reports.importers.compare import NONE, OK, WRONG, Row
+from crossbody.reports.importers.told import markdown, sarif
+
+pytest_plugins = ["pytester"]
+
+ARM = """<mujoco model="arm"><worldbody><body name="arm"><joint name="arm" axis="0 1 0"/>
+<inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .01"/></body></worldbody></mujoco>"""
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(str(end.value.code)), out, err
+
+
+@pytest.mark.parametrize("path", sorted(ROBOTS.glob("*/*.xml")), ids=lambda path: path.stem)
+def test_mujoco_and_our_tree_agree_on_every_published_robot(path: Path) -> None:
+    """The two yardsticks: whatever another reader is held to, they are the same to 1e-9."""
+    [(_, _, rows)] = audited(path, ["mujoco"], seconds=60.0)
+    assert {row.verdict for row in rows} <= {OK, NONE}, [row for row in rows if row.verdict not in (OK, NONE)]
+
+
+def test_what_is_known_of_pinocchio_and_a_published_robot() -> None:
+    """The pose of a body that is fixed to the world is left out: all that stands on it is turned."""
+    [(_, _, rows)] = audited(ROBOTS / "universal_robots_ur5e" / "ur5e.xml", ["pinocchio"], seconds=60.0)
+    assert [(row.quantity, row.where) for row in rows if row.verdict == WRONG] == [("frames", "base")]
+
+
+def test_a_table_of_80_columns_and_what_is_wrong_beneath_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.replace("<joint", '<joint frictionloss=".5" armature=".2"'))
+    code, out, err = run(["audit", str(path), "-e", "mujoco", "-e", "pinocchio"], capsys)
+    assert code == 0, out + err
+    assert max(map(len, out.splitlines())) <= 80
+    assert "mujoco: reads the same robot" in err
+    lines = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.startswith(("M ", "loops "))}
+    assert lines == {"M": ["ok", "ok"], "loops": ["-", "-"]}
+
+
+def test_rows_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    code, out, _ = run(["audit", str(path), "-e", "mujoco", "--json"], capsys)
+    assert code == 0
+    assert {"engine", "version", "reader", "quantity", "where", "value", "expected", "difference", "verdict", "cause",
+            "file", "line"} <= set(json.loads(out)[0])  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("<mujoco><worldbody/></mujoco>", "no joint"),
+    ("<mujoco>", "MuJoCo's compiler refuses it"),
+    ("<robot><link/></robot>", "MuJoCo's compiler refuses it"),
+    ("", "MuJoCo's compiler refuses it"),
+])  # fmt: skip
+def test_a_file_that_is_none_is_one_sentence(
+    text: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(text)
+    code, out, err = run(["audit", str(path), "-e", "mujoco"], capsys)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_wrong_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    code, _, err = run(["audit", str(tmp_path / "none.xml")], capsys)
+    assert code == 2
+    assert "none.xml" in err
+    code, _, err = run(["audit", str(path), "-e", "bullet"], capsys)
+    assert code == 2
+    assert "pinocchio" in err
+
+
+@pytest.fixture(scope="module")
+def explained_ur5e() -> list[Row]:
+    path = ROBOTS / "universal_robots_ur5e" / "ur5e.xml"
+    found = [row for _, _, rows in audited(path, ["pinocchio"], seconds=60.0) for row in rows]
+    return explained(path, urdf=False, rows=found, seconds=60.0)
+
+
+def test_a_difference_is_traced_to_a_feature_and_its_line(explained_ur5e: list[Row]) -> None:
+    """Line 37 is the base of the arm: a body without joints that is turned."""
+    [row] = [row for row in explained_ur5e if row.verdict == WRONG]
+    assert (row.quantity, row.cause, row.line) == ("frames", "fixed body with a pose under the world", 37)
+    assert advice(row.cause)
+
+
+def test_sarif_and_markdown_tell_what_the_rows_do(explained_ur5e: list[Row]) -> None:
+    path = ROBOTS / "universal_robots_ur5e" / "ur5e.xml"
+    told = json.loads(sarif(path, explained_ur5e))
+    [run] = told["runs"]
+    rules = {rule["id"] for rule in run["tool"]["driver"]["rules"]}
+    levels = [(one["ruleId"], one["level"]) for one in run["results"]]
+    assert ("fixed body with a pose under the world", "error") in levels
+    assert {rule for rule, _ in levels} == rules
+    assert all(one["locations"][0]["physicalLocation"]["region"]["startLine"] >= 1 for one in run["results"])
+    text = markdown(path, explained_ur5e)
+    assert "| frames | 1.0e+00 |" in text
+    assert "Line 37" in text
+
+
+def test_explain_sarif_and_markdown_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.replace("<worldbody>", '<option gravity="0 0 -3"/><worldbody>'))
+    files = ["--sarif", str(tmp_path / "a.sarif"), "--markdown", str(tmp_path / "a.md")]
+    code, out, err = run(["audit", str(path), "-e", "pinocchio", "--explain", *files], capsys)
+    assert code == 1, out + err
+    assert "arm.xml:1: gravity (pinocchio: gravity, bias, energy)" in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert json.loads((tmp_path / "a.sarif").read_text())["version"] == "2.1.0"
+    assert (tmp_path / "a.md").read_text().startswith("### arm.xml")
+    code, _, err = run(["audit", str(path), "-e", "mujoco", "--sarif", str(tmp_path / "none" / "a")], capsys)
+    assert code == 2
+    assert "cannot be written" in err
+
+
+def test_one_pytest_item_a_reader_and_quantity(pytester: pytest.Pytester) -> None:
+    pytester.makefile(".xml", arm=ARM.replace("<worldbody>", '<option gravity="0 0 -3"/><worldbody>'))
+    found = pytester.runpytest_subprocess(
+        "--crossbody-audit", "arm.xml", "--crossbody-engine", "mujoco", "--crossbody-engine", "pinocchio", "-rA"
+    )
+    counts = found.parseoutcomes()
+    assert counts["failed"] == 3  # gravity, bias and energy
+    found.stdout.fnmatch_lines(["PASSED *arm.xml::mujoco::gravity", "FAILED *arm.xml::pinocchio::gravity*"])
+    found = pytester.runpytest_subprocess("--crossbody-audit", "none.xml")
+    found.stdout.fnmatch_lines(["*There is no robot file*"])
+
+
+@pytest.mark.parametrize(("gravity", "code"), [("0 0 -9.81", 0), ("0 0 -3", 1)])
+def test_the_steps_of_the_action_run_as_a_script(gravity: str, code: int, tmp_path: Path) -> None:
+    """What a GitHub runner does with a composite action: its shell, its inputs in the environment."""
+    step = yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"][-1]
+    (tmp_path / "arm.xml").write_text(ARM.replace("<worldbody>", f'<option gravity="{gravity}"/><worldbody>'))
+    given = {"FILES": "arm.xml", "ENGINES": "mujoco pinocchio", "SARIF": "told", "GITHUB_STEP_SUMMARY": "summary.md"}
+    done = subprocess.run(["bash", "-eo", "pipefail", "-c", step["run"]], cwd=tmp_path, env=os.environ | given,
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == code, done.stdout + done.stderr
+    assert "### arm.xml" in (tmp_path / "summary.md").read_text()
+    results = json.loads((tmp_path / "told" / "arm.xml.sarif").read_text())["runs"][0]["results"]
+    assert bool(results) == bool(code)

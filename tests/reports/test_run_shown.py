@@ -1,0 +1,90 @@
+"""What `run` prints: who is off and why, in a table that fits and loses no digit."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import click
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crossbody.reports.commands import run_shown
+from crossbody.reports.judging.parts import part_of
+from crossbody.reports.judging.told import runs_of, sentence
+from crossbody.reports.judging.verdict import Row, Verdict, Word
+
+NARROW = 62
+"""Width that the errors of the longest name need."""
+
+
+def row(engine: str, metric: str, value: float, verdict: Word, limit: float = math.nan, case: str = "ball") -> Row:
+    return Verdict(
+        case=case, variant="v", engine=engine, profile="matched", metric=metric, value=value, unit="1", limit=limit,
+        tier="A", verdict=verdict, why="the reason",
+    ).row()  # fmt: skip
+
+
+errors = st.floats(1e-300, 1e300) | st.just(math.nan) | st.just(math.inf) | st.floats(-1e3, 1e3)
+
+
+@given(st.lists(st.tuples(errors, errors, st.floats(1e-6, 1e5)), min_size=1, max_size=6), st.integers(NARROW, 200))
+def test_the_table_fits_and_loses_no_digit(given_: list[tuple[float, float, float]], width: int) -> None:
+    rows, times = [], {}
+    for i, (error, step, wall) in enumerate(given_):
+        rows += [row(f"engine{i}", "position", error, Word.WITHIN),
+                 row(f"engine{i}", part_of("position", "step"), step, Word.INFO)]  # fmt: skip
+        times["ball:v", f"engine{i}:matched"] = wall, 2.0 * wall
+    heads, _, *lines = click.unstyle(run_shown.table(runs_of(rows), times, width)).splitlines()
+    assert max(map(len, (heads, *lines))) <= width
+    names = [head for head in heads.replace("in all", "all").split() if head[0] != "["]
+    for line, (error, step, _) in zip(lines, given_, strict=True):
+        shown = dict(zip(names, line.split()[1:], strict=True))
+        for name, value in (("position", error), ("step", step)):
+            if name in shown and value == value:
+                assert shown[name] == f"{value:.1e}"
+
+
+def test_columns_go_before_digits_and_errors_go_last() -> None:
+    rows = [row("mujoco", name, 1.23e-4, Word.INFO) for name in run_shown.SHOWN.values()]
+    rows.append(row("mujoco", "velocity", 1.0, Word.EXPECTED))
+    times = {("ball:v", "mujoco:matched"): (12.5, 80.0)}
+    shown = [
+        [head for head in (*run_shown.LEFT_OUT, "position", "outside") if head in table.splitlines()[0]]
+        for table in (run_shown.table(runs_of(rows), times, width) for width in range(200, 20, -1))
+    ]
+    assert "position" in shown[-1]
+    assert len(shown[0]) == len(run_shown.LEFT_OUT) + 1, "nothing is within: the column says nothing"
+    assert all(set(after) <= set(before) for before, after in pairwise(shown))
+
+
+def test_the_sentence_names_who_is_off_by_how_much_and_by_which_part() -> None:
+    rows = [
+        row("reference", "position", 1e-9, Word.WITHIN, 1e-6), row("mujoco", "velocity", 2e-3, Word.OUTSIDE, 1e-3),
+        row("mujoco", "position", 5e-3, Word.OUTSIDE, 1e-4),
+        row("mujoco", part_of("position", "model"), -4.9e-3, Word.INFO),
+        row("mujoco", part_of("position", "step"), 1e-4, Word.INFO),
+    ]  # fmt: skip
+    text = sentence(runs_of(rows))
+    assert text.startswith("1 of 2 runs are within all limits.")
+    assert "mujoco:matched on ball:v (position 0.005, 50 times its limit, mostly its model)" in text
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_has_no_number_is_off_the_farthest(value: float) -> None:
+    rows = [row("a", "position", 1.0, Word.OUTSIDE, 1e-9), row("b", "lam_impulse", value, Word.OUTSIDE, 1.0)]
+    assert "Off: b:matched on ball:v (lam_impulse outside); a:matched" in sentence(runs_of(rows))
+
+
+def test_an_engine_that_is_absent_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [row("drake", "run", math.nan, Word.SKIPPED, case=f"case{i}") for i in range(5)]
+    run_shown.show([*rows, row("reference", "position", 1e-9, Word.WITHIN, 1e-6)], {})
+    said = capsys.readouterr().out
+    assert said.count("drake") == 1
+    assert "skipped: drake:matched on 5 cases. the reason" in said
+
+
+def test_a_row_without_a_unit_has_none(capsys: pytest.CaptureFixture[str]) -> None:
+    run_shown.show([row("mujoco", "position", 2.0, Word.OUTSIDE, 1.0)], {})
+    assert "outside: ball:v mujoco:matched position 2, limit 1. the reason" in capsys.readouterr().out
