@@ -103,7 +103,7 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     code = settle.settle(K, s, m, w, b)
     if code != 0:
         return int(code)
-    s.unsettled, s.jumps = 0, 1
+    s.unsettled, s.jumps, s.watched = 0, 1, 0
     peaks.forget(s, w, b.mode)
     s.method = EXPLICIT
     s.stalled, s.hold, s.full_jacobian = 0, 0, 0
@@ -146,6 +146,8 @@ def _take_over(s: Any, w: Work) -> None:
     copy(w.gaps[last], w.gaps[0])
     copy(w.rates[last], w.rates[0])
     copy(w.guards[last], w.guards[0])
+    if s.watched:
+        copy(w.cones[last], w.cones[0])
 
 
 @compiled
@@ -235,7 +237,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     code = events.scan(K, s, m, w, b.mode)
     if code == TOO_LONG:
         s.rejected += 1
-        s.h = 0.5 * s.theta * s.hs
+        s.h, s.watched = 0.5 * s.theta * s.hs, 0
         return 0
     s.steps += 1
     s.implicit_steps += s.method == IMPLICIT

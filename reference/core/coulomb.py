@@ -103,6 +103,7 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
         if has_friction(m, i) and w.slides[i]:
             if has_begun(w, i) and slip(m, w, i, rate) > CLEAR * max(small_slip(s), _rest(m, w, i)):
                 count_from_none(m, w, i)
+                s.watched = 0
             if slip(m, w, i, rate) > small_slip(s):
                 _face(m, w, i, rate)
     if s.na > 0 and s.dependent_rows > 0:

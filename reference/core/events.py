@@ -133,16 +133,20 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
             scatter(s, w, w.lams[node])
             if s.frictional:
                 ask(WATCH, s, m, w, node)
-    for node in range(0, NODES if s.frictional and multipliers else 0, NODES - 1):
-        dense.state(s, m, w, at_node(node), w.ys)
-        if (
-            accelerate(
-                K.dynamics, K.rows, K.solve, s, m, w, s.t_old + at_node(node) * s.hs, w.ys[: s.nq], w.ys[s.nq :], OWN
-            )
-            != 0
-        ):
+    if s.frictional and multipliers:
+        return _watch_ends(K, s, m, w)
+    return 0
+
+
+@compiled
+def _watch_ends(K: Any, s: Any, m: Model, w: Work) -> int:
+    """How far contacts are from sliding, and from jams, at the step's ends; what its last one has told holds still."""
+    for node in range(NODES - 1 if s.watched else 0, NODES, NODES - 1):
+        t, y = (s.t_old, w.y) if node == 0 else (s.t_old + s.hs, w.y1)
+        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], OWN) != 0:
             return 1
         ask(WATCH, s, m, w, node)
+    s.watched = 1
     return 0
 
 
@@ -192,7 +196,8 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
         code = _scan_switches(K, s, m, w, mode)
         if code != 0:
             return int(code)
-    any_gap, any_multiplier = False, False
+    any_gap, any_multiplier, watched = False, False, s.watched
+    s.watched = 0
     hit, kind, unilateral, follows = w.hit, w.kind, m.unilateral, m.follows
     for i in range(s.nc):
         hit[i] = NEVER
@@ -213,6 +218,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
         if s.theta <= 1.0:
             _tie(s, w)
         return 0
+    s.watched = watched and any_multiplier
     if dense.prepare(K, s, m, w) != 0 or _fill_nodes(K, s, m, w, any_multiplier) != 0:
         return ILL_POSED
     for i in range(s.nc):

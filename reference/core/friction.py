@@ -128,6 +128,18 @@ def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
 
 
 @compiled
+def watch_slips(s: Any, m: Model, w: Work, stage: int) -> None:
+    """Keep the slips of contacts that slide, along their directions of reference, at a stage of a step."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and w.slides[i]:
+            total = 0.0
+            for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+                total += (w.hda[w.listed[t]] - w.rest[t]) * w.way[t]
+            w.slip_at[stage, i] = total
+
+
+@compiled
 def is_tangent(m: Model, i: int) -> bool:
     """Whether row i is a tangential row of a contact with friction."""
     return bool(m.follows[i] >= 0 and m.tangents[m.follows[i]] > 0)

@@ -125,6 +125,7 @@ STATE = np.dtype(
         ("spoilt", "i8"),  # a row holds what is not finite
         ("events", "i8"),
         ("switches", "i8"),
+        ("watched", "i8"),  # w.cones has the end of the last step
         ("jumps", "i8"),  # loads may do so at this instant, so that slips without a direction are decided anew
         ("slip_speed", "f8"),  # largest speed seen at contacts with friction
         ("unknowns", "i8"),  # of the algebra of friction: how many,
@@ -242,6 +243,7 @@ class Work:
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
     lam_at: Floats2  # (12, nc) multipliers at the stages, 0 left out
+    slip_at: Floats2  # (12, nc) slips along their directions of reference, likewise; empty without friction
     gap_at: Floats2  # (3, nc) gaps at three of the stages
     gap: Floats
     rate: Floats
@@ -356,7 +358,8 @@ def workspace(
         **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot", "pull", "shift"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
-        "lam_at": (STAGES_MOST, nc), "gap_at": (BETWEEN, nc), "guard_at": (BETWEEN, ng),
+        "lam_at": (STAGES_MOST, nc), "slip_at": (STAGES_MOST * frictional, nc),
+        "gap_at": (BETWEEN, nc), "guard_at": (BETWEEN, ng),
         "window": (WINDOW_LEVELS, FUNCTIONS_MOST * (NODES + 2) + NODES),
         **dict.fromkeys(("parts", "bands", "tiny"), (FUNCTIONS_MOST,)),
         **dict.fromkeys(("guard", "guard_hit"), (ng,)),
