@@ -23,7 +23,7 @@ from crossbody.reference.tree.system import system
 ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
 EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
 HEAVIEST = 2.0  # kg
-CHATTERING = {120, 158}  # an edge that slides at mu > 0.85: its ends press in turn, and no set of modes holds for long
+CYCLING = {158}  # an edge slides at mu = 0.97: its ends press in turn, until at one instant no set of modes holds
 FURTHER = (1090, 1481, 2129, 2629)
 QUICK = (*range(60), 70, 147, 210, 240, 264, 304, 325, 417, 499, 536, 572, *FURTHER)  # each broke one rule or another
 STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
@@ -64,8 +64,8 @@ def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
 )
 def test_cones_power_and_energy_of_bodies_with_edges(seed: int) -> None:
     scene, q0, v0, mu = tossed(seed, EDGED, 1)
-    run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=20_000)
-    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE) or seed in CHATTERING, run_.message
+    run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=150_000)
+    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE) or seed in CYCLING, run_.message
     obeys(scene, run_, mu, 1e-6)
 
 
