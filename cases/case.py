@@ -199,6 +199,7 @@ class Limit:
         known: a known property of the engine that takes it outside; empty if it should be within.
         known_size: how far that property may take it; beyond, it is outside like any other. Where it is infinite, the
             size is that of a stored run; without one, what lies beyond the limit is not judged.
+        known_least: how far it takes it at least, where that is known beforehand; 0 where it is not.
         covers_none: whether the property explains too that a run has no such number where the truth has one.
     """
 
@@ -209,6 +210,7 @@ class Limit:
     why: str = ""
     known: str = ""
     known_size: float = math.inf
+    known_least: float = 0.0
     covers_none: bool = False
 
     def covers(self, engine: str, profile: str) -> bool:

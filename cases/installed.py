@@ -45,7 +45,7 @@ class Kind(NamedTuple):
 KINDS = {
     "crossbody.cases": Kind("case", ("PARAMETERS", "VARIANTS", "build")),
     "crossbody.engines": Kind("engine", ("ENGINE",)),
-    "crossbody.engines.importers": Kind("importer", ("FORMATS", "PACKAGE", "open_robot")),
+    "crossbody.engines.importers": Kind("importer", ("FORMATS", "PACKAGE", "MODULE", "open_robot")),
     "crossbody.hw.formats": Kind("log format", ("SUFFIXES", "Options", "recognises", "open_log")),
     "crossbody.hw.models": Kind("model", ("MODEL",)),
     "crossbody.reports.metrics": Kind("metric", ("UNIT", "CLAIMED", "measure")),

@@ -119,7 +119,7 @@ def ensemble(
     spaces: SimpleQueue[CompiledRun] = SimpleQueue()
     for _ in range(count):
         spaces.put(_space(system, job, settings))
-    loop = bound(_loop(), kernels.NAMES, tuple(system.kernels.values()), advance_address())
+    loop = bound(compile_loop(), kernels.NAMES, tuple(system.kernels.values()), advance_address())
     edges = np.unique(np.linspace(0, job.size, count * CHUNKS + 1).astype(int))
     began = time.perf_counter()
     with ThreadPoolExecutor(count) as pool:
@@ -228,7 +228,7 @@ def _runs(at, first, last, template, state, model, work, buffers, p, laws, start
 
 
 @cache
-def _loop() -> Any:
+def compile_loop() -> Any:
     """Those runs without the interpreter's lock."""
     word, lines, state = types.int64, types.float64[:, ::1], numba.typeof(np.zeros(1, STATE))
     laws = types.float64[:, :, :, ::1]

@@ -101,7 +101,13 @@ def _go(at, state, model, work, buffers, budget):  # type: ignore[no-untyped-def
 
 @cache
 def _going() -> Any:
+    """That program as it is called from Python."""
     return compiled(_go, [types.int64(ADDRESSES, _state(), TABLE, TABLE, TABLE, types.int64)])
+
+
+def compile_loop() -> None:
+    """Have the loop ready, from the cache or compiled."""
+    program(), _going()
 
 
 def advance_address() -> int:

@@ -360,20 +360,22 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
     help="A reader that has not come back by then is ended, s.",
 )
 @click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
+@click.option("--fix", type=click.Path(path_type=Path), metavar="OUT", help="Write FILE so that more readers agree.")
 @click.option("--sarif", type=click.Path(path_type=Path), metavar="F", help="Write the findings as SARIF too.")
 @click.option("--markdown", type=click.Path(path_type=Path), metavar="F", help="Write a summary in Markdown too.")
 @speaks
 def audit(
-    file: Path, engines: tuple[str, ...], without: str, limit: float, explain: bool, sarif: Path | None,
-    markdown: Path | None,
+    file: Path, engines: tuple[str, ...], without: str, limit: float, explain: bool, fix: Path | None,
+    sarif: Path | None, markdown: Path | None,
 ) -> int:  # fmt: skip
     """Say whether every engine's own reader makes the same robot of FILE (MJCF or URDF), where not, and why."""
     from crossbody.reports.commands.audit import Ask
     from crossbody.reports.commands.audit import audit as work
 
     asked = Ask(
-        path=file, engines=engines, without=without, seconds=limit, explain=explain, sarif=sarif, markdown=markdown
-    )
+        path=file, engines=engines, without=without, seconds=limit, explain=explain, fix=fix, sarif=sarif,
+        markdown=markdown,
+    )  # fmt: skip
     return work(asked)
 
 
@@ -419,6 +421,15 @@ def log_info(path: Path, columns: str | None, part: int | None, draft: bool, mem
     from crossbody.reports.replay.log import info
 
     return info(path, columns, part, draft, memory)
+
+
+@cli.command()
+@speaks
+def warm() -> int:
+    """Compile ahead what runs need, on all processors."""
+    from crossbody.reports.commands.warm import warm as work
+
+    return work()
 
 
 @cli.group(invoke_without_command=True)

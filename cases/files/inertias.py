@@ -79,8 +79,8 @@ CHANGING = ("settotalmass", "boundmass", "boundinertia", "balanceinertia", "fuse
 def of_shapes(path: Path) -> dict[str, Inertia]:
     """Return the inertias of the named bodies of an MJCF that are those of their shapes alone, in closed form.
 
-    Bodies with a shape that is none of `SOLIDS`, or a shell, are left to the compiler; so is a file of which meshes that
-    are only drawn are not there.
+    Bodies with a shape that is none of `SOLIDS`, or a shell, are left to the compiler; so is a file of which meshes
+    that are only drawn are not there.
     """
     import mujoco
 

@@ -1,9 +1,9 @@
 """What an engine's own reader makes of a robot file: one module an importer, each run in a process of its own.
 
-A module has `FORMATS` (of "mjcf" and "urdf"), `PACKAGE` (what has to be installed) and `open_robot(path, urdf)`, which
-returns a `Robot`. It is loaded by its path where crossbody may not be installed, so it imports nothing of ours, and its
-engine only inside its functions: CROSSBODY_PYTHON_NEWTON=/path/to/python names the interpreter of the importer newton,
-where that is not this one.
+A module has `FORMATS` (of "mjcf" and "urdf"), `PACKAGE` (what has to be installed), `MODULE` (what is imported of it)
+and `open_robot(path, urdf)`, which returns a `Robot`. It is loaded by its path where crossbody may not be installed, so
+it imports nothing of ours, and its engine only inside its functions: CROSSBODY_PYTHON_NEWTON=/path/to/python names the
+interpreter of the importer newton, where that is not this one.
 """
 
 from __future__ import annotations

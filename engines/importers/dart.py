@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("mjcf", "urdf"), "dartpy"
+FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "dartpy", "dartpy"
 KINDS = {"FreeJoint": "free", "BallJoint": "ball", "RevoluteJoint": "hinge", "PrismaticJoint": "slide"}
 
 
@@ -78,7 +78,12 @@ class _Robot:
         return told
 
     def place(self, q: Any, v: Any) -> None:
-        at = 0
+        """A free joint counts from where its body stands in the file, its velocities are the world's all the same."""
+        at, q = 0, np.array(q)
+        for (_, _, kind, first, _), (joint, _) in zip(self.joints, self._joints, strict=True):
+            if kind == "free":
+                stands, here = joint.getTransformFromParentBodyNode(), slice(first, first + 6)
+                q[here] = joint.convertToPositions(stands.inverse().multiply(joint.convertToTransform(q[here])))
         for s in self._s:
             n = s.getNumDofs()
             s.setPositions(q[at : at + n])

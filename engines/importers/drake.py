@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("mjcf", "urdf"), "drake"
+FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "drake", "pydrake"
 KINDS = {"quaternion_floating": "free", "ball_rpy": "ball", "revolute": "hinge", "prismatic": "slide"}
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("mjcf", "urdf"), "mujoco"
+FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "mujoco", "mujoco"
 KINDS = ("free", "ball", "slide", "hinge")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("mjcf", "urdf"), "newton"
+FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "newton", "newton"
 KINDS = {0: "slide", 1: "hinge", 2: "ball", 4: "free"}
 FIXED = 3
 
@@ -71,7 +71,7 @@ class _Robot:
         self.actuators: dict[str, list[str]] = {}
         self.hidden = self.hidden | {"actuators": "Newton's actuators carry no names of the file's."}
         equalities = getattr(m.mujoco, "equality_constraint_count", 0) if hasattr(m, "mujoco") else 0
-        self.loops = max(sum(loops), int(equalities)) + len(m.constraint_mimic_label)
+        self.loops = max(sum(loops) + len(m.constraint_mimic_label), int(equalities))
         self.numbers = self._numbers()
 
     def _numbers(self) -> dict[str, dict[str, Any]]:
@@ -80,10 +80,11 @@ class _Robot:
             key: getattr(self._m, f"joint_{key}").numpy()
             for key in ("armature", "friction", "limit_lower", "limit_upper", "damping", "stiffness")
         }
-        for name, _, kind, _, dof in self.joints:
+        for name, _, kind, at, dof in self.joints:
             single = kind in ("hinge", "slide")
             values = {
-                **{key: arrays[key][dof] for key in ("armature", "friction", "damping", "stiffness")}, "rest": 0.0,
+                **{key: arrays[key][dof] for key in ("armature", "friction", "damping", "stiffness")},
+                "rest": float(self._m.joint_rest_q.numpy()[at]) if arrays["stiffness"][dof] else 0.0,
                 "lower": arrays["limit_lower"][dof] if single else -np.inf,
                 "upper": arrays["limit_upper"][dof] if single else np.inf,
             }  # fmt: skip
@@ -114,8 +115,9 @@ class _Robot:
         M, starts = np.zeros((self.nv, self.nv)), self._m.articulation_start.numpy()
         first = [*self._m.joint_qd_start.numpy()[: self._m.joint_count].tolist(), self.nv]
         for k, block in enumerate(self._M.numpy()):
-            a, b = first[starts[k]], first[starts[k + 1]]
-            M[a:b, a:b] = block[: b - a, : b - a]
+            a = first[starts[k]]
+            n = min(first[starts[k + 1]] - a, len(block))  # joints that close loops stand behind those of the tree
+            M[a : a + n, a : a + n] = block[:n, :n]
         return M
 
     def mass_matrix(self) -> Any:

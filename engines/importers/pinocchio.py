@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("mjcf", "urdf"), "pin"
+FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "pin", "pinocchio"
 NO_SPRINGS = "Pinocchio's model has no springs."
 
 
@@ -40,6 +40,8 @@ class _Robot:
         else:
             self._m, *constraints = pin.buildModelAndConstraintsFromMJCF(path)
         self._d = self._m.createData()
+        self._bare = self._m.copy()
+        self._bare.armature[:] = 0.0
         self.nq, self.nv = self._m.nq, self._m.nv
         self.loops = sum(len(group) for group in constraints)
         self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
@@ -88,7 +90,9 @@ class _Robot:
         return np.array(self._pin.nonLinearEffects(self._m, self._d, self._q, self._v))
 
     def energy(self) -> float:
-        kinetic = self._pin.computeKineticEnergy(self._m, self._d, self._q, self._v)
+        """Of 4.1.0's kinetic energy some types of joints leave their armature out, which M has: it is added here."""
+        kinetic = self._pin.computeKineticEnergy(self._bare, self._d, self._q, self._v)
+        kinetic += self._m.armature @ self._v**2 / 2
         return float(kinetic + self._pin.computePotentialEnergy(self._m, self._d, self._q))
 
     def frames(self) -> Any:

@@ -226,13 +226,14 @@ def main(importer: str, file: str, kind: str, answer: str, size: str) -> None:
     if spec is None or spec.loader is None:
         raise ImportError(f"{importer} is no Python file")
     module = module_from_spec(spec)
-    package = str(getattr(module, "PACKAGE", ""))
     try:
         spec.loader.exec_module(module)
-        package = module.PACKAGE
         told = measured(module.open_robot(file, kind == "urdf"), json.load(sys.stdin))
     except ModuleNotFoundError as error:
-        told = {"status": "absent", "why": f"It needs the package {package}, which is not installed ({error.name})."}
+        lacking = (error.name or "").partition(".")[0]
+        own = lacking == module.MODULE
+        why = f"It needs the package {module.PACKAGE if own else lacking}, which is not installed."
+        told = {"status": "absent" if own else "failed", "why": why}
     except MemoryError:
         told = {"status": "failed", "why": f"It wants more than {int(size) >> 20} MiB of memory."}
     except Exception as error:

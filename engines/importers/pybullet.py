@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE = ("urdf",), "pybullet"
+FORMATS, PACKAGE, MODULE = ("urdf",), "pybullet", "pybullet"
 KINDS = {0: "hinge", 1: "slide", 2: "ball"}
 FIXED = 4
 
@@ -18,7 +18,7 @@ class _Robot:
         "rest": "PyBullet's joints have no springs.", "actuators": "PyBullet drives joints, not actuators of a file.",
         "energy": "PyBullet tells no energy.",
     }  # fmt: skip
-    precision = 1e-6
+    precision = 1e-5
     loops = 0
 
     def __init__(self, path: str) -> None:

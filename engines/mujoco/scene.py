@@ -382,7 +382,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
         "gravity": 0.0 if weightless else float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
-    if profile != "as_is":
+    if profile == "matched" or not case.general:
         found["constants"] = rows.constants(own=profile == "default")
     hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
     if profile == "default" and not case.general:

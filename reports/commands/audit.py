@@ -6,7 +6,7 @@ import json
 import os
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from crossbody.cases import EngineUnavailable, OutputError, UnknownName
@@ -17,6 +17,7 @@ from crossbody.reports.importers import told
 from crossbody.reports.importers.audit import Audit, audited
 from crossbody.reports.importers.causes import advice, explained
 from crossbody.reports.importers.compare import FAILED, OK, QUANTITIES, UNSUPPORTED, WRONG, Row
+from crossbody.reports.importers.fix import fixed
 
 WIDTH, FIRST = 80, 13
 
@@ -31,7 +32,7 @@ class Ask:
         without: what is left out of the yardstick.
         seconds: what an importer may take.
         explain: whether causes are looked for.
-        sarif, markdown: files to write.
+        fix, sarif, markdown: files to write.
     """
 
     path: Path
@@ -39,6 +40,7 @@ class Ask:
     without: str = ""
     seconds: float = importers.SECONDS
     explain: bool = False
+    fix: Path | None = None
     sarif: Path | None = None
     markdown: Path | None = None
 
@@ -66,7 +68,16 @@ def audit(ask: Ask) -> int:
         _show(found, rows)
         if ask.explain:
             _explain(ask.path, rows)
-    return int(not told.alike(rows))
+    return int(not told.alike(rows)) if ask.fix is None else _fix(ask, ask.fix)
+
+
+def _fix(ask: Ask, out: Path) -> int:
+    """Write the file in plainer words, and audit that: its exit code."""
+    if not out.parent.is_dir() or (out.exists() and out.samefile(ask.path)):
+        raise OutputError(f"--fix {out}: it must be another file than {ask.path}, in a folder that is there.")
+    fixed(ask.path, out, ask.without)
+    voice.note(f"{out} means the same as {ask.path}; this is how it is read:")
+    return audit(replace(ask, path=out, fix=None, sarif=None, markdown=None))
 
 
 def read_by_all(ask: Ask) -> tuple[Audit, list[Row]]:

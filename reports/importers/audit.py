@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files.inertias import of_shapes, six
 from crossbody.cases.files.reading import findings_of, is_urdf, read, scene_of
 from crossbody.cases.files.text import check_text
+from crossbody.cases.files.urdf import parsed
+from crossbody.cases.files.without import without_meshes
 from crossbody.cases.scene import Body, Scene
 from crossbody.engines.importers import SECONDS, Reading
 from crossbody.reports.importers.compare import Row, rows
@@ -62,13 +66,34 @@ def audited(
         SceneError: for a file that cannot be the yardstick, before any importer is asked.
     """
     check_text(path)
-    readings = [Reading(name, path, is_urdf(path), seconds) for name in engines]
-    try:
-        found = audit or opened(path, without)
-    except BaseException:
-        for reading in readings:
-            reading.abandon()
-        raise
+    left_out = {word.strip() for word in without.split(",")}
+    if is_urdf(path):
+        left_out.add("actuators")  # of transmissions, which move nothing by themselves
+    with TemporaryDirectory(prefix="crossbody-audit-") as folder:
+        given = meshless(path, Path(folder)) if is_urdf(path) and without_meshes(without) else path
+        readings = [Reading(name, given, is_urdf(path), seconds) for name in engines]
+        try:
+            found = audit or opened(path, without)
+        except BaseException:
+            for reading in readings:
+                reading.abandon()
+            raise
+        yield from _answered(found, readings, left_out)
+
+
+def meshless(path: Path, folder: Path) -> Path:
+    """Return a copy of a URDF without what is drawn or touches by a mesh, none of which moves it."""
+    root = parsed(path)
+    for link in root.findall("link"):
+        for part in [*link.findall("visual"), *link.findall("collision")]:
+            if part.find("geometry/mesh") is not None:
+                link.remove(part)
+    copy = folder / path.name
+    ElementTree.ElementTree(root).write(copy, encoding="utf-8")
+    return copy
+
+
+def _answered(found: Audit, readings: Sequence[Reading], left_out: Set[str]) -> Iterator[tuple[Audit, str, list[Row]]]:
     with ThreadPoolExecutor(max(len(readings), 1)) as pool:
         answers = {pool.submit(reading.answer, found.job): reading.name for reading in readings}
         for done in as_completed(answers):
@@ -77,7 +102,8 @@ def audited(
             if answer["status"] == "absent":
                 found.absent[name] = answer["why"]
             else:
-                yield found, name, rows(name, answer, found.wanted, found.job["joints"])
+                told = rows(name, answer, found.wanted, found.job["joints"])
+                yield found, name, [row for row in told if row.quantity not in left_out]
 
 
 def opened(path: Path, without: str = "") -> Audit:

@@ -14,6 +14,8 @@ from crossbody.cases.arrays import Floats
 
 TOLERANCE = 1e-9
 """Of the largest entry: the same physics."""
+FLOOR = 1e-4
+"""Part of the largest force that is the scale of the smallest ones: rounding is that of the sums they stand in."""
 OK, WRONG, UNSUPPORTED, FAILED, NONE = "ok", "wrong", "unsupported", "failed", "-"
 QUANTITIES = (
     "reading", "coordinates", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping", "springs",
@@ -146,8 +148,12 @@ def _gaps(
     if not off:
         names = [name for name, _, kind in joints for _ in range({"free": 6, "ball": 3}.get(kind, 1))]
         yield "inertia", _inertia(found["inertias"], wanted["inertias"])
-        for key, gap in (("M", _matrix), ("gravity", _forces), ("bias", _forces)):
-            yield key, gap(_states(found, key, names), _states(wanted, key, names), names)
+        floor = 1.0 if found["precision"] else FLOOR
+        M = _states(wanted, "M", names)
+        yield "M", _matrix(_states(found, "M", names), M, names, floor)
+        moved = _moved(wanted, M)
+        for key in ("gravity", "bias"):
+            yield key, _forces(_states(found, key, names), _states(wanted, key, names), names, floor, moved)
         yield "energy", _energy(found, wanted, names)
         yield "frames", _frames(found["states"], wanted["states"])
     for key in ("armature", "damping", "springs", "limits", "friction"):
@@ -170,21 +176,32 @@ def _states(answer: Mapping[str, Any], key: str, names: Sequence[str]) -> Floats
     return found - np.diag(_armature(answer, names)) if key == "M" else found
 
 
-def _matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str]) -> Gap | None:
+def _matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float) -> Gap | None:
     if found is None or wanted is None:
         return None
     size = np.sqrt(np.abs(np.einsum("kii->ki", wanted)))
-    scale = np.maximum(size[:, :, None] * size[:, None, :], 1e-9 * float(np.abs(wanted).max(initial=1e-300)))
+    scale = np.maximum(
+        size[:, :, None] * size[:, None, :], min(floor, 1e-5) * float(np.abs(wanted).max(initial=1e-300))
+    )
     off = np.nan_to_num(np.abs(found - wanted) / scale, nan=math.inf)
     k, i, j = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
     where = names[i] if i == j else f"{names[i]}, {names[j]}"
     return Gap(float(off[k, i, j]), where, float(found[k, i, j]), float(wanted[k, i, j]))
 
 
-def _forces(found: Floats | None, wanted: Floats | None, names: Sequence[str]) -> Gap | None:
+def _moved(wanted: Mapping[str, Any], M: Floats | None) -> float:
+    """Return the size of forces at the velocities of the states, where there are no larger ones."""
+    v = np.array([state["v"] for state in wanted["states"]])
+    return 0.0 if M is None else float(np.abs(M).max(initial=0.0) * (v**2).max(initial=0.0))
+
+
+def _forces(
+    found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float, moved: float
+) -> Gap | None:  # fmt: skip
     if found is None or wanted is None:
         return None
-    scale = np.maximum(np.abs(wanted).max(axis=0), 1e-4 * float(np.abs(wanted).max(initial=0.0)))
+    largest = max(float(np.abs(wanted).max(initial=0.0)), moved)
+    scale = np.maximum(np.abs(wanted).max(axis=0), floor * largest)
     scale = np.where(scale > 0.0, scale, 1.0)
     off = np.nan_to_num(np.abs(found - wanted) / scale, nan=math.inf)
     k, i = map(int, np.unravel_index(int(np.argmax(off)), off.shape))

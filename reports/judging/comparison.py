@@ -153,7 +153,7 @@ def check_names(case: Case) -> None:
     for limit in case.limits:
         if limit.engine not in ("*", *installed):
             raise UnknownName(f"engine (in limits of {case.label})", limit.engine, installed)
-        if not (limit.value >= 0.0 and limit.known_size >= 0.0):
+        if not (limit.value >= 0.0 and limit.known_size >= limit.known_least >= 0.0):
             raise InvalidValue(f"{case.label}: the limit of {limit.metric} is {limit.value}; it must be at least 0.")
 
 

@@ -68,6 +68,7 @@ def truth_of(case: Case) -> Truth:
         trajectory=motion(sample_times(first, case.t_end)),
         at=motion,
         agreement={},
+        joined=case.general,
     )
     if "reference" not in engines.names() or not known(case):
         return truth

@@ -121,6 +121,8 @@ def explained(limit: Limit, stored: float | None) -> tuple[float, float] | None:
         limit: with the property.
         stored: deviation of a stored run with the same parameters and settings; None where there is none.
     """
+    if limit.known_least > 0.0:
+        return limit.known_least, limit.known_size
     if stored is not None:
         return stored / FACTOR, stored * FACTOR
     return (0.0, limit.known_size) if math.isfinite(limit.known_size) else None

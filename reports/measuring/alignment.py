@@ -33,9 +33,9 @@ def matched(truth: Truth, run: Trajectory) -> _Pairs:
 
 
 def turns(run: Trajectory) -> list[tuple[float, int, Mode]]:
-    """When rows pass from stick to slip or back, where lam jumps: instant, row, and mode behind, in order."""
+    """When rows begin to stick or to slip, or to slip another way, where lam jumps: instant, row, and mode behind."""
     between = {Mode.STICK, Mode.SLIP}
-    return sorted((e.t, e.contact, e.after) for e in run.events if {e.before, e.after} == between)
+    return sorted((e.t, e.contact, e.after) for e in run.events if {e.before, e.after} <= between)
 
 
 def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:

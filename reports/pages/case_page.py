@@ -16,6 +16,7 @@ from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import suits
 from crossbody.reports.pages.html import Page
+from crossbody.reports.pages.hysteresis import hysteresis
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results
@@ -47,7 +48,7 @@ def case_page(found: Results, case: CaseFiles) -> Page:
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about), engines=_engines(traces),
         sections=[
-            _glance(found, case), _verdicts(found, case), *playback(traces), *_plots(traces),
+            _glance(found, case), _verdicts(found, case), *playback(traces), *_plots(traces), *hysteresis(traces),
             *precision(found.out, case.label, found.rows.get(case.label, ()), _walls(found, case)),
             *studied(found.out, case.about), _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],

@@ -9,7 +9,9 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
+from crossbody.reports.figures.styles import label
 from crossbody.reports.measuring.impulse import with_collisions
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.sheet import Sheet
 from crossbody.reports.pages.strips import changing, modes
@@ -21,6 +23,8 @@ SAMPLE = 16
 FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
+BEYOND = 1.5
+"""Times the truth's largest force up to which forces are drawn."""
 ROUNDING = 1e-17
 """Depth below which there is none, m."""
 
@@ -92,8 +96,21 @@ def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
             exact = true[i]
             if exact is not None:
                 sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor))
+        _clip(sheet, 3 * place, traces, k)
     sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
+
+
+def _clip(sheet: Sheet, row: int, traces: Sequence[Trace], k: int) -> None:
+    """Leave what is far beyond the truth's force off the plot, and name it."""
+    ends = {label(trace): (np.nanmin(lam), np.nanmax(lam)) for trace in traces
+            if np.isfinite(lam := trace.run.lam[:, k]).any()}  # fmt: skip
+    low, high = ends.get(TRUTH, (0.0, 0.0))
+    reach = max(high, -low)
+    far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
+    if reach > 0.0 and far:
+        sheet.clip(row, BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach))
+        sheet.say(", ".join(f"{who} reaches {size:.2g} N" for who, size in far.items()))
 
 
 def energy(traces: Sequence[Trace], points: int = POINTS) -> Figure:
@@ -126,7 +143,7 @@ def penetration(traces: Sequence[Trace], points: int = POINTS) -> Figure:
             gap = trace.run.gap[:, k]
             depth = np.abs(gap) if on else -gap
             sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, np.nan))
-    sheet.logarithmic(*range(len(rows)))
+    sheet.logarithmic(*(row for row, on in enumerate(always) if on))
     return sheet.done()
 
 

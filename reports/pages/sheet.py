@@ -37,10 +37,20 @@ class Sheet:
         self.rows, self.title, self.points, self.group = rows, title, points, group
         self.lines: list[tuple[int, dict[str, Any]]] = []
         self.decades: set[int] = set()
+        self.ranges: dict[int, tuple[float, float]] = {}
+        self.said: list[str] = []
 
     def logarithmic(self, *rows: int) -> None:
         """Make the y axes of these plots (from 0 on) logarithmic."""
         self.decades |= set(rows)
+
+    def clip(self, row: int, low: float, high: float) -> None:
+        """Draw a plot between two values alone."""
+        self.ranges[row] = low, high
+
+    def say(self, text: str) -> None:
+        """Add to the title what cannot be seen."""
+        self.said.append(text)
 
     def line(self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, **more: Any) -> None:
         """One line of one engine into plot `row`, thinned; what is not finite is a gap."""
@@ -70,7 +80,9 @@ class Sheet:
 
     def _caption(self, drawn: Sequence[int]) -> str:
         empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
-        return f"{self.title}. Nothing to draw of: {', '.join(empty)}" if empty else self.title
+        told = [f"Nothing to draw of: {', '.join(empty)}"] if empty else []
+        told += [f"Off scale: {'; '.join(dict.fromkeys(self.said))}"] if self.said else []
+        return ". ".join([self.title, *told])
 
     def _axes(self, drawn: Sequence[int]) -> tuple[dict[str, Any], int]:
         """Axes of the plots that are drawn, and the height of the figure, pixels."""
@@ -85,6 +97,8 @@ class Sheet:
             axes |= _pair(number(i + 1), self.rows[row], [max(span[0], 0.0), span[1]], last[i])
             if i + 1 == len(drawn):
                 axes[f"xaxis{number(i + 1)}"]["title"] = {"text": "time [s]"}
+            if row in self.ranges:
+                axes[f"yaxis{number(i + 1)}"]["range"] = list(self.ranges[row])
             if row in self.decades:
                 axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 9, "exponentformat": "power"}
             top += heights[i] + below[i]

@@ -129,8 +129,8 @@ def _profiles(name: str, profile: str | None) -> Iterator[Pick]:
 
 
 def of_case(pick: Pick, case: Case) -> Pick:
-    """Return a pick, or for one of all profiles the one that stands for it where the case is a scene."""
-    if not pick.every or pick.skipped or not case.general:
+    """Return a pick, or for one of all profiles the one that stands for it where the case is a file."""
+    if not pick.every or pick.skipped or not case.file:
         return pick
     return replace(pick, profile=engines.load(pick.engine).of_scenes.get(pick.profile, pick.profile))
 

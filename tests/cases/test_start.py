@@ -12,6 +12,7 @@ from mechanisms import ball, flyby
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, SceneError
+from crossbody.engines.equations import system_of
 from crossbody.reference import Options, ensemble, prepare, simulate
 
 SOLVERS = ("compiled", "cvode", "ida")
@@ -129,6 +130,5 @@ ALL = [
 @pytest.mark.parametrize(("name", "variant"), ALL)
 def test_shipped_cases_start_on_their_rows_or_say_that_they_do_not(name, variant):
     case = cases.load(name, variant=variant)
-    system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
-    prepare(system, case.q0, case.v0, Options(t_end=case.t_end, rtol=1e-13, consistent=case.consistent))
+    prepare(system_of(case), case.q0, case.v0, Options(t_end=case.t_end, rtol=1e-13, consistent=case.consistent))
     assert case.consistent == ((name, variant) != ("bouncing_ball", "bilateral"))

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.files.case import case_of
+from crossbody.cases.mechanisms.friction.creep import Soft, creep
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.engines.equations import system_of
 from crossbody.reports.runs import jobs
@@ -94,23 +95,6 @@ def test_spheres_that_rub_push_along_the_frame_of_their_rows(order: int) -> None
     assert unexplained(case, found, some) < 1e-2
 
 
-def impedance(solimp: tuple[float, ...], depth: float) -> float:
-    """MuJoCo's impedance with midpoint 0.5 and power 2."""
-    low, high, width = solimp
-    x = min(depth / width, 1.0)
-    return low + (high - low) * (2.0 * x * x if x < 0.5 else 1.0 - 2.0 * (1.0 - x) ** 2)
-
-
-def depth_and_impedance(solimp: tuple[float, ...], stiffness: Any, pushed: Any) -> tuple[float, float]:
-    """Return depth and d with k d depth = R f, by bisection."""
-    low, high = 0.0, 0.1
-    for _ in range(200):
-        depth = 0.5 * (low + high)
-        d = impedance(solimp, depth)
-        low, high = (depth, high) if stiffness * d * depth < pushed * (1.0 - d) / d else (low, depth)
-    return depth, d
-
-
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
 @pytest.mark.parametrize("mu", [0.5, 0.9])
 @pytest.mark.parametrize("impratio", [1.0, 10.0])
@@ -126,17 +110,8 @@ def test_a_point_creeps_down_a_slope_as_its_parameters_say(
                                 soft=soft, speed="0 0"))  # fmt: skip
     found = run(cases.from_file(str(path), friction=1, t_end=2.0))
     assert set(found.mode[-100:, 0].tolist()) == {Mode.STICK}
-    tau, ratio, press = 0.02, 1.0, G * np.cos(np.arctan(SLOPE))
-    b, k = 2.0 / (solimp[1] * tau), 1.0 / (solimp[1] * tau * ratio) ** 2
-    if cone == "elliptic":
-        _, d = depth_and_impedance(solimp, k, press)
-        expected = (1.0 - d) / d * SLOPE * press / (impratio * b)
-    else:
-        rho, edge = SLOPE / mu, 2.0 * mu**2 * (1.0 + mu**2) / impratio
-        shared = 0.25 if rho <= 0.5 else 0.5 * (1.0 - rho)
-        depth, d = depth_and_impedance(solimp, k, edge * shared * press)
-        rest = k * d * depth
-        expected = rest * (2.0 * rho if rho <= 0.5 else (3.0 * rho - 1.0) / (1.0 - rho)) / (b * mu)
+    made = Soft(low=solimp[0], high=solimp[1], width=solimp[2], impratio=impratio)
+    expected = creep(mu, SLOPE, G * np.cos(np.arctan(SLOPE)), made, elliptic=cone == "elliptic")
     assert found.v[-1, 0] == pytest.approx(expected, rel=1e-2)
 
 

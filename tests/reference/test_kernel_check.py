@@ -31,7 +31,7 @@ VARIANTS = [
 @pytest.mark.parametrize(("name", "variant"), VARIANTS)
 def test_every_shipped_system_passes(name, variant):
     case = cases.load(name, variant=variant)
-    system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
+    system = system_of(case)
     for seed in range(3):
         check_kernels(system, np.array(case.q0), np.array(case.v0), t_end=case.t_end, seed=seed)
 
@@ -240,16 +240,16 @@ DEBUG = """
 
 SHIPPED = """
     import numpy as np
-    from importlib import import_module
     from mechanisms import sliders
     from crossbody import cases
+    from crossbody.engines.equations import system_of
     from crossbody.reference import System, kernels
 
     count = 0
     for name in cases.names():
         for variant in cases.variants(name):
             case = cases.load(name, variant)
-            system = import_module(f"crossbody.reference.systems.{case.mechanism}").build(case.parameters, case.law)
+            system = system_of(case)
             system.check(case.q0, case.v0, states=5, t_end=case.t_end)
             q, v, p = (np.array(x) for x in (case.q0, case.v0, system.p))
             u, s, mode = np.zeros(system.inputs), np.zeros(system.memory), np.zeros(system.nc, np.int8)

@@ -89,7 +89,7 @@ def numbers(coded: dict[str, str]) -> np.ndarray:
 
 def test_every_figure_is_there_and_has_data(out: Path) -> None:
     found = plots(out)
-    assert set(found) == {*figures.FIGURES, "precision"}
+    assert set(found) == {*figures.FIGURES, "hysteresis", "precision"}
     for name, figure in found.items():
         assert figure["data"], name
 

@@ -114,6 +114,32 @@ def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browse
     assert browser.complaints() == []
 
 
+def test_one_steps_from_event_to_event_and_sees_differences_larger(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    browser.wait(DRAWN)
+    drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+    def step(way: str) -> float:
+        browser.js(f"document.querySelector('[data-{way}]').click()")
+        browser.js(drawn)
+        return float(str(browser.js("document.querySelector('[data-readout]').textContent")).split()[2])
+
+    events = sorted({event.t for event in truth_of(load("bouncing_ball", "linear")).trajectory.events})
+    seen = [step("after") for _ in events]
+    assert seen == pytest.approx(events, abs=2e-3)
+    assert step("after") == seen[-1], "there is none behind the last"
+    assert step("before") == pytest.approx(events[-2], abs=2e-3)
+    plain = browser.picture(".player canvas")
+    browser.js(
+        "(() => { const field = document.querySelector('[data-differences]'); field.value = '100';"
+        " field.dispatchEvent(new Event('change')); })()"
+    )
+    browser.js(drawn)
+    assert browser.picture(".player canvas") != plain
+    assert browser.complaints() == []
+
+
 @pytest.fixture(scope="module")
 def solids(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of a scene: a plate that lies on a floor."""

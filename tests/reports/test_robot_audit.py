@@ -10,11 +10,13 @@ from pathlib import Path
 import pytest
 import yaml
 from places import ROBOTS, ROOT
+from robot_damage import damaged
 
+from crossbody.cases import CrossbodyError
 from crossbody.reports.cli import main
-from crossbody.reports.importers.audit import audited
+from crossbody.reports.importers.audit import audited, opened
 from crossbody.reports.importers.causes import advice, explained
-from crossbody.reports.importers.compare import NONE, OK, WRONG, Row
+from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WRONG, Row
 from crossbody.reports.importers.told import markdown, sarif
 
 pytest_plugins = ["pytester"]
@@ -158,3 +160,36 @@ def test_the_steps_of_the_action_run_as_a_script(gravity: str, code: int, tmp_pa
     assert "### arm.xml" in (tmp_path / "summary.md").read_text()
     results = json.loads((tmp_path / "told" / "arm.xml.sarif").read_text())["runs"][0]["results"]
     assert bool(results) == bool(code)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(ROBOTS.glob("*/*.xml")), ids=lambda path: path.stem)
+def test_a_file_with_one_thing_changed_is_read_or_refused(path: Path, tmp_path: Path) -> None:
+    """No change makes a fault of ours, and the two yardsticks agree on every one that they read: 40 a robot."""
+    text, read = path.read_text(), 0
+    for seed in range(40):
+        changed = tmp_path / f"{path.stem}{seed}.xml"
+        changed.write_text(damaged(text, seed))
+        try:
+            found = {engine: rows for _, engine, rows in audited(changed, ["mujoco", "pinocchio"], seconds=60.0)}
+        except CrossbodyError:
+            continue
+        read += 1
+        off = [row for row in found["mujoco"] if row.verdict not in (OK, NONE)]
+        assert not off, (seed, off)
+        assert found["pinocchio"][0].verdict in (OK, FAILED, UNSUPPORTED), seed
+    assert read >= 10
+
+
+@pytest.mark.parametrize(
+    ("number", "other"), [('mass="1"', 'mass="1.5"'), ('"0 0 .5"', '"0 0 .6"'), ('"0 1 0"', '"0 0 1"')]
+)
+@pytest.mark.parametrize("engine", ["mujoco", "pinocchio"])
+def test_a_change_is_seen_in_every_reader(engine: str, number: str, other: str, tmp_path: Path) -> None:
+    """Held to what the file said before, a reader is wrong; so the audit would have told of a reader that is."""
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    before = opened(path)
+    path.write_text(ARM.replace(number, other))
+    [(_, _, rows)] = audited(path, [engine], seconds=60.0, audit=before)
+    assert WRONG in {row.verdict for row in rows}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-HEAD = 'FORMATS, PACKAGE = ("mjcf", "urdf"), "numpy"\n\ndef open_robot(path, urdf):\n'
+HEAD = 'FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "numpy", "numpy"\n\ndef open_robot(path, urdf):\n'
 BAD = {
     "aborts": "    import os\n    os.abort()",
     "hangs": "    import time\n    time.sleep(600)",
@@ -15,6 +15,7 @@ BAD = {
     "leaves": "    raise SystemExit(0)",
     "chatters": "    print('word ' * 10_000_000)\n    raise RuntimeError('enough')",
     "nothing": "    return None",
+    "lacks": "    import there_is_no_such_module",
 }
 """Name -> what its `open_robot` does."""
 

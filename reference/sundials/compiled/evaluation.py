@@ -727,7 +727,7 @@ def _evaluate_at(at, what, t, y, out, lines):  # type: ignore[no-untyped-def]
 
 
 @cache
-def _compiled() -> tuple[Any, int]:
+def compile_equations() -> tuple[Any, int]:
     """`evaluate` as it is called from Python, and where it stands."""
     call = compiled(_evaluate_at, [types.int64(ADDRESSES, *_ARGUMENTS)])
     return call, address(compiled(evaluate, [_SIGNATURE]), _SIGNATURE)
@@ -735,7 +735,7 @@ def _compiled() -> tuple[Any, int]:
 
 def entry(system: System) -> Callable[..., int]:
     """The compiled `evaluate(what, t, y, out, lines)` of one system."""
-    call, program = _compiled()
+    call, program = compile_equations()
     return bound(call, _USED, [system.kernels[name] for name in _USED], program)
 
 

@@ -21,8 +21,8 @@
       return { ...track, t, poses, arrows, struck, blows, width: poses.length / t.length, pushes: arrows.length / t.length };
     });
     const find = (name) => root.querySelector(`[data-${name}]`);
-    const [play, clock, readout, speed, view, forces, longer, axes] =
-      ["play", "clock", "readout", "speed", "view", "forces", "longer", "axes"].map(find);
+    const [play, clock, readout, speed, view, forces, longer, axes, before, after, differences] =
+      ["play", "clock", "readout", "speed", "view", "forces", "longer", "axes", "before", "after", "differences"].map(find);
     const canvas = root.querySelector("canvas");
     const g = canvas.getContext("2d");
     let [now, running, last, turn, tilt, zoom] = [0, false, 0, 0.6, 0.35, 1];
@@ -59,6 +59,16 @@
     const middle = range.map(([a, b]) => (a + b) / 2);
     const size = space ? Math.hypot(...range.map(([a, b]) => b - a)) * 0.8 : 0;
 
+    const lead = tracks.find((track) => track.truth);
+    const larger = () => (differences && lead ? Number(differences.value) : 1);
+    // A pose with its difference to the truth's made larger: of bodies with shapes where they are, not how they are turned.
+    const pose = (track, t) => {
+      const [mine, factor] = [at(track, t), larger()];
+      if (factor === 1 || track === lead) return mine;
+      const true_ = at(lead, t).pose;
+      const moved = (k) => true_(k) + factor * (mine.pose(k) - true_(k));
+      return { ...mine, pose: (k) => (solids && k % 9 > 2 ? mine.pose(k) : moved(k)) };
+    };
     const at = (track, t) => {
       const times = track.t;
       let [low, high] = [0, times.length - 1];
@@ -69,7 +79,7 @@
       const gap = times[high] - times[low];
       const share = gap > 0 ? Math.min(Math.max((t - times[low]) / gap, 0), 1) : 0;
       const mix = (k) => track.poses[low * track.width + k] * (1 - share) + track.poses[high * track.width + k] * share;
-      const row = share > 0 ? high : low;
+      const row = share < 1 ? low : high; // what has been, so that no force is seen before its touch
       return { pose: mix, pushes: track.arrows.subarray(row * track.pushes, (row + 1) * track.pushes) };
     };
 
@@ -150,23 +160,23 @@
       if (axes.checked) crossbody.solids.axes(g, frames, to, 0.06 * size);
     };
     const paint = (track, to, h, ghost) => {
-      const { pose, pushes } = at(track, now);
+      const { pose: posed, pushes } = pose(track, now);
       g.strokeStyle = g.fillStyle = track.color;
       g.lineWidth = track.truth ? 4 : 1.8;
       g.setLineDash(ghost && track.strokes !== "none" ? track.strokes.split(" ").map(Number) : []);
-      if (solids) paintSolids(track, pose, to, ghost);
+      if (solids) paintSolids(track, posed, to, ghost);
       else if (space) {
         for (const line of stage.lines) {
-          trace(line.map((i) => to([pose(3 * i), pose(3 * i + 1), pose(3 * i + 2)])));
+          trace(line.map((i) => to([posed(3 * i), posed(3 * i + 1), posed(3 * i + 2)])));
           g.stroke();
         }
       } else {
         for (const [x, y, body] of stage.threads) {
-          trace([to([x, y]), to([pose(3 * body), pose(3 * body + 1)])]);
+          trace([to([x, y]), to([posed(3 * body), posed(3 * body + 1)])]);
           g.stroke();
         }
         stage.bodies.forEach((shapes, body) => {
-          const [x, y, angle] = [pose(3 * body), pose(3 * body + 1), pose(3 * body + 2)];
+          const [x, y, angle] = [posed(3 * body), posed(3 * body + 1), posed(3 * body + 2)];
           const [c, s] = [Math.cos(angle), Math.sin(angle)];
           const move = (p) => [x + c * p[0] - s * p[1], y + s * p[0] + c * p[1]];
           shapes.forEach((each) => shape(each, move, to, ghost));
@@ -280,14 +290,18 @@
     }
     play.addEventListener("click", () => run(!running));
     clock.addEventListener("input", () => seek((clock.value / 1000) * end, true));
-    [view, forces, longer, axes].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
+    const close = 1e-9 * (end || 1);
+    const step = (found) => { if (found !== undefined) { run(false); seek(found, true); } };
+    before.addEventListener("click", () => step(scene.events.findLast((t) => t < now - close)));
+    after.addEventListener("click", () => step(scene.events.find((t) => t > now + close)));
+    [view, forces, longer, axes, differences].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
     const look = (right, down, closer = 1) => {
       if (space) [turn, tilt] = [turn + right, Math.min(1.5, Math.max(-1.5, tilt + down))];
       zoom = Math.min(50, Math.max(0.2, zoom * closer));
       redraw();
     };
     const held = new Map(); // pointers that are down: one turns, two come nearer
-    const apart = () => { const [a, b] = [...held.values()]; return Math.hypot(a.x - b.x, a.y - b.y); };
+    const between = () => { const [a, b] = [...held.values()]; return Math.hypot(a.x - b.x, a.y - b.y); };
     canvas.style.touchAction = space ? "none" : "pan-y";
     canvas.addEventListener("pointerdown", (event) => {
       held.set(event.pointerId, { x: event.clientX, y: event.clientY });
@@ -295,12 +309,12 @@
     });
     for (const end_ of ["pointerup", "pointercancel"]) canvas.addEventListener(end_, (event) => held.delete(event.pointerId));
     canvas.addEventListener("pointermove", (event) => {
-      const before = held.get(event.pointerId);
-      if (!before) return;
-      const wide = held.size === 2 ? apart() : 0;
+      const was = held.get(event.pointerId);
+      if (!was) return;
+      const wide = held.size === 2 ? between() : 0;
       held.set(event.pointerId, { x: event.clientX, y: event.clientY });
-      if (wide) look(0, 0, apart() / wide);
-      else if (held.size === 1) look((event.clientX - before.x) * 0.01, (event.clientY - before.y) * 0.01);
+      if (wide) look(0, 0, between() / wide);
+      else if (held.size === 1) look((event.clientX - was.x) * 0.01, (event.clientY - was.y) * 0.01);
     });
     canvas.addEventListener("wheel", (event) => {
       if (document.activeElement !== canvas) return; // a page is scrolled past a picture that nobody has touched
@@ -311,10 +325,10 @@
     const keys = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1],
       "+": [0, 0, 1.2], "=": [0, 0, 1.2], "-": [0, 0, 1 / 1.2] };
     canvas.addEventListener("keydown", (event) => {
-      const step = keys[event.key];
-      if (!step || (!space && step.length < 3)) return;
+      const moved = keys[event.key];
+      if (!moved || (!space && moved.length < 3)) return;
       event.preventDefault();
-      look(...step);
+      look(...moved);
     });
     crossbody.on("time", (t, from) => { if (from !== root && root.closest("[data-page]").contains(from)) seek(t, false); });
     for (const what of ["engines", "page"]) crossbody.on(what, redraw);

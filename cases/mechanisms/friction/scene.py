@@ -1,0 +1,125 @@
+"""Bodies of 1 kg on a floor with friction, as scenes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from crossbody.cases.case import Parameter
+from crossbody.cases.scene import Actuator, Body, Joint, Pair, Push, RowLaw, Scene, Shape, Vector
+
+MASS = 1.0
+NUMBERS = {
+    "mu": Parameter(default=0.5, doc="coefficient of friction", low=0.0, open_low=True),
+    "gravity": Parameter(default=9.81, unit="m/s^2", doc="of the field", low=0.0, open_low=True),
+    "a0": Parameter(default=1e4, unit="1/s^2", doc="stiffness of the contact over the mass", low=0.0, open_low=True),
+    "a1": Parameter(default=200.0, unit="1/s", doc="damping of the contact over the mass", low=0.0),
+    "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
+}
+"""Parameters of every scene here."""
+SLIDES = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
+PLANAR = (("x", (1.0, 0.0, 0.0), "slide"), ("z", (0.0, 0.0, 1.0), "slide"), ("turn", (0.0, 1.0, 0.0), "hinge"))
+LOW, HIGH = (0.4, 0.3, 0.125), (0.1, 0.1, 0.125)
+"""Half sides of two blocks, m, whose heights add up without rounding: a gap of 1e-17 m would be one to fall through."""
+FLOOR = Shape(name="floor", type="plane")
+
+
+def law(p: Mapping[str, float]) -> RowLaw:
+    """Return the law of a scene's contacts."""
+    return RowLaw(a0=p["a0"], a1=p["a1"])
+
+
+def pair(first: str, second: str, mu: float, own: RowLaw) -> Pair:
+    """Return two shapes that slide on each other with friction."""
+    return Pair(name=f"{first}:{second}", first=first, second=second, friction=(mu, mu, 0.0, 0.0, 0.0), dimension=3,
+                law=own)  # fmt: skip
+
+
+def field(p: Mapping[str, float], steep: float = 0.0) -> Vector:
+    """Return gravity over a floor that falls along x, m/s^2.
+
+    Args:
+        p: with gravity.
+        steep: tangent of the floor's angle.
+    """
+    length = math.hypot(1.0, steep)
+    return (p["gravity"] * steep / length, 0.0, -p["gravity"] / length)
+
+
+def block(name: str, half: Vector, mass: float = MASS, height: float = 0.0) -> Body:
+    """Return a homogeneous block.
+
+    Args:
+        name: of the body.
+        half: its half sides, m.
+        mass: kg.
+        height: of its centre at the reference pose, m.
+    """
+    a, b, c = (side * side for side in half)
+    inertia = tuple(mass / 3.0 * part for part in (b + c, a + c, a + b))
+    return Body(name=name, mass=mass, inertia=(*inertia, 0.0, 0.0, 0.0), position=(0.0, 0.0, height))
+
+
+def point_on_floor(p: Mapping[str, float], radius: float) -> Scene:
+    """Return a body that never turns and touches at one place: a ball on three slides, its centre at the radius."""
+    return Scene(
+        bodies=(Body(name="block", mass=MASS, position=(0.0, 0.0, radius)),),
+        joints=tuple(Joint(name=name, body="block", type="slide", axis=axis) for name, axis in SLIDES),
+        shapes=(FLOOR, Shape(name="block", body="block", size=(radius, 0.0, 0.0))),
+        pairs=(pair("floor", "block", p["mu"], law(p)),),
+        gravity=field(p, p["slope"]),
+    )  # fmt: skip
+
+
+def block_on_floor(p: Mapping[str, float], half: Vector, planar: bool = False) -> Scene:
+    """Return a free block, or one that stays in a plane, on a floor that falls along x."""
+    free = (Joint(name="free", body="block", type="free"),)
+    joints = tuple(Joint(name=name, body="block", type=kind, axis=axis) for name, axis, kind in PLANAR)
+    return Scene(
+        bodies=(block("block", half, height=0.0 if planar else half[2]),), joints=joints if planar else free,
+        shapes=(FLOOR, Shape(name="block", body="block", type="box", size=half)),
+        pairs=(pair("floor", "block", p["mu"], law(p)),), gravity=field(p, p.get("slope", 0.0)),
+    )  # fmt: skip
+
+
+def block_on_belt(p: Mapping[str, float]) -> Scene:
+    """Return a block on a spring that touches a belt at one place, seen from the belt: the spring's far end goes back.
+
+    That end is an activation, the integral of a control that is the belt's speed, backwards.
+    """
+    r, k = p["radius"], p["stiffness"]
+    spring = Actuator(name="spring", joint="x", gain=(k, 0.0, 0.0), bias=(0.0, -k, 0.0), activation="integrator")
+    return Scene(
+        bodies=(Body(name="block", mass=MASS, position=(0.0, 0.0, r)),),
+        joints=tuple(Joint(name=name, body="block", type="slide", axis=axis) for name, axis in SLIDES[::2]),
+        shapes=(replace(FLOOR, name="belt"), Shape(name="block", body="block", size=(r, 0.0, 0.0))),
+        pairs=(pair("belt", "block", p["mu"], law(p)),), actuators=(spring,), gravity=field(p),
+    )  # fmt: skip
+
+
+def two_blocks(p: Mapping[str, float]) -> Scene:
+    """Return a block on a floor and one on it, each pushed along x at its centre."""
+    low, high = LOW, HIGH
+    return Scene(
+        bodies=(block("low", low, p["low_mass"], low[2]), block("high", high, p["high_mass"], 2.0 * low[2] + high[2])),
+        joints=tuple(Joint(name=name, body=name, type="free") for name in ("low", "high")),
+        shapes=(
+            FLOOR, Shape(name="low", body="low", type="box", size=low),
+            Shape(name="top", body="low", type="plane", position=(0.0, 0.0, low[2])),
+            Shape(name="high", body="high", type="box", size=high),
+        ),
+        pairs=(pair("floor", "low", p["mu"], law(p)), pair("top", "high", p["high_mu"], law(p))),
+        pushes=(Push(name="on low", body="low"), Push(name="on high", body="high")), gravity=field(p),
+    )  # fmt: skip
+
+
+def sphere_on_floor(p: Mapping[str, float]) -> Scene:
+    """Return a homogeneous sphere on a level floor."""
+    r = p["radius"]
+    return Scene(
+        bodies=(Body(name="sphere", mass=MASS, inertia=(0.4 * MASS * r * r,) * 3 + (0.0,) * 3, position=(0, 0, r)),),
+        joints=(Joint(name="free", body="sphere", type="free"),),
+        shapes=(FLOOR, Shape(name="sphere", body="sphere", size=(r, 0.0, 0.0))),
+        pairs=(pair("floor", "sphere", p["mu"], law(p)),), gravity=field(p),
+    )  # fmt: skip

@@ -1,0 +1,64 @@
+"""Force over depth of one contact: a spring is a line, what is lost in a contact is the area of the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from crossbody.cases import Mode
+from crossbody.reports.figures.section import Plot, Section
+from crossbody.reports.figures.styles import label, style
+from crossbody.reports.pages.sheet import coded, plain
+from crossbody.reports.runs.store import Trace
+from crossbody.reports.runs.thin import keep
+
+MOST = 1500
+"""Points of one engine's line."""
+TEXT = (
+    "Of the contact that carries the most: force over how deep it is. A spring is a line, damping opens it to a loop "
+    "whose area is the energy lost; what pulls stands below zero."
+)
+
+
+def hysteresis(traces: Sequence[Trace]) -> list[Section]:
+    """The section; nothing where no contact that opens and closes carries anything."""
+    k = _busiest(traces)
+    if k is None:
+        return []
+    lines = [line for i, trace in enumerate(traces) if (line := _line(trace, i, k))]
+    name = traces[0].about["contacts"][k]
+    layout = {
+        "title": {"text": f"Force over depth, contact {plain(name)}"}, "height": 420, "showlegend": False,
+        "xaxis": {"title": {"text": "depth [m]"}, "exponentformat": "power"},
+        "yaxis": {"title": {"text": "lam [N]"}, "exponentformat": "power"},
+    }  # fmt: skip
+    plots = (Plot(name="plot-hysteresis", figure={"data": lines, "layout": layout}),)
+    return [Section(name="hysteresis", title="Force over depth", text=TEXT, plots=plots)] if lines else []
+
+
+def _busiest(traces: Sequence[Trace]) -> int | None:
+    """The contact with the largest force in the first motion that has any, of those that open and close."""
+    for trace in traces:
+        lam = np.abs(np.nan_to_num(trace.run.lam))
+        lam = np.where((trace.run.mode == Mode.BILATERAL).all(axis=0), 0.0, lam)
+        if lam.size and lam.max() > 0.0:
+            return int(np.argmax(lam.max(axis=0)))
+    return None
+
+
+def _line(trace: Trace, i: int, k: int) -> dict[str, object]:
+    """Force over depth of one engine while its contact carries, with a break where it does not; empty without any."""
+    depth, lam = -trace.run.gap[:, k], trace.run.lam[:, k]
+    carries = np.isfinite(lam) & (lam != 0.0) & np.isfinite(depth)
+    if not carries.any():
+        return {}
+    near = carries | np.insert(carries[:-1], 0, False)  # the first sample that does not carry ends a line
+    x, y = (np.where(carries, values, np.nan)[near] for values in (depth, lam))
+    at = np.union1d(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), MOST), np.flatnonzero(np.isnan(y)))
+    look = style(trace, i)
+    return {
+        "type": "scatter", "mode": "lines", "x": coded(x[at].astype(np.float32)),
+        "y": coded(y[at].astype(np.float32)), "name": plain(label(trace)), "meta": label(trace),
+        "line": {key: look[key] for key in ("color", "dash", "width")},
+    }  # fmt: skip

@@ -1,0 +1,64 @@
+"""Force over depth and over time: the loop's area is the energy lost, and what is off the plot is named."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crossbody.cases import Trajectory, load
+from crossbody.cases.arrays import Floats
+from crossbody.engines import load as load_engine
+from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.pages.figures import force
+from crossbody.reports.pages.hysteresis import hysteresis
+from crossbody.reports.runs.jobs import Pick, run_case
+from crossbody.reports.runs.store import Trace
+
+
+@pytest.fixture(scope="module")
+def run() -> Trajectory:
+    """Samples with both sides of every event, as pages have them."""
+    case = load("bouncing_ball", "linear")
+    (entry,) = run_case(case, [Pick(engine="reference", profile="compiled")], refine=False).entries
+    assert entry.run is not None
+    return entry.run
+
+
+def trace(run: Trajectory, engine: str = TRUTH) -> Trace:
+    about = {"engine": engine, "profile": "p", "contacts": ["floor"], "coordinates": [{"name": "height", "unit": "m"}]}
+    return Trace(about=about, run=run, truth=run)
+
+
+def numbers(coded: dict[str, str]) -> Floats:
+    return np.frombuffer(base64.b64decode(coded["bdata"]), dtype=coded["dtype"]).astype(float)
+
+
+def test_the_area_of_the_loop_is_the_energy_that_the_contact_lost(run: Trajectory) -> None:
+    (section,) = hysteresis([trace(run)])
+    (line,) = section.plots[0].figure["data"]
+    x, y = numbers(line["x"]), numbers(line["y"])
+    ends = np.flatnonzero(np.isnan(x))
+    blows = [slice(a, b) for a, b in zip([0, *(ends + 1)], [*ends, len(x)], strict=True) if b > a + 1]
+    area = sum(np.trapezoid(y[blow], x[blow]) for blow in blows)
+    assert run.ledger is not None
+    lost = -(run.ledger.contact[-1, 0] - run.ledger.contact[0, 0])
+    assert lost > 0.1
+    assert area == pytest.approx(lost, rel=0.02)
+
+
+def test_a_row_that_is_always_on_has_no_loop() -> None:
+    case = load("bouncing_ball", "bilateral")
+    assert hysteresis([trace(load_engine("reference").prepare(case, "compiled").run())]) == []
+
+
+def test_a_force_beyond_the_plot_is_named(run: Trajectory) -> None:
+    drawn = force([trace(run), trace(replace(run, lam=100.0 * run.lam), "wild")])
+    top = float(np.nanmax(run.lam))
+    assert f"Off scale: wild:p reaches {100.0 * top:.2g} N" in drawn["layout"]["title"]["text"]
+    assert top < drawn["layout"]["yaxis"]["range"][1] < 2.0 * top
+    calm = force([trace(run), trace(replace(run, lam=1.2 * run.lam), "calm")])
+    assert "Off scale" not in calm["layout"]["title"]["text"]
+    assert "range" not in calm["layout"]["yaxis"]
