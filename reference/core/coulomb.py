@@ -513,14 +513,14 @@ def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
 
 
 @compiled
-def turning_rate(s: Any, m: Model, w: Work) -> float:
+def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
     """Fastest rate, 1/s, at which friction turns a slip into its own direction: mu lam_n / |v_t| over the mass there.
 
     From the last evaluation and what stands at the step's start. It grows without bound as a slip dies out.
     """
     fastest = 0.0
     for i in range(s.nc):
-        if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1:
+        if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1 and (not begun or has_begun(w, i)):
             c, (x, y), size = w.listed[m.tangent[i]], _across(m, w, i), _turning_slip(s, m, w, i)
             light = x * x * w.gram[c, c] + 2.0 * x * y * w.gram[c, c + 1] + y * y * w.gram[c + 1, c + 1]
             if size > 0.0:

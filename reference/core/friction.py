@@ -27,7 +27,7 @@ TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes ma
     BEGIN, FACTOR, SOLVE, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS, HOLDS_ON,
     BEGIN_SLIP, DECIDE,
 ) = np.arange(14)  # fmt: skip
-NOTHING = np.int64(0)  # beside what is asked of all rows together
+NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun
 
 
 @intrinsic  # type: ignore[untyped-decorator]

@@ -34,7 +34,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     STIFFNESS       what a multiplier of contact i does to its own gap
     MARGIN          how far contact i is from sliding
     WATCH           either of all contacts, into w.cones[i]
-    TURNING_RATE    fastest rate at which a slip turns
+    TURNING_RATE    fastest rate at which a slip turns, i = 1 of those that have just begun
     TURN_PART       1/|v_t|, and in w.la what a turn of contact i by one radian makes of all multipliers
     STANDS          1 if contact i has no slip velocity
     HOLDS_ON        1 if contact i, which sticks, surely does so throughout the step
@@ -56,7 +56,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == WATCH:
         coulomb.watch_friction(s, m, w, w.cones[i])
     elif what == TURNING_RATE:
-        return float(coulomb.turning_rate(s, m, w))
+        return float(coulomb.turning_rate(s, m, w, i != 0))
     elif what == TURN_PART:
         return float(coulomb.turn_part(s, m, w, i))
     elif what == RENEW:

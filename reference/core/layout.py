@@ -105,7 +105,8 @@ STATE = np.dtype(
         ("trial_rhs", "i8"),
         ("trial_t", "f8"),
         ("explicit_rate", "f8"),
-        ("row_rate", "f8"),  # fastest pole of the active rows, and of slips that turn, at an explicit step's start
+        ("row_rate", "f8"),  # fastest pole of the active rows, at an explicit step's start
+        ("turning_rate", "f8"),  # fastest at which friction turns a slip, likewise
         ("have_jacobian", "i8"),
         ("full_jacobian", "i8"),
         ("jacobian_scale", "f8"),
