@@ -141,7 +141,7 @@ class Options:
         A quaternion's entries are measured by its length, 1, however small they are; half of it, since an angle is
         twice their change.
         """
-        found: Floats = np.full(system.nq + system.n, self.tolerance)
+        found: Floats = np.full(system.nq + system.n, self.tolerance, dtype=np.float64)
         found[system.quaternion_entries] += 0.5 * self.rtol
         return found
 

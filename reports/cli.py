@@ -32,6 +32,17 @@ _Work = TypeVar("_Work", bound=Callable[..., int])
 DEFAULT_OUT = Path("out")
 
 
+class _Positive(click.FloatRange):
+    """A range in which NaN is no number."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read a number."""
+        found = super().convert(value, param, ctx)
+        if found != found:
+            self.fail(f"{value} is no number.", param, ctx)
+        return found
+
+
 def _plug(context: click.Context, _: click.Parameter, given: tuple[str, ...]) -> None:
     if not context.resilient_parsing:
         with suppress(FileNotFoundError):  # the folder one works in may be gone
@@ -146,7 +157,7 @@ _WITH = click.option(
 
 
 _LIMIT = click.option(
-    "--time-limit", "limit", type=click.FloatRange(0.0, min_open=True), default=3660.0, show_default=True, metavar="S",
+    "--time-limit", "limit", type=_Positive(0.0, min_open=True), default=3660.0, show_default=True, metavar="S",
     help="An engine that has not come back from a case by then is ended, s; compilation counts.",
 )  # fmt: skip
 
@@ -353,7 +364,7 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
 @click.option(
     "--time-limit",
     "limit",
-    type=click.FloatRange(0.0, min_open=True),
+    type=_Positive(0.0, min_open=True),
     default=20.0,
     show_default=True,
     metavar="S",
@@ -385,7 +396,7 @@ def audit(
 @click.option(
     "--time-limit",
     "limit",
-    type=click.FloatRange(0.0, min_open=True),
+    type=_Positive(0.0, min_open=True),
     default=20.0,
     show_default=True,
     metavar="S",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -68,6 +68,11 @@ def note(text: str) -> None:
 def rows_as_json(rows: pd.DataFrame) -> str:
     """A table as a JSON list of its rows."""
     return str(rows.to_json(orient="records", double_precision=15))
+
+
+def plain_rows_as_json(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The same of plain rows."""
+    return json.dumps([{name: finite(value) for name, value in row.items()} for row in rows], separators=(",", ":"))
 
 
 def finite(value: Any) -> Any:

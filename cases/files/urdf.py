@@ -61,6 +61,9 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
         for collision in link.findall("collision"):
             if without_meshes(without) and collision.find("geometry/mesh") is not None:
                 link.remove(collision)
+    for limit in root.findall("joint/limit"):
+        if {"lower", "upper"}.intersection(limit.attrib):  # the other is 0 by the format; the compiler takes none
+            limit.attrib = {"lower": "0", "upper": "0"} | limit.attrib
     for own in root.findall("mujoco"):
         root.remove(own)
     setting = ElementTree.SubElement(root, "mujoco")

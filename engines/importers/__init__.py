@@ -124,7 +124,7 @@ class Reading:
             if self._process is None:
                 said = self._told.read_text(encoding="utf-8") if self._told.exists() else ""
                 why = said or f"{self.name} reads no files of this format; valid: {', '.join(self.formats)}."
-                return {"status": "absent" if said else "unsupported", "told": [], "why": why}
+                return {"status": "failed" if said else "unsupported", "told": [], "why": why}
             why = self._waited(self._process, json.dumps(job).encode())
             found = _loaded(self._out)
             told = _lines(self._told)

@@ -37,11 +37,11 @@ class _Robot:
         m, told = self._m, dict[str, dict[str, Any]]()
         for i, (name, _, kind, at, dof) in enumerate(self.joints):
             single = kind in ("slide", "hinge")
-            bounds = m.jnt_range[i] if m.jnt_limited[i] and kind != "ball" else (-np.inf, np.inf)
+            bounds = m.jnt_range[i] if m.jnt_limited[i] else (-np.inf, np.inf)
             values = {
                 "armature": m.dof_armature[dof], "damping": m.dof_damping[dof], "friction": m.dof_frictionloss[dof],
                 "stiffness": m.jnt_stiffness[i], "rest": m.qpos_spring[at] if single and m.jnt_stiffness[i] else 0.0,
-                "lower": bounds[0], "upper": bounds[1],
+                "lower": bounds[0] if single else -np.inf, "upper": bounds[1],
             }  # fmt: skip
             for key, value in values.items():
                 told.setdefault(key, {})[name] = [float(value)]

@@ -63,6 +63,8 @@ def audit(ask: Ask) -> int:
         if file is not None:
             _write(file, text(ask.path, rows))
     if voice.as_json():
+        if ask.fix is not None:  # one document: that of the new file
+            return _fix(ask, ask.fix)
         print(json.dumps([asdict(row) for row in rows]))
     else:
         _show(found, rows)

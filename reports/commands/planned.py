@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import click
 
@@ -26,8 +27,13 @@ def tell(
         parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
         click.echo(f"{case.label}: {len(case.v0)} velocities, {len(case.contacts)} rows, {case.t_end:g} s")
         click.echo(f"  parameters: {parameters}" if parameters else "  no parameters")
+        known: list[tuple[str, str, Mapping[str, Any]]] = []
         for pick in (jobs.of_case(one, case) for one in picks):
-            click.echo(f"  {pick.engine}:{pick.profile}  {_settings(case, pick, asked)}".rstrip())
+            told = _settings(case, pick, asked)
+            if not isinstance(told, str):
+                known.append((pick.engine, pick.profile, told))
+            click.echo(f"  {pick.engine}:{pick.profile}  {told if isinstance(told, str) else words(told)}".rstrip())
+        jobs.check_known(asked, known)
     return 0
 
 
@@ -35,11 +41,11 @@ def _plain(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value) or '""'
 
 
-def _settings(case: Case, pick: jobs.Pick, asked: Mapping[str, Value]) -> str:
+def _settings(case: Case, pick: jobs.Pick, asked: Mapping[str, Value]) -> Mapping[str, Any] | str:
     """What an engine would be run with, or why it would not be."""
     if pick.skipped:
         return f"skipped: {pick.skipped}"
     try:
-        return words(jobs.prepare(case, pick, jobs.of_pick(asked, pick)).settings)
+        return jobs.prepare(case, pick, jobs.of_pick(asked, pick)).settings
     except CaseUnsupported as error:
         return f"skipped: {error}"

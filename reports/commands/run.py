@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -65,21 +64,28 @@ def run(
                 do(i, tell)
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
-            _tell(rows, made, controlled=any(case.control is not None for case in cases))
-            site.write(made, against=against, others=others)  # which takes longer than all but the engines
+            # Pages take longer than all but the engines: what they show is told before them, and lost by nothing.
+            untold = _tell(rows, made, controlled=any(case.control is not None for case in cases))
+            site.write(made, against=against, others=others)
+    if untold is not None:
+        raise untold
     where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
 
 
-def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> None:
-    """Print the verdicts of a folder."""
-    if voice.as_json():
-        print(json.dumps([{name: voice.finite(value) for name, value in row.items()} for row in rows]))
-        return
-    if controlled and not voice.quiet():
-        show_controllers(made)
-    show(rows, results.times_of(made))
+def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | None:
+    """Print the verdicts of a folder; what keeps them from being printed."""
+    try:
+        if voice.as_json():
+            print(voice.plain_rows_as_json(rows), flush=True)
+            return None
+        if controlled and not voice.quiet():
+            show_controllers(made)
+        show(rows, results.times_of(made))
+    except OSError as error:
+        return error
+    return None
 
 
 def _missing(cases: Sequence[Case], parts: Parts) -> list[int]:

@@ -124,11 +124,8 @@ def _blamed(path: Path, row: Row, failed: Sequence[tuple[Use, Row]]) -> Row:
 
     use, told = min(fitting, key=order)
     near = (line for line, names in zip(use.lines, use.names, strict=True) if not names.isdisjoint(places))
-    silent = told.verdict != UNSUPPORTED
-    return replace(
-        row, cause=use.feature.name, file=str(path), line=next(near, use.lines[0]),
-        verdict=row.verdict if silent else UNSUPPORTED, why=row.why if silent else row.why or told.why,
-    )  # fmt: skip
+    why = row.why or (told.why if told.verdict == UNSUPPORTED else "")
+    return replace(row, cause=use.feature.name, file=str(path), line=next(near, use.lines[0]), why=why)
 
 
 def advice(cause: str) -> str:

@@ -126,7 +126,7 @@ def _row(engine: str, found: Mapping[str, Any], quantity: str, gap: Gap | None, 
 
 def said_of(words: str, told: Sequence[str]) -> str:
     """Return the line in which an importer says that it leaves something out, by a pattern; empty where none does."""
-    lines = (line for line in told if words and SAID.search(line) and re.search(words, line, re.I))
+    lines = (line for line in told if words and SAID.search(line) and re.search(rf"\b({words})s?\b", line, re.I))
     return next(lines, "")
 
 
@@ -258,15 +258,21 @@ def _numbers(quantity: str, found: Mapping[str, Any], wanted: Mapping[str, Any])
     for key in OWN.get(quantity, (quantity,)):
         theirs = {name: value[0] for name, value in wanted[key].items()}
         mine = {name: value[0] for name, value in found.get(key, {}).items()}
-        finite = [abs(x) for x in theirs.values() if math.isfinite(x)]
         usual = -math.inf if key == "lower" else math.inf if key == "upper" else 0.0
         some |= any(x != usual for x in (*theirs.values(), *mine.values()))
         for name, x in theirs.items():
             y = mine.get(name, usual)
-            off = 0.0 if x == y else abs(x - y) / (max(finite, default=0.0) or 1.0)
+            off = _apart(x, y)
             if off > worst.size:
                 worst = Gap(min(off, 1e300), name, y, x)
     return worst if some else None
+
+
+def _apart(x: float, y: float) -> float:
+    """Difference of two numbers over the larger; 1 where one of them alone is infinite."""
+    if x == y:
+        return 0.0
+    return abs(x - y) / max(abs(x), abs(y)) if math.isfinite(x) and math.isfinite(y) else 1.0
 
 
 def _actuators(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> Gap | None:

@@ -83,7 +83,7 @@ def _numbers(scene: Scene) -> dict[str, dict[str, list[float]]]:
     of: dict[str, Callable[[Joint], float]] = {
         "armature": lambda j: j.armature + motors[j.name], "damping": lambda j: j.damping[0],
         "stiffness": lambda j: j.stiffness[0], "rest": lambda j: j.rest[0] if single(j) and any(j.stiffness) else 0.0,
-        "lower": lambda j: j.range[0] if single(j) else -np.inf, "upper": lambda j: j.range[1] if single(j) else np.inf,
+        "lower": lambda j: j.range[0] if single(j) else -np.inf, "upper": lambda j: j.range[1],
         "friction": lambda j: j.friction_loss,
     }  # fmt: skip
     return {key: {joint.name: [float(value(joint))] for joint in scene.joints} for key, value in of.items()}

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from crossbody.cases import SceneError
+from crossbody.cases import OutputError, SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.inertias import six
 from crossbody.cases.files.reading import is_urdf, read
@@ -37,6 +37,19 @@ SAME = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "armature", 
 """What the new file means as the old one does; bodies that are fixed to the world may have other frames."""
 
 
+KEPT = (
+    "geom_type", "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_friction", "geom_solref",
+    "geom_solimp", "geom_solmix", "geom_margin", "geom_gap", "geom_fluid", "geom_group", "site_type", "site_size",
+    "pair_friction", "pair_solref", "pair_solimp", "pair_margin", "pair_gap", "pair_dim", "exclude_signature",
+    "jnt_solref", "jnt_solimp", "jnt_margin", "dof_solref", "dof_solimp", "dof_frictionloss", "eq_type", "eq_solref",
+    "eq_solimp", "tendon_range", "tendon_stiffness", "tendon_damping", "tendon_frictionloss", "tendon_armature",
+    "actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_dynprm", "actuator_ctrlrange",
+    "actuator_forcerange", "actuator_gaintype", "actuator_biastype", "actuator_dyntype", "key_qpos", "key_qvel",
+    "key_ctrl",
+)  # fmt: skip
+"""Of the compiled model: what the rewriting must not touch."""
+
+
 def fixed(path: Path, out: Path, without: str = "") -> None:
     """Write a file that means the same in plainer words.
 
@@ -50,7 +63,11 @@ def fixed(path: Path, out: Path, without: str = "") -> None:
     try:
         half.write_text(ElementTree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
         _check(before, opened(half, without), path)
+        if not is_urdf(path):
+            _check_model(path, half)
         half.replace(out)
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written: {error.strerror}.") from None
     finally:
         half.unlink(missing_ok=True)
 
@@ -63,6 +80,15 @@ def _check(before: Audit, after: Audit, path: Path) -> None:
     off = [row for row in told if row.quantity in SAME and row.verdict == WRONG and (row.difference or 1.0) > 1e-8]
     if off:
         raise SceneError(f"{path} cannot be rewritten: {off[0].quantity} of {off[0].where} would differ.")
+
+
+def _check_model(path: Path, half: Path) -> None:
+    """Check what the audit does not look at: shapes, contacts, actuators, tendons, keyframes."""
+    before, after = read(path)[0], read(half)[0]
+    for name in KEPT:
+        old, new = np.asarray(getattr(before, name)), np.asarray(getattr(after, name))
+        if old.shape != new.shape or not np.allclose(old, new, rtol=1e-9, atol=1e-12, equal_nan=True):
+            raise SceneError(f"{path} cannot be rewritten: {name} of its compiled model would differ.")
 
 
 def _at(after: Audit, before: Audit) -> dict[str, Any]:
@@ -105,7 +131,7 @@ class _Rewriting:
         self.sequence = settings.get("eulerseq", "xyz")
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for top in root.findall("default"):
-            self._learn(top, "main", {})
+            self._learn(top, "main", self.classes["main"])
             self.classes[top.get("class", "main")] = self.classes["main"]
 
     def _learn(self, node: Node, name: str, above: dict[str, dict[str, str]]) -> None:
@@ -164,7 +190,17 @@ def merged(above: dict[str, str], own: Any) -> dict[str, str]:
     left = dict(above)
     if any(key in own for key in TURNS):
         left = {key: value for key, value in left.items() if key not in TURNS}
-    return left | dict(own)
+    return left | {key: _completed(value, left.get(key, "")) for key, value in dict(own).items()}
+
+
+def _completed(own: str, above: str) -> str:
+    """Return numbers with those of a class behind them, where they are fewer: what the compiler makes of them."""
+    mine, theirs = own.split(), above.split()
+    try:
+        numbers = [float(word) for word in (*mine, *theirs)]
+    except ValueError:
+        return own
+    return " ".join([*mine, *theirs[len(mine) :]]) if mine and len(numbers) > 2 else own
 
 
 def moved(node: Node, p: Floats, R: Floats) -> None:

@@ -235,13 +235,25 @@ def of_pick(settings: Mapping[str, Value], pick: Pick) -> dict[str, Value]:
 
 
 def _check_known(settings: Mapping[str, Value], entries: Sequence[Entry]) -> None:
+    ran = [(one.engine, one.profile, one.settings) for one in entries if one.run is not None]
+    check_known(settings, ran)
+
+
+def check_known(settings: Mapping[str, Value], ran: Sequence[tuple[str, str, Mapping[str, Any]]]) -> None:
+    """Check that somebody has each setting.
+
+    Args:
+        settings: asked for.
+        ran: engine, profile and settings of those that can run.
+
+    Raises:
+        UnknownName: for one that none of those who are meant has.
+    """
     for name in settings:
         who, _, key = name.rpartition(".")
-        meant = [one for one in entries if who in ("", one.engine, f"{one.engine}:{one.profile}")]
-        ran = [entry.settings for entry in meant if entry.run is not None]
-        if ran and not any(key in known for known in ran):
-            whose = who or "these engines"
-            raise UnknownName(f"setting of {whose}", key, {known for settings in ran for known in settings})
+        own = [known for engine, profile, known in ran if who in ("", engine, f"{engine}:{profile}")]
+        if own and not any(key in known for known in own):
+            raise UnknownName(f"setting of {who or 'these engines'}", key, {known for one in own for known in one})
 
 
 def check_asked(settings: Mapping[str, Value], wanted: Sequence[Pick]) -> None:
@@ -250,6 +262,10 @@ def check_asked(settings: Mapping[str, Value], wanted: Sequence[Pick]) -> None:
     Raises:
         UnknownName: for an engine that is not, or a profile that it does not have.
     """
+    for name in settings:
+        who, dot, key = name.rpartition(".")
+        if dot and not (who and key):
+            raise InvalidValue(f"--set-engine {name}= names no {'setting' if who else 'engine'}; mujoco.dt=1e-4 would.")
     for who in {name.rpartition(".")[0] for name in settings} - {""}:
         name, profile = parse_engine(who)
         known = {pick.engine for pick in wanted}

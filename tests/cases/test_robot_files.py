@@ -945,3 +945,21 @@ def test_engines_agree_on_what_bounces(tmp_path: Path) -> None:
     assert np.abs(ends[1] - ends[0]).max() < 1e-7
     assert np.abs(ends[2] - ends[0]).max() < 1e-6
     assert np.abs(ends[3] - ends[0]).max() < 1e-4  # first order in the step where it touches, at a few m/s
+
+
+@pytest.mark.parametrize(
+    ("bounds", "wanted"),
+    [('upper="1"', (0.0, 1.0)), ('lower="-1"', (-1.0, 0.0)), ('lower="-1" upper="2"', (-1.0, 2.0)),
+     ("", (-np.inf, np.inf))],
+)  # fmt: skip
+def test_a_bound_of_a_urdf_that_is_left_out_is_0(bounds: str, wanted: tuple[float, float], tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    path.write_text(
+        f'<robot name="arm"><link name="base"/><link name="arm">{body}</link><joint name="j" type="revolute">'
+        f'<parent link="base"/><child link="arm"/><axis xyz="0 1 0"/><limit {bounds} effort="1" velocity="1"/>'
+        "</joint></robot>"
+    )
+    scene = cases.from_file(path).scene
+    assert scene is not None
+    assert scene.joints[0].range == pytest.approx(wanted)

@@ -132,3 +132,10 @@ def test_shipped_cases_start_on_their_rows_or_say_that_they_do_not(name, variant
     case = cases.load(name, variant=variant)
     prepare(system_of(case), case.q0, case.v0, Options(t_end=case.t_end, rtol=1e-13, consistent=case.consistent))
     assert case.consistent == ((name, variant) != ("bouncing_ball", "bilateral"))
+
+
+def test_a_tolerance_that_is_a_flag_is_the_number_1():
+    """An array of flags has no sum with a part of a tolerance."""
+    system = ball()
+    runs = [simulate(system, [1.0], [0.0], 0.1, rtol=1e-3, atol=atol) for atol in (True, 1.0)]
+    assert np.array_equal(*(run.q for run in runs))

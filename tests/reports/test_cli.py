@@ -274,3 +274,10 @@ def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.Cap
     assert "fake:off  dt=0.004" in said
     assert "absent:*  skipped: Engine 'absent' needs" in said
     assert list(Path.cwd().iterdir()) == []
+
+
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+@pytest.mark.parametrize("setting", [".dt=3", "fake.=3", "fake.nonsense=1", "nonsense=1"])
+def test_a_setting_that_nobody_has_is_wrong_in_a_plan_too(setting: str, dry: tuple[str, ...]) -> None:
+    assert call(*LINEAR, "-e", "fake:exact", "--set-engine", setting, *dry) == 2
+    assert not Path("out").exists()

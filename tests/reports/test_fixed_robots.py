@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 from places import ROBOTS
 
@@ -53,3 +55,28 @@ def test_what_is_not_rewritten_is_a_sentence_and_no_file(tmp_path: Path, capsys:
         main(["audit", str(path), "-e", "mujoco", "--fix", str(path)])
     assert end.value.code == 2
     assert "must be another file" in capsys.readouterr().err
+
+
+PARTIAL = """<mujoco><default><geom contype="4" friction=".3 .01 .001" size=".1 .2 .3"/></default>
+<default><joint damping="2"/></default><worldbody><body><joint/><geom type="capsule" friction=".9" size=".5" mass="1"/>
+</body></worldbody></mujoco>"""
+
+
+def test_contacts_of_a_fixed_file_are_those_of_the_old_one(tmp_path: Path) -> None:
+    """What is said in parts is completed by its class, which may be told in several places."""
+    path, out = tmp_path / "parts.xml", tmp_path / "plain.xml"
+    path.write_text(PARTIAL)
+    fixed(path, out)
+    old, new = (mujoco.MjModel.from_xml_path(str(one)) for one in (path, out))
+    for name in ("geom_friction", "geom_size", "geom_contype", "dof_damping"):
+        assert np.array_equal(getattr(old, name), getattr(new, name)), name
+
+
+def test_what_a_rewriting_would_lose_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, out = tmp_path / "parts.xml", tmp_path / "plain.xml"
+    path.write_text(PARTIAL)
+    monkeypatch.setattr("crossbody.reports.importers.fix._completed", lambda own, _above: own)
+    path.write_text(PARTIAL.replace('size=".5" ', ""))
+    with pytest.raises(SceneError, match="geom_friction of its compiled model would differ"):
+        fixed(path, out)
+    assert not out.exists()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from crossbody.cases import CrossbodyError
 from crossbody.reports.cli import main
 from crossbody.reports.importers.audit import audited, opened
 from crossbody.reports.importers.causes import advice, explained
-from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WRONG, Row
+from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WORDS, WRONG, Row, said_of
 from crossbody.reports.importers.told import markdown, sarif
 
 pytest_plugins = ["pytester"]
@@ -87,7 +88,7 @@ def test_wrong_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture
     path.write_text(ARM)
     code, _, err = run(["audit", str(tmp_path / "none.xml")], capsys)
     assert code == 2
-    assert "none.xml" in err
+    assert "There is no robot file" in err
     code, _, err = run(["audit", str(path), "-e", "bullet"], capsys)
     assert code == 2
     assert "pinocchio" in err
@@ -153,7 +154,13 @@ def test_the_steps_of_the_action_run_as_a_script(gravity: str, code: int, tmp_pa
     """What a GitHub runner does with a composite action: its shell, its inputs in the environment."""
     step = yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"][-1]
     (tmp_path / "arm.xml").write_text(ARM.replace("<worldbody>", f'<option gravity="{gravity}"/><worldbody>'))
-    given = {"FILES": "arm.xml", "ENGINES": "mujoco pinocchio", "SARIF": "told", "GITHUB_STEP_SUMMARY": "summary.md"}
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # the Action installs it there
+    given = {"PATH": path} | {
+        "FILES": "arm.xml",
+        "ENGINES": "mujoco pinocchio",
+        "SARIF": "told",
+        "GITHUB_STEP_SUMMARY": "summary.md",
+    }
     done = subprocess.run(["bash", "-eo", "pipefail", "-c", step["run"]], cwd=tmp_path, env=os.environ | given,
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == code, done.stdout + done.stderr
@@ -193,3 +200,75 @@ def test_a_change_is_seen_in_every_reader(engine: str, number: str, other: str, 
     path.write_text(ARM.replace(number, other))
     [(_, _, rows)] = audited(path, [engine], seconds=60.0, audit=before)
     assert WRONG in {row.verdict for row in rows}
+
+
+TWO = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="b1"><joint name="j1" type="{kind}" {of1}/>
+<geom size=".1" mass="1"/><body name="b2" pos="0 0 1"><joint name="j2" axis="0 1 0" {of2}/>
+<geom size=".1" pos="0 0 .5" mass="1"/></body></body></worldbody></mujoco>"""
+
+
+def rows_of(path: Path, engine: str, text: str, changed: str) -> dict[str, str]:
+    """Verdicts of a reader that reads one file while the yardstick holds it to another."""
+    path.write_text(text)
+    wanted = opened(path)
+    path.write_text(changed)
+    [(_, _, rows)] = audited(path, [engine], seconds=60.0, audit=wanted)
+    return {row.quantity: row.verdict for row in rows}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "own", "other"),
+    [
+        ("limits", 'limited="true" range="-1e9 1e9"', 'limited="true" range="-{} .4"'),
+        ("armature", 'armature="1e6"', 'armature="{}"'), ("damping", 'damping="1e6"', 'damping="{}"'),
+    ],
+)  # fmt: skip
+def test_a_large_number_of_one_joint_hides_no_difference_of_another(
+    quantity: str, own: str, other: str, tmp_path: Path
+) -> None:
+    here, there = (TWO.format(kind="slide", of1=own, of2=other.format(x)) for x in (0.2, 0.0035))
+    assert rows_of(tmp_path / "two.xml", "mujoco", here, there)[quantity] == WRONG
+
+
+def test_a_ball_joint_has_a_bound_that_is_compared(tmp_path: Path) -> None:
+    here, there = (TWO.format(kind="ball", of1=of, of2="") for of in ('limited="true" range="0 40"', ""))
+    assert rows_of(tmp_path / "ball.xml", "mujoco", here, there)["limits"] == WRONG
+
+
+@pytest.mark.parametrize("line", ["warning: the attribute 'inertiagrouprange' will be ignored.", "ranges are here"])
+def test_a_warning_of_something_else_excuses_nothing(line: str) -> None:
+    assert said_of(WORDS["limits"], [line]) == ""
+    assert said_of(WORDS["limits"], ["warning: the attribute 'range' is ignored."]) != ""
+
+
+def test_what_is_asked_to_be_written_changes_no_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.replace("<worldbody>", '<compiler settotalmass="6"/><worldbody>'))
+    plain = run(["audit", str(path), "-e", "pinocchio", "-e", "mujoco"], capsys)[0]
+    for more in (["--explain"], ["--sarif", str(tmp_path / "s")], ["--markdown", str(tmp_path / "m")]):
+        assert run(["audit", str(path), "-e", "pinocchio", "-e", "mujoco", *more], capsys)[0] == plain
+
+
+@pytest.mark.parametrize("words", [["--fix", "/proc/x.xml"], ["--time-limit", "nan"]])
+def test_what_cannot_be_is_a_sentence(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    assert run(["audit", str(path), "-e", "mujoco", *words], capsys)[0] == 2
+
+
+def test_an_interpreter_that_cannot_start_is_a_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("CROSSBODY_PYTHON_PINOCCHIO", "/nope/python")
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    code, out, _ = run(["audit", str(path), "-e", "pinocchio", "-e", "mujoco"], capsys)
+    assert code == 1
+    assert "/nope/python cannot be started" in " ".join(out.split())
+
+
+def test_json_of_a_file_that_is_fixed_is_one_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    _, out, _ = run(["audit", str(path), "-e", "mujoco", "--json", "--fix", str(tmp_path / "plain.xml")], capsys)
+    assert json.loads(out)

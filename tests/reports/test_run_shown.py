@@ -26,10 +26,10 @@ def row(engine: str, metric: str, value: float, verdict: Word, limit: float = ma
     ).row()  # fmt: skip
 
 
-errors = st.floats(1e-300, 1e300) | st.just(math.nan) | st.just(math.inf) | st.floats(-1e3, 1e3)
-
-
-@given(st.lists(st.tuples(errors, errors, st.floats(1e-6, 1e5)), min_size=1, max_size=6), st.integers(NARROW, 200))
+@given(
+    st.lists(st.tuples(st.floats(), st.floats(), st.floats(1e-6, 1e5)), min_size=1, max_size=4),
+    st.integers(NARROW, 200),
+)
 def test_the_table_fits_and_loses_no_digit(given_: list[tuple[float, float, float]], width: int) -> None:
     rows, times = [], {}
     for i, (error, step, wall) in enumerate(given_):

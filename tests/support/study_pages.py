@@ -32,7 +32,7 @@ def rig(folder: Path) -> tuple[str, ...]:
 
 
 def studies(folder: Path) -> list[Path]:
-    """Folders of gap map, frequency responses, analysis, stress, replay and identification."""
+    """Folders of gap map, frequency responses, analysis, stress, replay, identification and readers."""
     log = rig(folder)
     commands = {
         "gapmap": (*ONE, "--n", "3", "--points", "5"),
@@ -41,6 +41,7 @@ def studies(folder: Path) -> list[Path]:
         "stress": ("gap", *ONE, "--runs", "4", "--jobs", "1"),
         "replay": (*log, *ONE),
         "identify": (*log, "-f", "k1"),
+        "conformance": ("--feature", "armature", "-e", "mujoco"),
     }
     for name, arguments in commands.items():
         with pytest.raises(SystemExit) as end:

@@ -19,7 +19,7 @@ HELD = "friction holds: what is left of a slip decays as a gap does"
 
 
 def limits(
-    case: Case, title: str, parameters: Mapping[str, Parameter], motion: Motion,
+    case: Case, title: str, parameters: Mapping[str, Parameter], motion: Motion | None,
     p: Mapping[str, float], creeps: float = 0.0,
 ) -> Case:  # fmt: skip
     """Return a case with its title, its exact motion and the limits of all cases with friction.
@@ -38,7 +38,7 @@ def limits(
         known_least=creeps * (1.0 - NEAR), known_size=creeps * (1.0 + NEAR),
     )  # fmt: skip
     return replace(
-        case, title=title, closed_form=motion if motion.presses else None,
+        case, title=title, closed_form=motion if motion is not None and motion.presses else None,
         units={name: one.unit for name, one in parameters.items()},
         limits=(
             *case.limits,

@@ -47,8 +47,6 @@ class Stage:
 class Motion:
     """An exact motion of several stages, to be evaluated at any nondecreasing times.
 
-    `presses` says whether no place would have to pull: else what lies on several tips, and the motion is another one.
-
     Args:
         stages: in order; the first begins at 0.
         normals: number of rows that have events, which stand first.
@@ -69,7 +67,12 @@ class Motion:
             if b_ != a_ or (b is not stages[0] and a_ == Mode.SLIP)
         )
 
-        self.presses = bool((self(np.array([0.0, t_end])).lam[:, :normals] >= 0.0).all())
+        self.normals, self.t_end = normals, t_end
+
+    @property
+    def presses(self) -> bool:
+        """Whether no place would have to pull: else what lies on several tips, and the motion is another one."""
+        return self.normals == 1 or bool((self(np.array([0.0, self.t_end])).lam[:, : self.normals] >= 0.0).all())
 
     def __call__(self, t: Floats) -> Trajectory:
         """Return the motion at times (n,), s; an event's instant that stands twice is before and after it."""

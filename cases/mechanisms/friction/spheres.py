@@ -6,8 +6,8 @@ straight (spec 7.5). The attitude has a closed form where the axis of turning ke
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -20,6 +20,8 @@ from crossbody.cases.trajectory import Mode
 
 TIGHT, TINY = 1e-13, 1e-15
 """Relative and absolute tolerance of an attitude that is integrated."""
+FARTHEST = 1e4
+"""Angle through which an attitude is integrated at most, rad."""
 REACH = 0.4
 """Moment of inertia over m r^2."""
 
@@ -51,14 +53,18 @@ def attitude(s: Floats, spin: Floats, rate: Floats) -> Floats:
     return q
 
 
-def sphere(p: Mapping[str, float]) -> Motion:
-    """Return the motion: q = (x, y, z, quaternion), rows (n, t1, t2)."""
+def sphere(p: Mapping[str, float]) -> Motion | None:
+    """Return the motion: q = (x, y, z, quaternion), rows (n, t1, t2); None where it turns too often to be followed."""
     r, press = p["radius"], p["mu"] * p["gravity"]
     v0, spin = np.array([p["speed"], 0.0]), np.array([p["spin_x"], p["spin_y"], p["spin_z"]])
     u0 = v0 + r * np.array([-spin[1], spin[0]])
     slip = float(np.linalg.norm(u0))
     stop, push = 2.0 * slip / (7.0 * press), -press * u0 / slip if slip > 0.0 else np.zeros(2)
     rate = np.array([push[1], -push[0], 0.0]) / (REACH * r)  # of -r z x push
+
+    until = min(stop, p["t_end"])
+    if np.cross(spin, rate).any() and not (np.linalg.norm(spin) + until * np.linalg.norm(rate)) * until < FARTHEST:
+        return None
 
     def state(s: Floats, place: Floats, v: Floats, a: Floats, turn: Floats, w: Floats) -> Rows:
         q = np.concatenate([place, np.full((len(s), 1), r), turn], axis=1)
@@ -70,14 +76,18 @@ def sphere(p: Mapping[str, float]) -> Motion:
         t = s[:, None]
         return state(s, t * v0 + 0.5 * t**2 * push, v0 + t * push, push, attitude(s, spin, rate), spin + t * rate)
 
-    end = slides(np.array([stop]))
+    @cache
+    def end() -> Floats:
+        found: Floats = slides(np.array([stop]))[0][0]
+        return found
+
     v1, w1 = v0 + stop * push, spin + stop * rate
 
     def rolls(s: Floats) -> Rows:
         t = s[:, None]
-        turn = product(turned(t * w1), np.broadcast_to(end[0][0, 3:], (len(s), 4)))
+        turn = product(turned(t * w1), np.broadcast_to(end()[3:], (len(s), 4)))
         v = np.broadcast_to(v1, (len(s), 2))
-        return state(s, end[0][0, :2] + t * v1, v, np.zeros(2), turn, np.broadcast_to(w1, (len(s), 3)))
+        return state(s, end()[:2] + t * v1, v, np.zeros(2), turn, np.broadcast_to(w1, (len(s), 3)))
 
     def energy(q: Floats, v: Floats) -> Floats:
         moving = 0.5 * MASS * np.sum(v[:, :3] ** 2, axis=1) + 0.5 * REACH * MASS * r**2 * np.sum(v[:, 3:] ** 2, axis=1)
@@ -85,9 +95,3 @@ def sphere(p: Mapping[str, float]) -> Motion:
 
     stages = [Stage(0.0, (int(Mode.SLIP),) * 3, slides)] if slip > 0.0 else []
     return Motion([*stages, Stage(stop, (int(Mode.STICK),) * 3, rolls)], 1, energy, p["t_end"])
-
-
-def rolls_at(p: Mapping[str, float]) -> float:
-    """Return when it begins to roll, s."""
-    slip = math.hypot(p["speed"] - p["radius"] * p["spin_y"], p["radius"] * p["spin_x"])
-    return 2.0 * slip / (7.0 * p["mu"] * p["gravity"])
