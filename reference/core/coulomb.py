@@ -106,6 +106,8 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
                 s.watched = 0
             if slip(m, w, i, rate) > small_slip(s):
                 _face(m, w, i, rate)
+            if m.tangents[i] > 1:
+                s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
     if s.na > 0 and s.dependent_rows > 0:
         s.redundant = max(s.redundant, s.dependent_rows)
         if not s.indeterminate:
