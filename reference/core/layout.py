@@ -351,7 +351,8 @@ def workspace(
     shapes: dict[str, tuple[int, ...]] = {
         **dict.fromkeys(("y", "y1", "ys", "atol"), (ny,)), "k": (DENSE_STAGES, ny), "F": (DENSE_TERMS, ny),
         "tangent": (turns * nq, n), "stage_v": (6 * turns, n), "bend": (2 * turns, nq),
-        **dict.fromkeys(("place", "turn"), (turns * nq,)), "slip": (turns * n,), "travel": (max(turns, frictional) * n,),
+        **dict.fromkeys(("place", "turn"), (turns * nq,)),
+        "slip": (turns * n,), "travel": (max(turns, frictional) * n,),
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),
