@@ -31,8 +31,8 @@ def begin() -> None:
     if _alone or (os.cpu_count() or 1) < 2:
         return
     work = f"from crossbody.reference.ahead import compile_piece\nfor name in {BESIDE!r}: compile_piece(name)"
-    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    atexit.register(_end, subprocess.Popen([sys.executable, "-c", work], **quiet))
+    none = subprocess.DEVNULL
+    atexit.register(_end, subprocess.Popen([sys.executable, "-c", work], stdin=none, stdout=none, stderr=none))
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

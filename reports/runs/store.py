@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, LogFormatError, Mode, Outcome, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
@@ -90,13 +91,12 @@ def _blocks(data: pa.Table) -> dict[str, Floats]:
     Raises:
         ValueError: for columns out of order.
     """
-    found: dict[str, list[Floats]] = {}
+    found: dict[str, list[NDArray[Any]]] = {}
     for name, column in zip(data.column_names, data.itercolumns(), strict=True):
         block = found.setdefault(name.rstrip("0123456789"), [])
         if name[-1].isdigit() and not name.endswith(f"{len(block)}"):
             raise ValueError(f"its column {name!r} is out of order")
-        values: Floats = np.from_dlpack(column.combine_chunks())  # `to_numpy` imports pandas
-        block.append(values)
+        block.append(np.from_dlpack(column.combine_chunks()))  # `to_numpy` imports pandas
     return {name: np.stack(block, axis=1) for name, block in found.items()}
 
 
