@@ -30,6 +30,7 @@ from crossbody.reports.judging.verdict import (
     judge,
     limit_for,
 )  # fmt: skip
+from crossbody.reports.measuring.alignment import instants
 from crossbody.reports.measuring.truth import TRUTH, Truth
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ def compare(
 def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> list[Verdict]:
     """Every row of one case: those of every run, the truth's own, and a word on claims that judged nothing."""
     check_names(case)
+    truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
     rows = [row for entry in entries for row in verdicts(case, entry, truth, command)]
     return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command)]
 

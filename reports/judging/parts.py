@@ -24,6 +24,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import turned
@@ -115,6 +116,7 @@ def splits(case: Case, truth: Truth, run: Trajectory, study: Study, own: Truth |
         own: the truth of the equations that the engine follows, where they are not the case's.
     """
     positions = Positions(case, truth, run, math.inf if own is None else own.trusted)
+    positions.expect([*study.runs, *filter(None, (study.built,))])
     laid: dict[str, Positions | Events] = {"position": positions, "event_times": Events(case, truth, run)}
     told = {metric: _split(one, metric, positions, study, own) for metric, one in laid.items() if one.whole.size}
     return told if positions.whole.size else {}
@@ -272,6 +274,17 @@ class Positions:
             self.laid[id(run)] = self._lay(run)
         return self.laid[id(run)]
 
+    def expect(self, runs: Sequence[Trajectory]) -> None:
+        """Have the truth found at once for all runs that will be laid on it."""
+        if self.whole.size:
+            self.truth.expect(self._needed(run, clock(self.truth, run))[1] for run in runs if len(run.t))
+
+    def _needed(self, run: Trajectory, t: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """Return the samples of a run, on the truth's clock t, between which those of the judged one lie; and when."""
+        behind = np.clip(np.searchsorted(t, self.t), 0, len(t) - 1)
+        needed = np.unique(np.concatenate([np.maximum(behind - 1, 0), behind]))
+        return needed, np.minimum(t[needed], float(self.truth.trajectory.t[-1]))
+
     def _lay(self, run: Trajectory) -> Floats:
         """Return the error of a run.
 
@@ -283,8 +296,8 @@ class Positions:
             raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
         behind = np.clip(np.searchsorted(t, self.t), 0, len(t) - 1)
         before = np.maximum(behind - 1, 0)
-        needed = np.unique(np.concatenate([before, behind]))
-        exact = self.truth.at(np.minimum(t[needed], float(self.truth.trajectory.t[-1])))
+        needed, times = self._needed(run, t)
+        exact = self.truth.at(times)
         error = self._error(run.q[needed], exact.q)
         a, b = (np.searchsorted(needed, side) for side in (before, behind))
         width = (t[behind] - t[before])[:, None]

@@ -15,6 +15,7 @@ from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Outcome, T
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
+from crossbody.reports.judging.answers import Answers
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, sample_times
@@ -78,25 +79,6 @@ def truth_of(case: Case) -> Truth:
     return replace(told, trusted=math.inf, parted=math.inf, agreement=_agreement(truth, second, case))
 
 
-ANSWERS = 64 << 20
-"""Multipliers of the answers that are kept, bytes: about a third of what they take."""
-
-
-def answers_kept(function: Callable[[Floats], Trajectory]) -> Callable[[Floats], Trajectory]:
-    """Keep the last answers: every metric asks for the truth at the same instants of a run."""
-    last: dict[bytes, Trajectory] = {}
-
-    def cached(times: Floats) -> Trajectory:
-        key = times.tobytes()
-        if key not in last:
-            while last and sum(run.lam.nbytes for run in last.values()) > ANSWERS:
-                del last[next(iter(last))]
-            last[key] = function(times)
-        return last[key]
-
-    return cached
-
-
 def law_of(followed: Case) -> Truth | None:
     """The truth of the equations that an engine really integrates, where they are not the case's own (spec 4.1).
 
@@ -154,7 +136,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
 
     reference = load("reference")
 
-    @answers_kept
+    @Answers
     def at(times: Floats) -> Trajectory:
         run = _motion(reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)))
         # A run that is asked for samples need not take the same steps: its events move by the tolerance.
@@ -173,7 +155,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
         second = reference.prepare(case, other, rtol=loose).run()
     truth = _held_against(
         Truth(
-            tier=tier, source="", trajectory=dense, at=at, agreement={}, tight=case.tight,
+            tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
             grows=_growing(case, dense, at), joined=case.general,
         ),
         second,

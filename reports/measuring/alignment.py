@@ -7,6 +7,7 @@ is a number of its own (metric event_times).
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,5 +66,18 @@ def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
 def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDArray[np.bool_], Trajectory]:
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run, releases)
-    inside = t <= min(truth.trajectory.t[-1], truth.trusted)
+    inside = _known(truth, t)
     return inside, truth.at(t[inside])
+
+
+def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
+    """Yield the instants at which the truth is asked for where runs are laid beside it."""
+    for run in runs:
+        for releases in (False, True):
+            t = clock(truth, run, releases)
+            yield t[_known(truth, t)]
+
+
+def _known(truth: Truth, t: Floats) -> NDArray[np.bool_]:
+    known: NDArray[np.bool_] = t <= min(truth.trajectory.t[-1], truth.trusted)
+    return known

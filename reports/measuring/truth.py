@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -28,6 +28,7 @@ class Truth:
         source: in words, with the agreement of tier C.
         trajectory: the motion, dense enough to plot, both sides of every event.
         at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
+        expect: told at which instants it will be asked for, so that it may find them together.
         agreement: metric -> how far the two sources of tier C are apart; empty for the others.
         trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
         parted: when the two sources part, s; infinite if they never do.
@@ -43,6 +44,7 @@ class Truth:
     source: str
     trajectory: Trajectory
     at: Callable[[Floats], Trajectory]
+    expect: Callable[[Iterable[Floats]], None] = lambda asked: None
     agreement: dict[str, float]
     trusted: float = math.inf
     parted: float = math.inf
