@@ -82,7 +82,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         text += f" Off: {_named([_off(run, run.wrong[0]) for run in off])}."
     if beyond:
         beyond.sort(key=lambda one: -share(one[1]))
-        text += f" Beyond a limit as is known of them, by how much is not: {_named([_off(*one) for one in beyond])}."
+        text += f" Off by a known cause, with no bound on how far: {_named([_off(*one) for one in beyond])}."
     return text
 
 

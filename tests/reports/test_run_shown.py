@@ -56,7 +56,7 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
     ]
     text = sentence(runs_of(rows))
     assert text.startswith("2 of 3 runs are within all limits.")
-    assert text.endswith("by how much is not: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
+    assert text.endswith("no bound on how far: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
     step = row("b", part_of("position", "step"), 2.0e-5, Word.INFO)
     assert "24 times its limit, mostly its step" in sentence(runs_of([*rows, step]))
 
