@@ -44,12 +44,12 @@ PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit"
 
 def case_page(found: Results, case: CaseFiles) -> Page:
     """All sections of one case; its motions are read here and forgotten with the page."""
-    traces = case.traces()
+    traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about), engines=_engines(traces),
         sections=[
-            _glance(found, case), _verdicts(found, case), *playback(traces), *_plots(traces), *hysteresis(traces),
-            *precision(found.out, case.label, found.rows.get(case.label, ()), _walls(found, case)),
+            _glance(found, case), _verdicts(found, case), *playback(traces), *_plots(traces, rows), *hysteresis(traces),
+            *precision(found.out, case.label, rows, _walls(found, case)),
             *studied(found.out, case.about), _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
@@ -109,11 +109,11 @@ def _far(row: Row) -> tuple[int, float]:
     return (grid.WORST.index(word), -share(row)) if word in grid.WORST else (len(grid.WORST), 0.0)
 
 
-def _plots(traces: Sequence[Trace]) -> list[Section]:
+def _plots(traces: Sequence[Trace], rows: Sequence[Row]) -> list[Section]:
     if not traces:
         return []
-    points = figures.points_for(traces, PLOTTED)
-    drawn = {name: draw(traces, points) for name, (_, draw) in figures.FIGURES.items() if suits(name, traces)}
+    points, limits = figures.points_for(traces, PLOTTED), figures.limits_of(rows)
+    drawn = {name: draw(traces, points, limits) for name, (_, draw) in figures.FIGURES.items() if suits(name, traces)}
     return [
         Section(
             name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces),

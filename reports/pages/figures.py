@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import label
+from crossbody.reports.judging.verdict import Row
 from crossbody.reports.measuring.impulse import with_collisions
+from crossbody.reports.measuring.scale import energy as energy_of
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.sheet import Sheet
@@ -27,6 +29,25 @@ BEYOND = 1.5
 """Times the truth's largest force up to which forces are drawn."""
 ROUNDING = 1e-17
 """Depth below which there is none, m."""
+
+
+Limits = Mapping[str, Mapping[float, str]]
+"""Metric -> what engines may reach -> how that is called."""
+NONE: Limits = {}
+
+
+def limits_of(rows: Iterable[Row]) -> Limits:
+    """Return the limits by which engines are judged; where they have others each is called by whose it is."""
+    found: dict[str, dict[float, list[str]]] = {}
+    for row in rows:
+        if (row["limit"] or 0.0) > 0.0:
+            found.setdefault(row["metric"], {}).setdefault(row["limit"], []).append(f"{row['engine']}:{row['profile']}")
+    return {
+        metric: {
+            limit: "limit" if len(limits) == 1 else f"limit ({', '.join(whose)})" for limit, whose in limits.items()
+        }
+        for metric, limits in found.items()
+    }
 
 
 def drawn(count: int) -> list[int]:
@@ -59,7 +80,7 @@ def _floors(traces: Sequence[Trace], units: Sequence[str]) -> dict[str, float]:
     return {unit: floor_of(q[:, [k for k, u in enumerate(units) if u == unit]]) for unit in units}
 
 
-def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Every coordinate of every engine, and under it log |difference to the truth|, impacts matched."""
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
     floors = _floors(traces, [unit for _, unit in names])
@@ -73,11 +94,17 @@ def motion(traces: Sequence[Trace], points: int = POINTS) -> Figure:
             if trace.truth is not None:
                 error = apart(trace.run.q[:, k], trace.truth.q[:, k], floors[names[k][1]])
                 sheet.line(trace, i, 2 * place + 1, error)
+    scales = traces[0].about.get("scales", ())
+    turns = {at + i for at in traces[0].quaternions for i in range(4)}  # judged by their angle
+    for place, k in enumerate(shown):
+        if k < len(scales) and k not in turns:
+            for limit, name in limits.get("position", {}).items():
+                sheet.limit(2 * place + 1, limit * scales[k], name)
     sheet.logarithmic(*range(1, len(rows), 2))
     return sheet.done()
 
 
-def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
     shown = drawn(len(contacts))
@@ -97,6 +124,8 @@ def force(traces: Sequence[Trace], points: int = POINTS) -> Figure:
             if exact is not None:
                 sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor))
         _clip(sheet, 3 * place, traces, k)
+        for limit, name in limits.get("lam_impulse_path", {}).items():
+            sheet.limit(3 * place + 2, limit * float(np.nanmax(np.abs(summed[0]), initial=0.0)), name)
     sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
 
@@ -113,7 +142,7 @@ def _clip(sheet: Sheet, row: int, traces: Sequence[Trace], k: int) -> None:
         sheet.say(", ".join(f"{who} reaches {size:.2g} N" for who, size in far.items()))
 
 
-def energy(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Total energy, work of the contacts, and what neither they nor inputs nor damping explain."""
     rows = ["total energy\n[J]", "work of contacts\n[J]", "|unexplained|\n[J]"]
     sheet = Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points, group=3)
@@ -128,10 +157,12 @@ def energy(traces: Sequence[Trace], points: int = POINTS) -> Figure:
         book = work + run.ledger.input - run.ledger.dissipated
         sheet.line(trace, i, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor))
     sheet.logarithmic(2)
+    for limit, name in limits.get("energy_integrator", {}).items():
+        sheet.limit(2, limit * energy_of(traces[0].run), name)
     return sheet.done()
 
 
-def penetration(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+def penetration(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Depth of every contact below its surface; |gap| of a row that is always on."""
     contacts = traces[0].about["contacts"]
     shown = drawn(len(contacts))
@@ -147,7 +178,7 @@ def penetration(traces: Sequence[Trace], points: int = POINTS) -> Figure:
     return sheet.done()
 
 
-def steps(traces: Sequence[Trace], points: int = POINTS) -> Figure:
+def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Length of every step at its start: small while a collision lasts, large again when it is over."""
     sheet = Sheet(["step size\n[s]"], "Step size of each engine", points)
     floor = floor_of(traces[0].run.t)
@@ -184,7 +215,7 @@ NOTES = {
         "Collisions that take no time are steps of the impulse."
     ),
 }
-FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int], Figure]]] = {
+FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int, Limits], Figure]]] = {
     "motion": ("Motion", motion),
     "force": ("Contact force", force),
     "energy": ("Energy", energy),

@@ -22,6 +22,9 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46
 """Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one group, between groups
 (with times), pixels."""
 
+LEVEL = "#8a8a8a"
+"""Of limits: seen on light and on dark pages."""
+
 
 class Sheet:
     """Plots one below another, with the lines of every engine; a plot in which nothing is drawn is left out.
@@ -39,6 +42,11 @@ class Sheet:
         self.decades: set[int] = set()
         self.ranges: dict[int, tuple[float, float]] = {}
         self.said: list[str] = []
+        self.limits: list[tuple[int, float, str]] = []
+
+    def limit(self, row: int, value: float, name: str) -> None:
+        """Draw what a plot's lines may reach and be within."""
+        self.limits.append((row, value, name))
 
     def logarithmic(self, *rows: int) -> None:
         """Make the y axes of these plots (from 0 on) logarithmic."""
@@ -76,7 +84,8 @@ class Sheet:
         place = {row: number(i + 1) for i, row in enumerate(drawn)}
         data = [line | {"xaxis": f"x{place[row]}", "yaxis": f"y{place[row]}"} for row, line in self.lines]
         layout = {"title": {"text": self._caption(drawn)}, "height": height, "showlegend": False} | axes
-        return {"data": data, "layout": layout}
+        limits = [(f"y{place[row]}", value, name) for row, value, name in self.limits if row in place]
+        return {"data": data, "layout": layout | {"shapes": [_level(*one) for one in limits]}}
 
     def _caption(self, drawn: Sequence[int]) -> str:
         empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
@@ -103,6 +112,14 @@ class Sheet:
                 axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 9, "exponentformat": "power"}
             top += heights[i] + below[i]
         return axes, TOP + inside + BOTTOM
+
+
+def _level(axis: str, value: float, name: str) -> dict[str, Any]:
+    """A line across a plot, and what it is."""
+    ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
+    label = {"text": plain(name), "textposition": "end", "font": {"size": 10, "color": LEVEL}, "padding": 1}
+    line = {"color": LEVEL, "width": 1, "dash": "dash"}
+    return {"type": "line", "layer": "below", "line": line, "label": label} | ends
 
 
 def _pair(n: str, name: str, domain: list[float], timed: bool) -> dict[str, Any]:

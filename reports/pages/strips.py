@@ -23,7 +23,7 @@ LONGEST = 150
 MOST_CONTACTS = 8
 
 
-def modes(traces: Sequence[Trace], points: int = LONGEST) -> Figure:
+def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None) -> Figure:
     """One strip a contact and engine; contacts that are in one mode throughout are named instead."""
     moving, still = changing(traces)
     bars: list[dict[str, Any]] = []

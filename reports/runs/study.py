@@ -22,6 +22,7 @@ from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import TRUTH, Truth
+from crossbody.reports.metrics.position import scale_of
 from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, save
@@ -51,7 +52,7 @@ def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> list[Ro
 def write(out: Path, results: Sequence[CaseResult], rows: Sequence[Row], provenance: Mapping[str, Any]) -> None:
     """Write everything but the page into a folder."""
     _write_judged(out, rows, _audit(results), provenance)
-    _save_traces(out, [trace for result in results for trace in _traces(result)])
+    _save_traces(out, [trace for result in results for trace in traces(result)])
 
 
 def _write_judged(out: Path, rows: Sequence[Row], audited: Sequence[Row], provenance: Mapping[str, Any]) -> None:
@@ -65,7 +66,7 @@ def write_case(made: Path, result: CaseResult, command: str) -> list[Row]:
     judged = judge([result], {result.case.label: command})
     told = {"verdicts": judged, "audit": _audit([result])}
     (made / CASE).write_text(json.dumps(told, default=_plain), encoding="utf-8")
-    _save_traces(made, _traces(result))
+    _save_traces(made, traces(result))
     return judged
 
 
@@ -160,9 +161,11 @@ def _drawn(scene: Scene) -> Scene:
     return scene.replace(pairs=met, actuators=(), pushes=())
 
 
-def _traces(result: CaseResult) -> list[Trace]:
+def traces(result: CaseResult) -> list[Trace]:
+    """Return the motions of a case as they are stored: the truth's first, then every engine's beside it."""
     case, truth = result.case, result.truth
     about = _about(case, TRUTH, "") | {"tier": truth.tier.value, "source": truth.source}
+    about["scales"] = scale_of(truth.trajectory, case).tolist()
     found = [Trace(about=about, run=truth.trajectory)]
     return found + [_trace(case, entry, truth) for entry in result.entries if entry.run is not None]
 
