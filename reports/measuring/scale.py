@@ -17,6 +17,8 @@ RESTS = 1e-4
 tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hundred of them."""
 
 
+IDLE = 1e-3
+"""Part of the forces that move a mechanism below which its rows carry nothing: their multipliers are noise."""
 KNOWN = 1e-8
 """Part of an energy that must move for what it is off by to be measured: rounding of the rest is 1e-7 of that."""
 
@@ -44,3 +46,13 @@ def least(named: Sequence[Coordinate], rates: bool = False) -> Floats:
     """What coordinates, or their rates, are measured by at least (n,), SI."""
     known = [coordinate.rate if rates else coordinate.size for coordinate in named]
     return np.maximum(of_like(np.array(known), named), RESTS)
+
+
+def idle(run: Trajectory) -> float:
+    """Return the multiplier, N or N m, below which errors are not measured by what rows carry.
+
+    The force is the energy over the way that it moves things: of what falls, its weight. A robot whose couplings have
+    nothing to hold in free fall has multipliers of 1e-13 N, and an error of as much is none.
+    """
+    moved = float(np.ptp(run.q, axis=0).max(initial=0.0)) if len(run.q) else 0.0
+    return IDLE * energy(run) / max(moved, RESTS)

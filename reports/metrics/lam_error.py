@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.scale import idle
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -19,7 +20,9 @@ NEEDS = "lam"
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |lam - lam_truth| over max |lam_truth|; None where a row can open, NaN where lam is not known.
+    """Max |lam - lam_truth| over max |lam_truth|, or what `idle` rows are measured by.
+
+    None where a row can open, NaN where lam is not known.
 
     Where an instant stands twice lam jumps: its two sides are compared each with its own.
     """
@@ -29,4 +32,5 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     inside, exact = aligned(truth, run)
     scale = float(np.max(np.abs(exact.lam), initial=0.0))
-    return float(np.max(np.abs(run.lam[inside] - exact.lam), initial=0.0)) / scale if scale else None
+    off = float(np.max(np.abs(run.lam[inside] - exact.lam), initial=0.0))
+    return off / max(scale, idle(truth.trajectory)) if scale else None

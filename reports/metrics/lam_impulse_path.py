@@ -9,6 +9,7 @@ import numpy as np
 
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.impulse import away, with_collisions
+from crossbody.reports.measuring.scale import idle
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
@@ -36,4 +37,4 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
     off = float(np.max(np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth], initial=0.0))
-    return off / scale if scale else off or None
+    return off / max(scale, idle(truth.trajectory) * case.t_end) if scale else off or None

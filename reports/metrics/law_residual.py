@@ -22,6 +22,7 @@ from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import off_slip
 from crossbody.reports.measuring.multipliers import told
+from crossbody.reports.measuring.scale import idle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,6 +88,8 @@ def multipliers(
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |lam - lam_law(q, v)| over max |lam_law| on at most 400 closed samples; NaN where lam is not known.
 
+    Where all carry next to nothing it is over what `idle` rows are measured by.
+
     Where contacts slide the law of the other rows is asked for with the friction that the run has, and friction for
     what it is by the slip. None where nothing closes, and where a controller or discrete variables act that a row of
     the run does not show.
@@ -113,4 +116,4 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         lam, moving = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, fast, inputs, pushed)
         worst = max(worst, float(np.max(np.abs(moving @ (run.lam[i, rows] - lam)))))
         scale = max(scale, float(np.max(np.abs(lam))))
-    return worst / scale if scale else None
+    return worst / max(scale, idle(truth.trajectory)) if scale else None
