@@ -13,6 +13,7 @@ from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import LogFormatError, SceneError, UnknownName
+from crossbody.hw.checks import smooth
 from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.checks.rates import RateCheck
 from crossbody.hw.checks.values import ValueCheck
@@ -172,6 +173,19 @@ def swing(rate: float = 1.0, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray
     random = np.random.default_rng(2)
     q = 0.8 * np.sin(3.0 * t) + 0.3 * np.sin(11.0 * t) + noise * random.standard_normal(len(t))
     return t, q, rate * (2.4 * np.cos(3.0 * t) + 3.3 * np.cos(11.0 * t))
+
+
+@pytest.mark.parametrize("kind", ["wraps", "slips", "spikes"])
+def test_a_jump_counts_once_wherever_two_chunks_meet(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(smooth, "CHUNK", 300)
+    t = np.arange(1300) * STEP
+    smooth_motion = np.sin(5.0 * t) + 1e-4 * np.random.default_rng(5).standard_normal(len(t))
+    for row in range(300 - 2 * smooth.HALF - 3, 304):
+        values = smooth_motion.copy()
+        values[row : row + 1 if kind == "spikes" else None] += 2.0 * np.pi if kind == "wraps" else 0.5
+        for cuts in ([], [row], [row - 1, row + 2]):
+            check = blocks(smooth.JumpCheck("arm", "rad"), cuts, t, values)
+            assert [(f.check, f.row, f.count) for f in check.findings()] == [(kind, row, 1)], (row, cuts)
 
 
 @pytest.mark.parametrize("rate", [np.pi / 180, 180 / np.pi, -1.0, 1e3, 0.0])
