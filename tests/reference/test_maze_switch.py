@@ -201,9 +201,10 @@ def test_channels_of_any_number_of_rings(rings):
         assert (h > -1e-15).all()
 
 
-def test_rings_that_are_added_have_their_gaps_between_those_of_the_ring_below():
-    """As many, and as wide for the ball."""
-    rings = maze_of(load("ball_maze", variant="solve", rings=9).parameters).rings
+@pytest.mark.parametrize("outer", [80e-3, 81.5e-3, 83e-3])
+def test_rings_that_are_added_have_their_gaps_between_those_of_the_ring_below(outer):
+    """As many, and as wide for the ball, however thick the last ring of the table is."""
+    rings = maze_of(load("ball_maze", variant="solve", rings=9, outer3=outer).parameters).rings
     for below, ring in pairwise(rings[3:]):
         ahead = (ring.centre(0) - below.centre(0)) * below.gaps / (2.0 * math.pi)
         assert ahead % 1.0 == pytest.approx(0.5, abs=1e-12)
