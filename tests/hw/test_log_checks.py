@@ -195,6 +195,18 @@ def test_a_rate_in_another_unit_or_sign_is_a_fault(rate: float) -> None:
     assert finding.channel == "coordinates.arm"
 
 
+@pytest.mark.parametrize("cuts", [[7000], [1, 5000, 5001, 16_000], list(range(100, 20_000, 37))], ids=len)
+@pytest.mark.parametrize("rate", [0.9, 1.0, -1.0])
+def test_rates_are_judged_alike_wherever_blocks_are_cut(rate: float, cuts: list[int]) -> None:
+    """Every sample counts, whichever block it came in."""
+    data = swing(rate, noise=1e-5)
+    whole, cut = (blocks(RateCheck("arm"), at, *data) for at in ([], cuts))
+    np.testing.assert_allclose(cut._totals, whole._totals, rtol=1e-9)
+    assert [(f.check, f.row, f.count, f.text) for f in cut.findings()] == [
+        (f.check, f.row, f.count, f.text) for f in whole.findings()
+    ]
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
 def test_a_rate_that_belongs_to_its_coordinate_is_none(noise: float) -> None:
     t, q, v = swing(noise=noise)
