@@ -201,14 +201,14 @@ class _Walk:
     def _event(self, piece: list[Event]) -> bool:
         """Pass one event, or one frozen collision with all that it does; False if it is only grazed."""
         event, before = piece[0], self._here()
-        frozen = len(piece) > 1 and piece[1].before is Mode.COLLISION
+        frozen = len(piece) > 1
         start, n = event.t == 0.0 and not frozen, self.at.system.n
         R, jumped = np.eye(2 * n, self.S.shape[1]), self.x
         if frozen:
-            let_go = {e.contact for e in piece[2:]}
+            let_go = {e.contact for e in piece[1:-1]}
             held = [i for i in before.active.tolist() if i not in let_go]
             struck = replace(before, active=np.array([*held, event.contact], dtype=np.int64))
-            after = bounced(struck, event.contact, piece[1].after is Mode.CONTACT)
+            after = bounced(struck, event.contact, piece[-1].after is Mode.CONTACT)
             R = np.vstack([R[:n], gradient(after, struck, self.over)])
             jumped = np.concatenate([struck.q, after(struck, struck.q, struck.v)])
         guard = None if start else self._guard(event, before)
@@ -251,7 +251,7 @@ class _Walk:
 
 
 def _pieces(events: list[Event]) -> Iterator[list[Event]]:
-    """Events of one instant: each frozen collision with its end and the rows it releases, every other one alone.
+    """Events of one instant: each frozen collision with the rows it releases and its end, every other one alone.
 
     Raises:
         SceneError: if several rows strike together.
@@ -259,12 +259,12 @@ def _pieces(events: list[Event]) -> Iterator[list[Event]]:
     k = 0
     while k < len(events):
         size = 1
-        ends = [e for e in events[k + 1 :] if e.contact == events[k].contact and e.before is Mode.COLLISION]
+        ends = [
+            j for j, e in enumerate(events) if j > k and e.contact == events[k].contact and e.before is Mode.COLLISION
+        ]
         if events[k].after is Mode.COLLISION and ends:
-            if events[k + 1] is not ends[0]:
+            if any(e.before is not Mode.CONTACT for e in events[k + 1 : ends[0]]):
                 raise SceneError(AS_ONE)
-            size = 2
-            while k + size < len(events) and events[k + size].before is Mode.CONTACT:
-                size += 1
+            size = ends[0] - k + 1
         yield events[k : k + size]
         k += size

@@ -19,7 +19,7 @@ from rotating_bodies import (
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from crossbody.cases import InvalidValue, Mode, Outcome, SceneError
+from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, rotations
 from crossbody.reference import System, ensemble, kernels, prepare, simulate
 from crossbody.reference.core.exact import linear_arc
 from crossbody.reference.kinds import Array, Floats
@@ -397,3 +397,27 @@ def test_a_quaternion_without_direction_is_refused() -> None:
     """Zero has no rotation."""
     with pytest.raises(SceneError, match="the quaternion at entries 3 to 6 is zero"):
         simulate(free_body((1.0, 2.0, 3.5)), np.zeros(7), np.zeros(6), 1.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rotations_are_those_of_scipy_whatever_the_length_and_sign_of_their_quaternions(seed: int) -> None:
+    """As many at once as there are, with other positions around them."""
+    rng = np.random.default_rng(seed)
+    shape = [(), (7,), (3, 5)][seed % 3]
+    a, b = rng.normal(size=(2, *shape, 4)) * 10.0 ** rng.uniform(-2.0, 2.0, (2, *shape, 1))
+    np.testing.assert_allclose(rotations.matrices(a), matrix(a), atol=1e-14)
+    one, other = (Rotation.from_quat(x.reshape(-1, 4), scalar_first=True) for x in (a, b))
+    between = (one.inv() * other).as_rotvec().reshape(*shape, 3)
+    np.testing.assert_allclose(rotations.turned(b, a), between, atol=1e-13)
+    q, r = (np.concatenate([rng.normal(size=(len(x), 2)), x, rng.normal(size=(len(x), 1))], axis=1)
+            for x in (one.as_quat(scalar_first=True), -3.0 * other.as_quat(scalar_first=True)))  # fmt: skip
+    apart = np.zeros(q.shape)
+    apart[:, [0, 1, 6]] = np.abs(q - r)[:, [0, 1, 6]]
+    apart[:, 2] = (one.inv() * other).magnitude()
+    np.testing.assert_allclose(rotations.differences(q, r, [2]), apart, atol=1e-13)
+    v, step = rng.normal(size=(len(q), 6)), 1e-6
+    ahead, behind = (q + sign * step * rotations.rates(q, v, [2]) for sign in (1.0, -1.0))
+    np.testing.assert_allclose((ahead - behind)[:, [0, 1, 6]] / (2.0 * step), v[:, [0, 1, 5]], atol=1e-8)
+    np.testing.assert_allclose(rotations.turned(ahead[:, 2:6], behind[:, 2:6]) / (2.0 * step), v[:, 2:5], atol=1e-8)
+    long = np.linalg.norm(rotations.normalised(r, [2])[:, 2:6], axis=1)
+    np.testing.assert_allclose(long, 1.0, atol=1e-15)

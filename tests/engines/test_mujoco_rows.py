@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from random_scenes import random_scene, random_state, with_own_laws
 
 from crossbody.cases import Mode
@@ -14,19 +17,25 @@ from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load
 from crossbody.engines.equations import system_of
 from crossbody.engines.mujoco._globals import hooked
+from crossbody.engines.mujoco._switched import Switched
+from crossbody.engines.mujoco.scene import matched
 
 STATES = 6
 SAME = 1e-5
 """MuJoCo's rows keep 1e-7 of their softness."""
 
 
+def of_one_place(scene: Scene, names: Sequence[str]) -> NDArray[np.bool_]:
+    """Which rows are of no contact that has several: of a deep corner MuJoCo tells a point halfway to the surface."""
+    several = {row for contact in contacts(scene) if contact.places > 1 for row in contact.rows}
+    return np.array([name not in several for name in names], dtype=bool)
+
+
 def pushing(scene: Scene, seed: int) -> int:
     """Check the law of the rows that push at random states; returns how many did."""
-    # Of a deep corner MuJoCo tells a point halfway to the surface, which may be another corner's.
-    several = {row for contact in contacts(scene) if contact.places > 1 for row in contact.rows}
     case = case_of(scene)
     prepared, system, rng = load("mujoco").prepare(case, "matched").scene, system_of(case), np.random.default_rng(seed)
-    mine = np.array([name not in several for name in case.contacts], dtype=bool)
+    mine = of_one_place(scene, case.contacts)
     assert prepared.arm is not None
     prepared.arm((int(Mode.CONTACT),) * len(case.contacts))
     pushed = 0
@@ -48,6 +57,25 @@ def pushing(scene: Scene, seed: int) -> int:
 def test_a_row_that_pushes_follows_the_law(seed: int) -> None:
     """H v' + H'v + a1 h' + a0 h = 0 at MuJoCo's v', by the reference's rows, with all terms of their curvature."""
     assert pushing(with_own_laws(random_scene(seed).replace(loops=()), seed), seed)
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_rows_approach_as_those_of_the_reference(seed: int) -> None:
+    """By gap, rate and acceleration where nothing acts but forces, from where their law has them at zero."""
+    scene = with_own_laws(random_scene(seed).replace(loops=()), seed)
+    case, rng = case_of(scene), np.random.default_rng(seed)
+    model = matched(scene)
+    data = mujoco.MjData(model)
+    rows, system = Switched(scene, model, data), system_of(case)
+    for _ in range(STATES):
+        q, v, _ = random_state(scene, rng)
+        data.qpos[:], data.qvel[:] = q, v
+        gap, rate, ahead = rows.approach()
+        H, h, _ = system.constraint(q, v)
+        there = of_one_place(scene, case.contacts) & (rate != 0.0)
+        assert there.any() or not len(h)
+        for mine, theirs in ((gap, h), (rate, H @ v), (ahead, H @ data.qacc_smooth)):
+            assert np.abs(mine - theirs)[there].max(initial=0.0) <= SAME * max(1.0, np.abs(theirs).max(initial=0.0))
 
 
 def test_a_contact_that_is_alone_follows_the_law() -> None:

@@ -9,18 +9,18 @@ from rig_data import channels, log_of, needs_pendulum, pendulum, run_as_log
 from crossbody import cases, engines, hw
 from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw import models
-from crossbody.hw.fitting.derivative import Exact, apart
+from crossbody.hw.fitting.derivative import SETTLED, Exact, apart
 from crossbody.hw.models._contract import Segment
 from crossbody.hw.windows.window import windows
 
 TRUE = {"k1": 5e-4, "s1": 8e-4, "k2": 2e-4, "s2": 3e-4, "slip": 0.05}
 
 
-def swing(noise: float, seed: int, seconds: float = 4.0, rates: float = 0.0) -> hw.Log:
+def swing(noise: float, seed: int, seconds: float = 4.0, rates: float = 0.0, step: float = 2e-3) -> hw.Log:
     """A double pendulum with known friction; the reference at 1e-12 is the plant."""
     model = models.load("double_pendulum")
     segment = Segment(y=np.array([2.2, 2.6]), yd=np.array([0.5, -1.0]), t_end=seconds)
-    case, t = model.build(model.numbers(TRUE), segment), np.arange(0.0, seconds, 2e-3)
+    case, t = model.build(model.numbers(TRUE), segment), np.arange(0.0, seconds, step)
     run = engines.load("reference").prepare(case, samples=t, rtol=1e-12).run()
     random = np.random.default_rng(seed)
     y = run.q[:, [2, 5]] + noise * random.standard_normal((len(t), 2))
@@ -73,6 +73,47 @@ def test_the_fixed_steps_follow_the_integrator_of_the_reference() -> None:
     model, log = models.load("double_pendulum"), swing(0.0, 0)
     problem = Exact(model, model.numbers(TRUE), ("k1",), windows(log, model, 2.0), False, 10)
     assert np.abs(problem.residual(problem.first())).max() < 1e-5
+
+
+@pytest.mark.parametrize("delay", [0.0, 5e-3])
+def test_residuals_vanish_at_the_true_delay_and_starts_at_both_ends_of_every_window(delay: float) -> None:
+    model, late, every = models.load("double_pendulum"), round(delay / 1e-3), swing(0.0, 0, step=1e-3)
+    names = ("th1", "th2")
+    y, yd = (
+        np.stack([every.channel(role, name).values for name in names], axis=1) for role in ("coordinates", "velocities")
+    )
+    rows = np.arange(late, len(y) - late, 2)
+    log = log_of(
+        every.time[rows], channels("coordinates", "rad", dict(zip(names, y[rows - late].T, strict=True))),
+        channels("velocities", "rad/s", dict(zip(names, yd[rows - late].T, strict=True))),
+    )  # fmt: skip
+    cut = windows(log, model, 1.0)
+    begin = np.searchsorted(every.time, [window.t[0] for window in cut])
+    problem = Exact(model, model.numbers(TRUE), ("delay",), cut, True, 7)
+    x = np.concatenate([[delay], *(np.concatenate([y[k], yd[k]]) for k in begin)])
+    assert np.abs(problem.residual(x)).max() < 1e-5
+    if delay:
+        x[0] = -delay
+        assert np.abs(problem.residual(x)).max() > 1e-3
+    for j, window in enumerate(cut):
+        before = problem.residual_of(j, x)
+        for end in (0, -1):
+            window.y[end] += 1e-3
+            assert np.abs(problem.residual_of(j, x) - before).max() == pytest.approx(1e-3, rel=1e-6)
+            window.y[end] -= 1e-3
+
+
+@pytest.mark.parametrize("step", [5e-3, 1e-2, 2e-2])
+def test_integration_steps_are_as_many_as_every_coordinate_needs_and_no_more(step: float) -> None:
+    """Twice as many change none by a millionth of its own size, half as many do."""
+    model = models.load("double_pendulum")
+    problem = Exact(model, model.numbers(TRUE), ("k1",), windows(swing(0.0, 0, step=step), model, 1.0), False, 1)
+    runs, parts = [], problem.parts
+    for problem.parts in (parts // 2, parts, 2 * parts):
+        runs.append(problem._run(0, problem.first().astype(complex))[1].real if problem.parts else None)
+    half, now, twice = runs
+    assert np.all(np.abs(twice - now) <= SETTLED * np.abs(twice).max(axis=0))
+    assert half is None or np.any(np.abs(now - half) > SETTLED * np.abs(now).max(axis=0))
 
 
 def test_friction_comes_out_inside_its_intervals() -> None:

@@ -13,6 +13,7 @@ from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import LogFormatError, SceneError, UnknownName
+from crossbody.hw.checks import smooth
 from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.checks.rates import RateCheck
 from crossbody.hw.checks.values import ValueCheck
@@ -174,11 +175,36 @@ def swing(rate: float = 1.0, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray
     return t, q, rate * (2.4 * np.cos(3.0 * t) + 3.3 * np.cos(11.0 * t))
 
 
+@pytest.mark.parametrize("kind", ["wraps", "slips", "spikes"])
+def test_a_jump_counts_once_wherever_two_chunks_meet(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(smooth, "CHUNK", 300)
+    t = np.arange(1300) * STEP
+    smooth_motion = np.sin(5.0 * t) + 1e-4 * np.random.default_rng(5).standard_normal(len(t))
+    for row in range(300 - 2 * smooth.HALF - 3, 304):
+        values = smooth_motion.copy()
+        values[row : row + 1 if kind == "spikes" else None] += 2.0 * np.pi if kind == "wraps" else 0.5
+        for cuts in ([], [row], [row - 1, row + 2]):
+            check = blocks(smooth.JumpCheck("arm", "rad"), cuts, t, values)
+            assert [(f.check, f.row, f.count) for f in check.findings()] == [(kind, row, 1)], (row, cuts)
+
+
 @pytest.mark.parametrize("rate", [np.pi / 180, 180 / np.pi, -1.0, 1e3, 0.0])
 def test_a_rate_in_another_unit_or_sign_is_a_fault(rate: float) -> None:
     (finding,) = blocks(RateCheck("arm"), [7000], *swing(rate)).findings()
     assert finding.fault
     assert finding.channel == "coordinates.arm"
+
+
+@pytest.mark.parametrize("cuts", [[7000], [1, 5000, 5001, 16_000], list(range(100, 20_000, 37))], ids=len)
+@pytest.mark.parametrize("rate", [0.9, 1.0, -1.0])
+def test_rates_are_judged_alike_wherever_blocks_are_cut(rate: float, cuts: list[int]) -> None:
+    """Every sample counts, whichever block it came in."""
+    data = swing(rate, noise=1e-5)
+    whole, cut = (blocks(RateCheck("arm"), at, *data) for at in ([], cuts))
+    np.testing.assert_allclose(cut._totals, whole._totals, rtol=1e-9)
+    assert [(f.check, f.row, f.count, f.text) for f in cut.findings()] == [
+        (f.check, f.row, f.count, f.text) for f in whole.findings()
+    ]
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])

@@ -160,6 +160,14 @@ def gained(s: Scene) -> tuple[Trajectory, float]:
     return run, float(run.energy[released(s, -1)[0]].sum() - run.energy[0].sum()) / ended
 
 
+def rebounding(s: Scene) -> tuple[Trajectory, float]:
+    """Rates at the first touch and the first release; all others are drawn."""
+    run, (down, up) = drawn(s, "v"), s.rng.uniform(0.5, 2.0, 2)
+    touch = next(e.t for e in run.events if e.after in CLOSED and e.before not in CLOSED)
+    run = changed(run, "v", (np.flatnonzero(run.t == touch), 0), -down, whole=True)
+    return changed(run, "v", (released(s, 0), 0), up, whole=True), float(up / down)
+
+
 def free_again(s: Scene) -> tuple[Trajectory, float]:
     times = np.sort(s.rng.uniform(0.0, 1.0, 14)).tolist()
     names = [Mode.FREE, Mode.CONTACT] * 7
@@ -257,6 +265,7 @@ VALUES: dict[str, tuple[str, Known]] = {
     "peak_lam3": ("box", peak(2)),
     "penetration": ("box", value("gap", lambda _, run: -run.gap.min())),
     "rate_residual": ("box", faster),
+    "restitution": ("ball", rebounding),
     "ring_changes": ("maze", rings),
     "separation_gap": ("ball", gap_there),
     "swing_period": ("swing", swinging),

@@ -61,6 +61,7 @@ SCENES = {
     "sliders": ("newtons_cradle", {"variant": "sliders", "n": 4, "gap": 1e-3}, 0.02, 1e-6),
     "cubic floor": ("bouncing_ball", {"variant": "listing"}, 1.1, 1e-6),
     "red body": ("red_body", {}, 0.078, 1e-7),
+    "red body, frozen": ("red_body", {"variant": "frozen"}, 0.115, 1e-7),
 }
 
 

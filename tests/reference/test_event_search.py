@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gusty import gusty
 from many_contacts import constant
+from mechanisms import ball
 from numpy.polynomial.chebyshev import chebvander
 from rippled_walls import rippled
 from scipy.optimize import linprog
@@ -295,3 +296,19 @@ def test_rows_at_rest_beside_each_other_are_not_searched():
     case = cases.load("newtons_cradle", variant="pendulums")
     run = engines.load("reference").prepare(case, "compiled", rtol=1e-6).run()
     assert run.counts["guards"] < 20 * run.steps
+
+
+def test_events_that_are_not_kept_are_counted():
+    """More of them than the record has room for at once."""
+    bouncing = ball(b0=1e6, b1=0.0, a0=1e4, a1=200.0, a2=0.0)
+    kept, dropped = (simulate(bouncing, [0.01], [0.0], 150.0, events=events, samples=[0.0]) for events in (True, False))
+    assert not dropped.events
+    assert dropped.counts["events"] == kept.counts["events"] == len(kept.events) > 2000
+
+
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+def test_as_many_collisions_as_an_instant_may_have_are_no_cycle_where_each_has_its_own(solver):
+    bouncing = ball(b0=1e6, b1=0.0, a0=1e4, a1=200.0, a2=0.0)
+    run = simulate(bouncing, [0.001], [0.0], 32.0, solver=solver, samples=[0.0])
+    assert run.outcome.ok, run.message
+    assert len(run.events) > 2 * 1064

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from gusty import gusty
-from many_contacts import tower
+from many_contacts import constant, tower
 from mechanisms import ball, sliders
 
 from crossbody.cases import Mode, Outcome
-from crossbody.reference import simulate
+from crossbody.reference import System, simulate
 
 
 def test_start_below_the_surface():
@@ -119,3 +119,47 @@ def test_bodies_that_touch_and_fall_side_by_side_do_not_meet(solver: str, collis
         assert run.outcome.ok, (seed, run.message)
         assert not run.events, seed
         assert run.q[-1] == pytest.approx(np.full(n, 0.4 * height), rel=1e-6)
+
+
+def pushed_to_a_wall(rng: np.random.Generator, forces: list[float], balls: int, damping: float) -> System:
+    """Balls that touch each other and a wall, the first of them pushed to it by forces, and one far away."""
+    n, H = balls + 1, np.eye(balls + 1) - np.eye(balls + 1, k=-1)
+    base = constant(
+        np.diag(rng.uniform(0.2, 5.0, n)), H, [0.0] * balls + [5.0], np.resize([*np.negative(forces), *[0.0] * n], n),
+        zeta=0.3, b0=1e8,
+    )  # fmt: skip
+    kernels = {name: getattr(base, name) for name in ("dynamics", "gaps", "rows", "energy")}
+    a0 = np.full(n, 10.0 ** rng.uniform(0.0, 4.0))
+    return System(n=n, parameters=base.p, a0=a0, a1=damping, b0=1e8, b1=6e3, **kernels)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_gaps_and_rates_that_count_as_none_decide_nothing(solver: str) -> None:
+    """What the laws of rows at rest make of them presses no other row, however stiff and damped they are."""
+    for seed in range(20):
+        rng = np.random.default_rng([21, seed])
+        balls, speed = int(rng.integers(2, 5)), rng.uniform(1.0, 5.0)
+        pressed = int(rng.integers(1, balls))
+        forces, damping = rng.uniform(0.1, 1.0, pressed).tolist(), 10.0 ** rng.uniform(0.0, 4.0)
+        system = pushed_to_a_wall(rng, forces, balls, damping)
+        q0 = np.append(np.cumsum(rng.uniform(-4e-15, 4e-15, balls)), 0.0)
+        v0 = np.append(np.cumsum(rng.uniform(-4e-10, 4e-10, balls)), 1.0) * speed
+        run = simulate(system, q0, v0, 0.01, solver=solver, collisions="sequential")
+        assert run.outcome.ok, (seed, run.message)
+        assert sorted((e.contact, e.after) for e in run.events) == [(i, Mode.CONTACT) for i in range(pressed)], seed
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_row_is_pressed_however_much_stronger_another_is(solver: str) -> None:
+    for seed in range(20):
+        rng = np.random.default_rng([22, seed])
+        pressed = int(rng.integers(2, 5))
+        forces = [1.0, *(10.0 ** rng.uniform(-8.0, -6.0, pressed - 1)).tolist()]
+        run = simulate(
+            pushed_to_a_wall(rng, forces, pressed + 1, 10.0 ** rng.uniform(-1.0, 1.0)), np.zeros(pressed + 2),
+            [0.0] * (pressed + 1) + [1e-3], 0.01, solver=solver, collisions="sequential",
+        )  # fmt: skip
+        assert run.outcome.ok, (seed, run.message)
+        assert sorted((e.contact, e.after) for e in run.events) == [(i, Mode.CONTACT) for i in range(pressed)], seed
+        sums = np.cumsum(forces[::-1])[::-1]
+        np.testing.assert_allclose(run.lam[-1, :pressed], sums, rtol=1e-6)

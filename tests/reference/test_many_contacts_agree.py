@@ -404,3 +404,16 @@ def test_of_touching_rows_the_fastest_collides_first_however_near_the_others_are
         )
         assert labels(ours) == labels(other), seed
         assert [e.impulse for e in ours.events] == pytest.approx([e.impulse for e in other.events], rel=1e-9), seed
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_kernels_may_leave_out_the_zeros_of_their_rows(solver: str) -> None:
+    """Whatever rows stood in their places before."""
+    ends = []
+    for zeros in (True, False):
+        made = tower([1.0, 2.0, 0.5], zeta=0.3, zeros=zeros)
+        ends.append(simulate(made, [0.0, 0.05, 0.1], [0.0] * 3, 0.3, solver=solver))
+        assert ends[-1].outcome.ok, ends[-1].message
+    assert len(ends[0].events) > 4
+    assert ends[0].events == ends[1].events
+    assert np.array_equal(ends[0].q[-1], ends[1].q[-1])

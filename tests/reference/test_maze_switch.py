@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from crossbody.cases import load
+from crossbody.cases import InvalidValue, load
 from crossbody.cases.mechanisms.maze.geometry import maze_of
 from crossbody.reference.kernels import CHANGED, LOST, START, TOUCHED, UNCHANGED
 from crossbody.reference.systems import _maze_layout as layout
@@ -198,6 +199,40 @@ def test_channels_of_any_number_of_rings(rings):
         h = np.zeros(8)
         maze.gaps(0.0, ball(wall.outer + geometry.ball, 1.2), np.zeros(4), p, h, np.zeros(8))
         assert (h > -1e-15).all()
+
+
+@pytest.mark.parametrize("outer", [80e-3, 81.5e-3, 83e-3])
+def test_rings_that_are_added_have_their_gaps_between_those_of_the_ring_below(outer):
+    """As many, and as wide for the ball, however thick the last ring of the table is."""
+    rings = maze_of(load("ball_maze", variant="solve", rings=9, outer3=outer).parameters).rings
+    for below, ring in pairwise(rings[3:]):
+        ahead = (ring.centre(0) - below.centre(0)) * below.gaps / (2.0 * math.pi)
+        assert ahead % 1.0 == pytest.approx(0.5, abs=1e-12)
+        assert ring.gaps == below.gaps
+        assert ring.free_width == pytest.approx(below.free_width, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_maze_is_refused_where_its_ball_does_not_fit(seed):
+    """Through the narrowest of its hole, its channels and its gaps, measured between points of the walls."""
+    rng = np.random.default_rng(seed)
+    radii = np.cumsum(rng.uniform(0.01, 0.03, 8))
+    given = {"rings": 4, "wall": radii[-1] + rng.uniform(0.01, 0.03), "ring": 0, "angle": 0.1}
+    rooms = [2.0 * radii[0], *(radii[2::2] - radii[1:-1:2]), given["wall"] - radii[-1]]
+    for i in range(4):
+        inner, outer = radii[2 * i : 2 * i + 2]
+        width = rng.uniform(0.3, 0.8)
+        given |= {f"inner{i}": inner, f"outer{i}": outer, f"gaps{i}": 2, f"width{i}": math.degrees(width)}
+        # Caps of half the wall's thickness about points of its middle circle, beyond the flat ends of the gap.
+        middle, cap = 0.5 * (inner + outer), 0.5 * (outer - inner)
+        half = 0.5 * width + math.asin(cap / middle)
+        tips = middle * np.array([[math.sin(half), math.cos(half)], [-math.sin(half), math.cos(half)]])
+        rooms.append(float(np.linalg.norm(tips[0] - tips[1])) - 2.0 * cap)
+    fits = 0.5 * min(rooms)
+    ok = load("ball_maze", variant="inside", ball_radius=(1.0 - 1e-9) * fits, **given)
+    assert ok.parameters["ball_radius"] < fits
+    with pytest.raises(InvalidValue, match="ball"):
+        load("ball_maze", variant="inside", ball_radius=(1.0 + 1e-9) * fits, **given)
 
 
 @pytest.mark.parametrize("turn", [0.2, 1.0, -1.0, 5.0, -7.0, 40.0])

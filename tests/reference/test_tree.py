@@ -21,8 +21,8 @@ from crossbody.engines import load
 from crossbody.engines._scene import Forces, Rows
 from crossbody.engines.mujoco import _build as build
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, Strings
-from crossbody.engines.pinocchio.scene import tree
+from crossbody.engines.pinocchio._joined import Strings
+from crossbody.engines.pinocchio.scene import Gaps, spans, tree
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 
@@ -106,11 +106,6 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     assert close(moved[1].imag / step, Hdv)
 
 
-def in_space(scene: Scene) -> Scene:
-    """The scene with its loops in space alone."""
-    return scene.replace(loops=tuple(loop for loop in scene.loops if loop.in_space))
-
-
 def drift_of(model: Any, row: Any, q: Any, v: Any) -> Any:
     """H' v by what MuJoCo's rows (h, H) are at two instants of a motion."""
     step, ends = 1e-6, [np.array(q), np.array(q)]
@@ -138,7 +133,7 @@ def test_loops_are_those_of_mujoco(seed: int) -> None:
         return signs * h, signs[:, None] * J
 
     q, v, u = random_state(scene, np.random.default_rng(seed))
-    H, mine, Hdv = rows_at(scene, q, v, u)
+    H, mine, Hdv = (part[:count] for part in rows_at(scene, q, v, u))
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
     if data.ne < count:
@@ -160,24 +155,31 @@ def test_couplings_are_those_of_the_engines(seed: int) -> None:
     q, v, u = random_state(scene, np.random.default_rng(seed))
     H, h, Hdv = rows_at(scene, q, v, u)
     for mine, theirs in ((h, rows.heights(q)), (H, rows.jacobian(q)), (Hdv, rows.drift(q, v))):
-        assert close(mine, theirs[: len(mine)])
+        count = sum(loop.width for loop in scene.loops)
+        assert close(mine[:count], theirs[:count])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_loops_in_space_are_those_of_pinocchio(seed: int) -> None:
-    scene = in_space(random_scene(seed))
-    if not scene.loops:
-        return
-    to, (model, placed) = Coordinates(scene), tree(scene)
-    joined = Joined(model, placed, scene.loops)
-    q, v, u = random_state(scene, np.random.default_rng(seed))
-    r = to.theirs(q)
+def test_rows_are_those_of_pinocchio_in_their_order(seed: int) -> None:
+    """Of all kinds together, whichever are asked for: contacts of several places too."""
+    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    to, (model, placed), forces = Coordinates(scene), tree(scene), Forces(scene)
+    forces.spans = spans(scene, model, placed, to)
+    theirs = Gaps(scene, forces, (model, placed), to)
+    q, v, u = random_state(scene, rng)
     H, h, Hdv = rows_at(scene, q, v, u)
-    assert close(joined.heights(r), h)
-    assert close(to.velocities(r, joined.gradients(r)[1]), H)
-    # Their H' v is at rest of their velocities, of which those of free joints turn with the body.
+    if not len(h):
+        return
+    r = to.theirs(q)
     their = to.back(r, v)
-    assert close(joined.drift(r, their) - H @ to.bend(r, their), Hdv)
+    assert close(theirs.heights(r), h)
+    for chosen in (slice(None), *(sorted(rng.permutation(len(h))[:k].tolist()) for k in (1, 2, 5, 9))):
+        gaps, rows = theirs.gradient_of(r, chosen)
+        assert close(gaps, h[chosen])
+        assert close(to.velocities(r, rows), H[chosen])
+        # Their H' v is at rest of their velocities, of which those of free joints turn with the body.
+        drift = theirs.drift_of(r, their, chosen) - H[chosen] @ to.bend(r, their)
+        assert np.abs(drift - Hdv[chosen]).max() <= 1e-8 * max(1.0, np.abs(Hdv).max())  # contacts by differences
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -334,9 +334,10 @@ def test_a_control_is_checked_when_it_is_made(given: tuple[Any, Any], told: str)
 
 
 def test_what_contradicts_a_control_is_refused() -> None:
-    held = Inputs(names=("m1", "m2"), times=np.zeros(1), values=np.ones((1, 2)))
-    with pytest.raises(SceneError, match="valid: one of them"):
-        arm(pd, inputs=held)
+    for values in np.eye(4).reshape(4, 2, 2):  # a single number that is not 0
+        held = Inputs(names=("m1", "m2"), times=np.array([0.0, 0.1]), values=values)
+        with pytest.raises(SceneError, match="valid: one of them"):
+            arm(pd, inputs=held)
     with pytest.raises(SceneError, match="no actuators"):
         cases.from_scene(ARM.replace(actuators=()), control=Control(pd, 0.1))
     with pytest.raises(InvalidValue, match="at most"):

@@ -12,12 +12,14 @@ import mujoco
 import numpy as np
 import pytest
 from places import ROBOTS
+from scipy.spatial.transform import Rotation
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
+from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
 from crossbody.reports.judging.verdict import Verdict, Word
@@ -64,6 +66,25 @@ def study(case: Case, steps: list[float], model: float, order: float, shape: Cal
 
 def split(case: Case, truth: Truth, run: Trajectory, made: Study) -> Split:
     return splits(case, truth, run, made)["position"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_error_of_attitude_is_its_angle_however_a_body_is_turned(seed: int) -> None:
+    """In the metric and in the parts of an error; a quaternion of the other sign is the same attitude."""
+    body = Body(name="a", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    free = cases.from_scene(Scene(bodies=(body,), joints=(Joint(name="free", body="a", type="free"),)), t_end=2.0)
+    rng, t, still = np.random.default_rng(seed), np.linspace(0.0, 2.0, 41), np.zeros((41, 3))
+    way, off = rng.normal(size=(2, 3))
+    exact = Rotation.from_quat(rng.normal(size=4)) * Rotation.from_rotvec(np.outer(t, way))
+    wrong = exact * Rotation.from_rotvec(1e-3 * np.outer(t, off / np.linalg.norm(off)))
+    ours, theirs = (
+        np.hstack([still, sign * x.as_quat(scalar_first=True)]) for x, sign in ((exact, 1.0), (wrong, -1.0))
+    )
+    v = np.hstack([still, np.tile(way, (41, 1))])
+    truth, run = from_run(motion(ours, t, v), Tier.A, ""), motion(theirs, t, v)
+    positions = Positions(free, truth, run)
+    assert positions.sizes(positions.whole).max() == pytest.approx(2e-3, rel=1e-9)
+    assert metrics.load("position").measure(truth, run, free) == pytest.approx(2e-3, rel=1e-9)
 
 
 STEPS = [0.02, 0.01, 0.005]

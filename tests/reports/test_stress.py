@@ -11,6 +11,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -359,10 +360,14 @@ def test_a_truth_whose_touch_comes_earlier_or_later_beside_it_excuses_that_touch
         run = case.closed_form(t)  # type: ignore[misc]
         return replace(run, events=tuple(replace(event, t=event.t + by) for event in run.events))
 
-    wrong = replace(motion, q=np.where(motion.t[:, None] > touches[0] + 0.02, 2.0, 1.0) * motion.q)
+    near = 1.0 + 3e-4
+    wrong = replace(
+        motion, q=np.where(motion.t[:, None] > touches[0] + 0.02, 2.0, near) * motion.q,
+        events=tuple(replace(event, t=event.t + 5.0 * abs(by)) for event in motion.events),
+    )  # fmt: skip
     found = error(case, wrong, Asked(limit=1e-3, near=lambda: replace(case, closed_form=shifted)))
     assert found.until == pytest.approx(touches[0] + min(by, 0.0), abs=1e-12)
-    assert found.value < 1e-13
+    assert found.value == pytest.approx(near - 1.0, rel=1e-6)
 
 
 def test_a_slow_touch_does_not_set_the_clock_of_what_moves_fast() -> None:
@@ -408,6 +413,25 @@ def test_a_row_that_has_collapsed_passes_an_impulse_on_as_one_that_touches(n: in
     assert np.max(np.abs(run.v[-1] - truth.v[-1])) < 1e-9
     assert np.max(np.abs(run.q - truth.q)) < 1e-9 * run.t[-1]
     assert run.v[-1].sum() == pytest.approx(lifted, rel=1e-12)  # momentum: equal masses, 1 m/s
+
+
+@pytest.mark.parametrize("draw", [0, 4, 7])
+def test_an_exact_motion_to_a_nearer_horizon_is_the_beginning_of_it(draw: int) -> None:
+    """Wherever the horizon lies between two events, and however many blocks are searched before it."""
+    path = str(Path(suites.__file__).with_name("_springs_and_walls.py"))
+    whole = cases.load(path, n=1, walls=1, draw=draw, a0=1e5, zeta=0.5, stiffness=1.0, t_end=2.0)
+    assert whole.closed_form is not None
+    events = whole.closed_form(np.array([2.0])).events
+    free = [(a.t, b.t) for a, b in pairwise(events) if b.before is Mode.FREE]
+    assert free
+    for before, after in free[:2]:
+        for part in (0.05, 0.95):
+            t_end = before + part * (after - before)
+            near = cases.load(path, **{**whole.parameters, "t_end": t_end})
+            assert near.closed_form is not None
+            run = near.closed_form(np.array([t_end]))
+            assert run.outcome is Outcome.FINISHED
+            assert run.events == tuple(event for event in events if event.t <= before)
 
 
 @pytest.mark.parametrize("spec", drawn(), ids=str)

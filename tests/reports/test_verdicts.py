@@ -14,6 +14,7 @@ from crossbody import engines
 from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
+from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
@@ -300,6 +301,25 @@ def test_events_that_a_run_does_not_have_are_outside_and_no_known_property_cover
     }
     assert math.isnan(rows["event_times"].value)
     assert rows["event_times"].verdict == Word.OUTSIDE
+
+
+def test_whatever_is_claimed_or_limited_is_measured(case: Case, motion: Trajectory) -> None:
+    """What only a claim asks for too; a number that the run does not have is told where it is claimed."""
+    truth, entry = truth_of(case), Entry(engine="fake", profile="", run=motion)
+
+    def values(**asked: Any) -> dict[str, float]:
+        other = replace(case, **{"limits": (), "claims": (), **asked})
+        return {row.metric: row.value for row in judged(other, [entry], truth, "")}
+
+    own = {name: metric.measure(truth, motion, case) for name, metric in metrics.of(case).items() if metric.CLAIMED}
+    known = {name: value for name, value in own.items() if value is not None}
+    assert len(known) >= 5
+    assert own.keys().isdisjoint(values())
+    claimed = values(claims=tuple(Claim(metric=name, expected=1.0, tier=Tier.A, source="a book") for name in own))
+    limited = values(limits=tuple(Limit(metric=name, value=1.0) for name in own))
+    assert claimed.keys() >= own.keys()
+    for found in (claimed, limited):
+        assert {name: found[name] for name in known} == known
 
 
 def test_a_number_that_is_missing_is_expected_only_where_it_was_missing_before(case: Case, motion: Trajectory) -> None:

@@ -33,8 +33,8 @@ def compiled(scene: Scene) -> Any:
 
 
 def rows_at(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
-    """Return H, h and H' v of the loops of a scene, or of all rows where there are none."""
-    count, table = sum(loop.width for loop in scene.loops) or len(rows_of(scene)[0]), tabulate(scene)
+    """Return H, h and H' v of all rows of a scene."""
+    count, table = len(rows_of(scene)[0]), tabulate(scene)
     H, h, Hdv, w = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count), np.zeros(table.scratch)
     mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
     mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
