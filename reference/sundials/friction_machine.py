@@ -111,6 +111,17 @@ class FrictionMachine(LevelMachine):
         sliding = [i for i in seen.rows if i in self.sliding.ways and self.modes[i] == Mode.SLIP]
         return {i: self.direction(i, self.sliding.slip(seen, i)) for i in sliding}
 
+    def turning(self, t: float, q: Floats, v: Floats) -> dict[int, tuple[float, float]]:
+        """Slip velocity of contacts that slide in space, and the rate at which friction turns it, m/s and 1/s."""
+        seen, found = self.see(t, q, v), dict[int, tuple[float, float]]()
+        lam = self.sliding.forces(seen, self._modes_of(seen), self._ways_of(seen))
+        for i in seen.rows:
+            if len(ways := self.sliding.ways.get(i, [])) > 1 and self.modes[i] == Mode.SLIP:
+                size = max(float(np.linalg.norm(self.sliding.slip(seen, i))), self.small)
+                light = max(seen.G[seen.at[t], seen.at[t]] for t in ways)
+                found[i] = size, self.sliding.mu[i] * lam[seen.at[i]] * light / size
+        return found
+
     def renew(self, q: Floats, v: Floats, t: float) -> None:
         """Take the slip velocities' directions at the end of a step for those of reference."""
         _, rate = self.equations.gaps(t, q, v)
@@ -149,7 +160,8 @@ class FrictionMachine(LevelMachine):
             for i in trying:
                 mode = found.modes[i]
                 off = self.modes[i] if self.modes[i] not in ON else Mode.FREE if gap[i] > 0.0 else Mode.BALLISTIC
-                off = Mode.BALLISTIC if mode == Mode.FREE and gap[i] < -self.deep else off
+                if off == Mode.FREE and gap[i] <= 0.0 and (rate[i] < -self.slow or gap[i] < -self.deep):
+                    off = Mode.BALLISTIC
                 self._become(t, i, off if mode == Mode.FREE else mode)
             for i, way in found.ways.items():
                 if found.modes[i] == Mode.SLIP and (i not in self.ways or i in self._stands):

@@ -20,10 +20,15 @@ from crossbody.reference.sundials.run import CAUTION, SundialsRun
 CHUNK = 500
 SAME_INSTANT = 8.0 * ULP
 ORDER = 12
+STIFF = 10.0  # times the fastest pole of the rows
 
 
 class SlidingArc:
-    """One smooth arc: CVODE by Adams' formulas on the reduced equations, step by step.
+    """One smooth arc: CVODE on the reduced equations, step by step, by Adams' formulas or backward differentiation.
+
+    Friction turns a slip at a rate that goes as 1/|v_t|. CVODE keeps the matrix of Newton's method for twenty steps; one
+    from when a slip was slower hides what lies across the slip, and the solver does not see it. So it begins anew
+    whenever a slip has doubled that turns fast.
 
     Args:
         run: whose machine and options hold.
@@ -31,18 +36,19 @@ class SlidingArc:
         longest: bound on the step, s.
     """
 
-    stiff = False
-
     def __init__(self, run: FrictionRun, start: State, longest: float) -> None:
         self.run, system = run, run.system
         self.nq, self.ny = system.nq, system.nq + system.n
         y = np.concatenate([start.q, start.v, start.z])
         tolerance = SHARE * run.options.tolerance
         atol = np.concatenate([SHARE * run.options.absolute(system), np.full(len(start.z), tolerance * run.scale)])
+        self.turning = run.friction.turning(start.t, start.q, start.v)
+        fastest, pole = max((rate for _, rate in self.turning.values()), default=0.0), self._pole()
+        stiff = fastest > STIFF * pole
+        order = 5 if stiff else ORDER_IN_CONTACT if run.friction.contacts() else ORDER
         self.solver = CVODE(
-            self._slopes, method="Adams", rtol=SHARE * run.options.rtol, atol=atol, max_num_steps=CHUNK,
-            max_step=longest if np.isfinite(longest) else 0.0,
-            max_order=ORDER_IN_CONTACT if run.friction.contacts() else ORDER,
+            self._slopes, method="BDF" if stiff else "Adams", rtol=SHARE * run.options.rtol, atol=atol, max_num_steps=CHUNK,
+            max_step=longest if np.isfinite(longest) else 0.0, max_order=order,
         )  # fmt: skip
         self.solver.init_step(start.t, y)
         self.t0, self.t1, self.y0, self.y1 = start.t, start.t, y, y
@@ -60,6 +66,20 @@ class SlidingArc:
         yp[self.nq : self.ny] = vd
         if len(y) > self.ny:
             yp[self.ny :] = run.equations.powers(t, q, v, lam)
+
+    def _pole(self) -> float:
+        """Fastest pole of the laws in contact, 1/s; 1 without contacts."""
+        laws = self.run.friction.sliding.slow[self.run.friction.contacts()]
+        return float(max(1.0, np.sqrt(laws[:, 0]).max(initial=0.0), laws[:, 1].max(initial=0.0)))
+
+    @property
+    def stiff(self) -> bool:
+        """Whether a slip that turns fast has doubled since the arc began."""
+        if not any(rate > self._pole() for _, rate in self.turning.values()):
+            return False
+        s = self.at(self.t1)
+        now = self.run.friction.turning(s.t, s.q, s.v)
+        return any(i in now and now[i][0] > 2.0 * size for i, (size, _) in self.turning.items())
 
     def step(self, stop: float, target: float) -> tuple[State, Fired]:
         """Go on by one step, or to the first alarm inside it."""
@@ -177,6 +197,9 @@ class FrictionRun(SundialsRun):
         if cautious:
             longest = min(longest, (self.options.t_end - self.state.t) * CAUTION**self.retries)
         return SlidingArc(self, self.state, longest)
+
+    def _arc_on(self, arc: Any, view: View) -> Any:
+        return self._arc(view) if arc.stiff else arc
 
     def _accelerate(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         return self.friction.accelerate(t, q, v)

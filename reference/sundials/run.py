@@ -147,8 +147,8 @@ class SundialsRun:
             if switched or (at_stop and self.state.t < t_end):
                 view = self._settle(switched)
                 arc = self._arc(view)
-            elif self.kind is CvodeArc and arc.stiff:
-                arc = BdfArc(self.scene, self.state, view, self.options.max_step, self.single)
+            else:
+                arc = self._arc_on(arc, view)
 
     def _check_bounds(self, began: float) -> None:
         if self.scene.steps >= self.options.max_steps:
@@ -194,6 +194,12 @@ class SundialsRun:
         self.machine.move(s.t, modes)
         self.told += len(events) - known
         return changed
+
+    def _arc_on(self, arc: Arc, view: View) -> Arc:
+        """The arc that goes on from here: of the same solver, or of one for what has turned out to be stiff."""
+        if self.kind is not CvodeArc or not arc.stiff:
+            return arc
+        return BdfArc(self.scene, self.state, view, self.options.max_step, self.single)
 
     def _accelerate(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         return self.equations.accelerate(t, q, v)
