@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from sksundae.cvode import CVODE
 
 from crossbody.cases import Outcome
-from crossbody.reference.kinds import Floats
+from crossbody.reference.kinds import Floats, Floats2
 from crossbody.reference.sundials import roots
 from crossbody.reference.sundials.arcs import FAR, ORDER_IN_CONTACT, SHARE, Fired, State
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
@@ -20,6 +20,7 @@ from crossbody.reference.sundials.run import CAUTION, SundialsRun
 CHUNK = 500
 SAME_INSTANT = 8.0 * ULP
 ORDER = 12
+APART, APART_PART = 1e-7, 0.1  # of positions, and part of a slip without a direction: steps of differences
 STIFF = 10.0  # times the fastest pole of the rows
 
 
@@ -49,6 +50,7 @@ class SlidingArc:
         self.solver = CVODE(
             self._slopes, method="BDF" if stiff else "Adams", rtol=SHARE * run.options.rtol, atol=atol, max_num_steps=CHUNK,
             max_step=longest if np.isfinite(longest) else 0.0, max_order=order,
+            jacfn=self._jacobian if self.turning else None,
         )  # fmt: skip
         self.solver.init_step(start.t, y)
         self.t0, self.t1, self.y0, self.y1 = start.t, start.t, y, y
@@ -66,6 +68,17 @@ class SlidingArc:
         yp[self.nq : self.ny] = vd
         if len(y) > self.ny:
             yp[self.ny :] = run.equations.powers(t, q, v, lam)
+
+    def _jacobian(self, t: float, y: Floats, yp: Floats, J: Floats2) -> None:
+        """Differences over velocities that are small beside slips without a direction: the library's are not."""
+        moved, slopes, small = np.array(y), np.empty(len(y)), self.run.friction.small
+        J[:] = 0.0
+        for k in range(self.ny):
+            step = APART * max(1.0, abs(y[k])) if k < self.nq else APART_PART * small
+            moved[k] = y[k] + step
+            self._slopes(t, moved, slopes)
+            J[:, k] = (slopes - yp) / (moved[k] - y[k])
+            moved[k] = y[k]
 
     def _pole(self) -> float:
         """Fastest pole of the laws in contact, 1/s; 1 without contacts."""
