@@ -31,9 +31,9 @@ STILL = 10.0  # times that: a slip that stops there, stops
 GRAZE = 0.1  # of that: a slip may pass zero by so much and go on
 AGREES = 1e-10  # part of the largest acceleration by which a set of modes may be off
 ROUNDS, SWEEPS = 40, 3000
+FAR = 1e6  # times what one row alone would ask for: sweeps that lead there diverge
 SETTLED = 1e-14  # part of the largest multiplier by which the last sweep changes any
 WITHIN = 1e-7  # part of its bound by which a force must stay below it to count as that of a contact that sticks
-LOUD = (Mode.STICK, Mode.SLIP, Mode.CONTACT, Mode.FREE, Mode.BALLISTIC)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +81,7 @@ class FrictionMachine(LevelMachine):
 
     def see(self, t: float, q: Floats, v: Floats, contacts: list[int] | None = None) -> Seen:
         """Evaluate contacts, those that press if none are named."""
-        seen = self.sliding.see(t, q, v, self.contacts() if contacts is None else contacts)
-        return seen
+        return self.sliding.see(t, q, v, self.contacts() if contacts is None else contacts)
 
     def direction(self, i: int, slip: Floats) -> Floats:
         """Direction of a slip velocity; near zero it turns steadily to that of reference, behind which none is."""
@@ -91,7 +90,7 @@ class FrictionMachine(LevelMachine):
             return own
         if size >= STILL * self.small:
             return slip / size
-        slip = slip + max(-(slip @ own), 0.0) * own
+        slip = slip + max(-float(slip @ own), 0.0) * own
         longer = slip + max(self.small - float(np.linalg.norm(slip)), 0.0) * own
         way: Floats = longer / np.linalg.norm(longer)
         return way
@@ -265,7 +264,9 @@ class FrictionMachine(LevelMachine):
         for i, mode in tried.modes.items():
             k, heavy = seen.at[i], seen.G[seen.at[i], seen.at[i]]
             if mode == Mode.FREE:
-                off = [(-tried.excess[k], self._pressed(i, {j: w for j, w in tried.ways.items() if j not in self._stands}))]
+                off = [
+                    (-tried.excess[k], self._pressed(i, {j: w for j, w in tried.ways.items() if j not in self._stands}))
+                ]
             else:
                 off = [(-tried.lam[k] * heavy, Mode.FREE)]
                 ways = [seen.at[t] for t in self.sliding.ways.get(i, ())]
@@ -324,6 +325,8 @@ class FrictionMachine(LevelMachine):
                     lam[along] = step * (bound / size) if size > bound else step
             if np.abs(lam - before).max() <= SETTLED * np.abs(lam).max():
                 break
+            if not np.abs(lam).max() < FAR * np.abs(seen.bare).max() / own[own > 0.0].min():
+                return None  # friction presses further in: it jams
         excess, found, ways = seen.G @ lam - seen.bare, dict(modes), dict(fixed)
         for i in modes:
             along = [seen.at[t] for t in self.sliding.ways.get(i, ())]
@@ -342,7 +345,6 @@ class FrictionMachine(LevelMachine):
     def _set_alarms(self, t: float, q: Floats, v: Floats) -> None:
         """List what may fire until the next event, in the order of `values`."""
         self.alarms, count = [], 0
-        self._back: dict[int, float] = {}
 
         def add(i: int, tells: str, terms: int, armed: bool = True) -> None:
             nonlocal count
@@ -392,7 +394,7 @@ class FrictionMachine(LevelMachine):
                 found.append(self.sliding.mu[i] * bare[seen.at[i]] - force)
             elif tells == "STOP":
                 slip = self.sliding.slip(seen, i)
-                near = np.linalg.norm(slip) - STILL * self.small if len(slip) > 1 else -1.0
+                near = float(np.linalg.norm(slip)) - STILL * self.small if len(slip) > 1 else -1.0
                 found += [float(slip @ self.ways[i]) + self._leave(i), near]
             elif tells == "JAM":
                 found.append(self.sliding.stiffness(seen, modes, ways, i))

@@ -27,8 +27,8 @@ STIFF = 10.0  # times the fastest pole of the rows
 class SlidingArc:
     """One smooth arc: CVODE on the reduced equations, step by step, by Adams' formulas or backward differentiation.
 
-    Friction turns a slip at a rate that goes as 1/|v_t|. CVODE keeps the matrix of Newton's method for twenty steps; one
-    from when a slip was slower hides what lies across the slip, and the solver does not see it. So it begins anew
+    Friction turns a slip at a rate that goes as 1/|v_t|. CVODE keeps the matrix of Newton's method for twenty steps;
+    one from when a slip was slower hides what lies across the slip, and the solver does not see it. So it begins anew
     whenever a slip has doubled that turns fast.
 
     Args:
@@ -48,8 +48,8 @@ class SlidingArc:
         stiff = fastest > STIFF * pole
         order = 5 if stiff else ORDER_IN_CONTACT if run.friction.contacts() else ORDER
         self.solver = CVODE(
-            self._slopes, method="BDF" if stiff else "Adams", rtol=SHARE * run.options.rtol, atol=atol, max_num_steps=CHUNK,
-            max_step=longest if np.isfinite(longest) else 0.0, max_order=order,
+            self._slopes, method="BDF" if stiff else "Adams", rtol=SHARE * run.options.rtol, atol=atol,
+            max_num_steps=CHUNK, max_step=longest if np.isfinite(longest) else 0.0, max_order=order,
             jacfn=self._jacobian if self.turning else None,
         )  # fmt: skip
         self.solver.init_step(start.t, y)
@@ -108,8 +108,8 @@ class SlidingArc:
         state = self.at(end)
         if not fired:
             self.run.friction.renew(state.q, state.v, state.t)
-        watched = [alarm for alarm in fired if alarm.tells == "WATCH"]
-        return state, Fired([alarm for alarm in fired if alarm.tells != "WATCH"], watched)  # type: ignore[misc]
+        rows: Any = [alarm for alarm in fired if alarm.tells != "WATCH"]
+        return state, Fired(rows, [alarm.row for alarm in fired if alarm.tells == "WATCH"])
 
     def _search(self) -> tuple[float, list[Alarm]]:
         """The first instant of the step at which alarms fire, and these; its end if none does."""
@@ -226,9 +226,8 @@ class FrictionRun(SundialsRun):
     def _fire(self, fired: Any) -> bool:
         """Apply what was located; whether the arc ends there."""
         s = self.state
-        rows = [alarm for alarm in fired.rows if alarm.tells != "WATCH"]
-        if rows:
-            self.friction.apply(s.t, s.q, s.v, rows)
-        for alarm in fired.guards:
-            self._discretely(alarm.row)
-        return bool(rows or fired.guards)
+        if fired.rows:
+            self.friction.apply(s.t, s.q, s.v, fired.rows)
+        for guard in fired.guards:
+            self._discretely(guard)
+        return bool(fired.rows or fired.guards)

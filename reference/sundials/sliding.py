@@ -1,8 +1,8 @@
 """Contacts with Coulomb friction in whole matrices: forces of any set of modes, by singular values (spec 7.1, 7.3).
 
 With G = H M^-1 H^T of all rows in contact and b what their laws ask for, a set of modes has G lam = b in the rows that
-are solved for, and lam_t = -mu lam_n s in those that slide. Where these depend on each other the normal rows come first,
-with multipliers of least norm, and the sticking ones in what they leave, with least sum |lam_t|^2 / (mu lam_n).
+are solved for, and lam_t = -mu lam_n s in those that slide. Where these depend on each other the normal rows come
+first, with multipliers of least norm, and the sticking ones in what they leave, with least sum |lam_t|^2 / (mu lam_n).
 """
 
 from __future__ import annotations
@@ -83,7 +83,8 @@ class Sliding:
             raise Ended(Outcome.ILL_POSED, rows) from None
         if not np.isfinite(solved).all():
             raise Ended(Outcome.NOT_FINITE)
-        X, vd, rate = solved[:, :-1], solved[:, -1], H @ v - self.drift[rows]
+        X: Floats = np.asarray(solved[:, :-1], dtype=np.float64)
+        vd, rate = np.asarray(solved[:, -1], dtype=np.float64), H @ v - self.drift[rows]
         a0, a1, a2 = self.slow[rows].T
         law = a1 * rate + (a0 + a2 * h * h) * h
         slides = np.array([row in self.normal for row in rows], dtype=bool)
@@ -98,7 +99,7 @@ class Sliding:
         self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats]
     ) -> tuple[list[int], int, Floats, Floats]:
         """Places of the unknowns, how many of them are no sticking rows, their scaled matrix, and their sizes."""
-        columns, first, last = seen.G.copy(), [], []
+        columns, first, last = seen.G.copy(), list[int](), list[int]()
         for row, k in seen.at.items():
             i = self.normal.get(row, row)
             if i in self.ways and modes[i] == Mode.SLIP:
@@ -114,9 +115,7 @@ class Sliding:
         size = np.sqrt(np.maximum(np.maximum(own[places], own[beside]), np.finfo(float).tiny))
         return places, len(first), columns[np.ix_(places, places)] / np.outer(size, size), size
 
-    def forces(
-        self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats], pulled: bool = True
-    ) -> Floats:
+    def forces(self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats], pulled: bool = True) -> Floats:
         """Multipliers (m,) of the rows seen.
 
         Args:
