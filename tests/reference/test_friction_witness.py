@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from friction_scenes import account, linear, rod_on_floor, run, tossed
 
 from crossbody import cases, engines
-from crossbody.cases import Mode, Outcome, Trajectory
+from crossbody.cases import Mode, Outcome, Tier, Trajectory
+from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import RowLaw
 from crossbody.reference import simulate
+from crossbody.reports.judging.truth import truth_of
 
 QUICK = [
     ("sliding_block", "turns"), ("sliding_block", "askew"), ("rolling_sphere", "side_spin"), ("rocking_block", "falls"),
@@ -83,3 +87,12 @@ def test_both_decide_alike_where_one_set_agrees(seed: int) -> None:
             assert np.array_equal(one.mode[-1], other.mode[-1])
             compared += 1
     assert compared > 0
+
+
+def test_a_truth_without_a_closed_form_has_this_witness() -> None:
+    scene, q0, v0, _ = tossed(2)
+    case = replace(case_of(scene, t_end=0.3, v0=v0), q0=q0)
+    truth = truth_of(case)
+    assert truth.tier is Tier.C, truth.source
+    assert "cvode" in truth.source
+    assert truth.trusted == np.inf, truth.source
