@@ -16,6 +16,7 @@ from crossbody.reference.core import (
     exact,
     folds,
     guards,
+    instant,
     journal,
     peaks,
     record,
@@ -100,7 +101,7 @@ def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
 def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Settle the modes at the present instant and choose how to go on."""
     s.unsettled = 1
-    code = settle.settle(K, s, m, w, b)
+    code = instant.ask(instant.SETTLE, K, s, m, w, b)
     if code != 0:
         return int(code)
     s.unsettled, s.jumps, s.watched = 0, 1, 0
@@ -281,7 +282,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 @compiled
 def _share_anew(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Ask anew which rows idle: they carry again where they would push, and must have followed their laws."""
-    code = settle.share(K, s, m, w, b)
+    code = instant.ask(instant.SHARE, K, s, m, w, b)
     return _restart(K, s, m, w, b) if code == MOVED else code
 
 

@@ -10,11 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core.apart import number_at
 from crossbody.reference.core.layout import SLIP, Model, Work
 from crossbody.reference.kinds import Array, Bytes
 
@@ -30,27 +28,10 @@ TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes ma
 NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def _call(typingctx: Any, address: Any, what: Any, state: Any, model: Any, work: Any, i: Any) -> Any:
-    """Call the code at an address by the convention of compiled functions, and hand on what it raises."""
-    given = (what, state, model, work, i)
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        convention = context.call_conv
-        kind = convention.get_function_type(types.float64, given)
-        function = builder.inttoptr(args[0], kind.as_pointer())
-        status, found = convention.call_function(builder, function, types.float64, given, args[1:])
-        with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
-        return found
-
-    return types.float64(address, *given), generate
-
-
 @compiled
 def ask(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     """Have something done, or told, by the code of friction: `friction_answers` says what."""
-    return _call(s.friction_code, what, s, m, w, i)  # type: ignore[no-any-return]
+    return float(number_at(s.friction_code, (what, s, m, w, i)))
 
 
 @compiled

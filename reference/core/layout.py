@@ -70,6 +70,7 @@ STATE = np.dtype(
         ("has_switch", "i8"),
         ("frictional", "i8"),  # some rows in contact have friction
         ("friction_code", "i8"),  # where the code stands that answers for them
+        ("instant_code", "i8"),  # and that which settles modes
         ("rtol", "f8"),
         ("atol", "f8"),
         ("t_end", "f8"),
