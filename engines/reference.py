@@ -153,7 +153,7 @@ class Reference(Engine):
 def _no_friction(case: Case, solver: str) -> str | None:
     """Return why a scene's friction cannot be followed; None if there is none, or it can."""
     found = frictional(case.scene) if case.general and case.scene is not None else None
-    if found is None or solver != "compiled":
+    if found is None or solver == "ida":
         return found
     if case.scene is not None and case.scene.loops:
         return (

@@ -51,6 +51,10 @@ def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> A
         from crossbody.reference._run import CompiledRun
 
         return CompiledRun(system, *start, options)
+    if system.frictional:
+        from crossbody.reference.sundials.friction_run import FrictionRun
+
+        return FrictionRun(system, *start, options)
     from crossbody.reference.sundials.run import SundialsRun
 
     return SundialsRun(system, *start, options)

@@ -183,8 +183,8 @@ class Options:
         why = "the system has contacts with friction (System.mu)"
         if self.fsm != "level":
             raise InvalidValue(f"fsm is {self.fsm!r}, and {why}; valid: 'level'.")
-        if self.solver != "compiled":
-            raise InvalidValue(f"solver is {self.solver!r}, and {why}; valid: 'compiled'.")
+        if self.solver == "ida":
+            raise InvalidValue(f"solver is {self.solver!r}, and {why}; valid: 'compiled', 'cvode'.")
         rows = np.flatnonzero(system.held)
         if len(rows):
             raise SceneError(f"Row {rows[0]} is always on, and {why}: loops beside friction are not done.")

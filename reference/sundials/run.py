@@ -60,7 +60,8 @@ class SundialsRun:
         self.system, self.options, self.q0, self.v0 = system, options, q0, v0
         self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
         self.natural = options.samples is None
-        entry(system)  # the kernels are built into the compiled equations before the clock runs
+        if not system.frictional:
+            entry(system)  # the kernels are built into the compiled equations before the clock runs
         self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
         self.rigid: list[int] = np.flatnonzero(system.held).tolist() if options.index == 3 else []
         self._check_manifold()
@@ -84,7 +85,7 @@ class SundialsRun:
         self.single = self.natural or bool(self.folds.rows)
         nz = self.system.nc + 2 if self.options.ledger else 0
         energy = np.abs(np.nan_to_num(e.energy(self.q0, self.v0))).sum()
-        self.scene = Scene(e, self.machine, self.discrete, self.options, nz, max(float(energy), 1.0))
+        self.scene = self._scene(nz, max(float(energy), 1.0))
         self.state = State(0.0, self.q0.copy(), self.v0.copy(), np.zeros(nz))
         self.rows: list[tuple[float, Floats, Floats, Floats, Floats, Floats, list[int], Floats]] = []
         self.next_sample = self.next_input = self.next_tick = 0
@@ -97,6 +98,9 @@ class SundialsRun:
         if not self.options.freezes(self.system):
             return LevelMachine(self.system, e)
         return FrozenMachine(self.system, e, self.options.collisions, self.options.rtol)
+
+    def _scene(self, nz: int, scale: float) -> Scene:
+        return Scene(self.equations, self.machine, self.discrete, self.options, nz, scale)
 
     def go(self, progress: Callable[[float], None] | None = None) -> tuple[Outcome, float]:
         """Run to the end; how it ended, and the wall time in s."""
@@ -143,8 +147,8 @@ class SundialsRun:
             if switched or (at_stop and self.state.t < t_end):
                 view = self._settle(switched)
                 arc = self._arc(view)
-            elif self.kind is CvodeArc and arc.stiff:
-                arc = BdfArc(self.scene, self.state, view, self.options.max_step, self.single)
+            else:
+                arc = self._arc_on(arc, view)
 
     def _check_bounds(self, began: float) -> None:
         if self.scene.steps >= self.options.max_steps:
@@ -191,6 +195,15 @@ class SundialsRun:
         self.told += len(events) - known
         return changed
 
+    def _arc_on(self, arc: Arc, view: View) -> Arc:
+        """The arc that goes on from here: of the same solver, or of one for what has turned out to be stiff."""
+        if self.kind is not CvodeArc or not arc.stiff:
+            return arc
+        return BdfArc(self.scene, self.state, view, self.options.max_step, self.single)
+
+    def _accelerate(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        return self.equations.accelerate(t, q, v)
+
     def _arc(self, view: View, cautious: bool = False) -> Arc:
         longest = self.options.max_step
         if cautious:
@@ -203,7 +216,7 @@ class SundialsRun:
         if stop - before.t <= 16.0 * ULP * stop:
             self.state.t = stop
             if self._next_sample() <= stop:
-                self._sample(self.equations.accelerate(stop, before.q, before.v)[1])
+                self._sample(self._accelerate(stop, before.q, before.v)[1])
             self._check_progress(moved=False)
             return False
         try:

@@ -57,7 +57,7 @@ def truth_of(case: Case) -> Truth:
 
     arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
-        # SUNDIALS runs the level machine without friction alone: any other truth is known by itself only.
+        # SUNDIALS runs the level machine alone: any other truth is known by itself only.
         case, first = tightened(case)
         apart = case.fsm == "level" and engines.load("reference").why_not(case, "cvode") is None
         return _integrated(case, first, "cvode" if apart else "compiled")
@@ -130,8 +130,9 @@ def _tight(case: Case, **bound: int) -> Trajectory:
     return load("reference").prepare(case, "compiled", rtol=case.tight, **bound).run()
 
 
-def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
+def _integrated(case: Case, first: Trajectory, other: str, why: str = "") -> Truth:
     """The compiled integrator at its tightest, held against another solver: tier C if that is independent, else D."""
+    from crossbody.cases.scene_contacts import frictional
     from crossbody.engines import load
 
     reference = load("reference")
@@ -145,14 +146,18 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
 
     dense = at(sample_times(first, case.t_end))
     tier = Tier.D if other == "compiled" else Tier.C
-    who, loose, why = other, SECOND * case.tight, ""
+    rubs = tier is Tier.C and case.scene is not None and frictional(case.scene) is not None
+    who, loose = other, SECOND * case.tight
     shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
-    second = _witness(case) if case.general and tier is Tier.C else None
+    second = _witness(case) if case.general and tier is Tier.C and not rubs else None
     if isinstance(second, Trajectory):
         who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "the scene alone"
     else:
-        why = f" ({second})" if second else ""
-        second = reference.prepare(case, other, rtol=loose).run()
+        why = f" ({second})" if second else why
+        found = _in_time(case, loose, first.outcome) if rubs else reference.prepare(case, other, rtol=loose).run()
+        if isinstance(found, str):
+            return _integrated(case, first, "compiled", f" ({found})")
+        second = found
     truth = _held_against(
         Truth(
             tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
@@ -169,6 +174,21 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
         ended = f"{who} ends {second.outcome.value} at t = {truth.parted:.4g} s"
         source += f"; {ended if math.isnan(truth.growth) else apart}"
     return _rechecked(replace(truth, source=source), case)
+
+
+def _in_time(case: Case, rtol: float, expected: Outcome) -> Trajectory | str:
+    """A scene's motion with friction by CVODE, or why there is none: its equations are in Python."""
+    from crossbody.engines import load
+
+    late = f"CVODE would share the equations alone, and take more than {WITNESS_S:.0f} s"
+    for part in (SHARE, 1.0):
+        shorter = replace(case, t_end=part * case.t_end)
+        run = load("reference").prepare(shorter, "cvode", rtol=rtol, time_limit=part * WITNESS_S).run()
+        if run.outcome is Outcome.TIME_LIMIT:
+            return late
+        if not run.outcome.ok and run.outcome is not expected:
+            return f"CVODE ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
+    return run
 
 
 def _witness(case: Case) -> Trajectory | str:

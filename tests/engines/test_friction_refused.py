@@ -88,7 +88,7 @@ def test_dry_friction_of_a_joint_is_refused() -> None:
         case_of(joint(friction_loss=0.1))
 
 
-RUBBING = (("reference", "compiled"), ("mujoco", "default"), ("mujoco", "as_is"))
+RUBBING = (("reference", "compiled"), ("reference", "cvode"), ("mujoco", "default"), ("mujoco", "as_is"))
 """Those that have friction; of a scene and of a file one of MuJoCo's is refused, for another reason."""
 
 

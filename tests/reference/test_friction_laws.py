@@ -2,52 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from friction_oracle import STICK, Body
-from friction_scenes import HALF, G, account, box_body, box_on_floor, linear, pair, point, rod_on_floor, run
+from friction_scenes import EDGED, HEAVIEST, G, account, box_on_floor, linear, point, rod_on_floor, run, tossed
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Joint, RowLaw, Scene, Shape
+from crossbody.cases.scene import RowLaw, Scene
 from crossbody.reference import System, simulate
 from crossbody.reference.linear import linearise
 from crossbody.reference.tree.system import system
 
-ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
-EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
-HEAVIEST = 2.0  # kg
 CYCLING = {158}  # an edge slides at mu = 0.97: its ends press in turn, until at one instant no set of modes holds
 FURTHER = (1090, 1481, 2129, 2629)
 QUICK = (*range(60), 70, 147, 210, 240, 264, 304, 325, 417, 499, 536, 572, *FURTHER)  # each broke one rule or another
 STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
 DRIFT = 1e3  # times rtol, of the largest speed: a contact that sticks is no faster
-
-
-def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int = 3) -> Any:
-    """Return bodies tossed onto a floor, two spheres among them that may meet, their start and mu."""
-    sizes = ROUND | first
-    rng = np.random.default_rng(seed)
-    mu, law = float(rng.uniform(0.0, 1.0)), RowLaw(a0=float(10 ** rng.uniform(3, 4.5)), a1=float(rng.uniform(5, 200)))
-    kinds = [str(rng.choice(list(first))), "sphere", "sphere"][: int(rng.integers(1, 1 + most))]
-    bodies, shapes, q, v = [], [Shape(name="floor", type="plane")], [], []
-    for i, kind in enumerate(kinds):
-        bodies.append(box_body(f"b{i}", HALF, float(rng.uniform(0.5, HEAVIEST))))
-        shapes.append(Shape(name=f"s{i}", body=f"b{i}", type=kind, size=sizes[kind]))
-        turn = rng.normal(size=4)
-        q += [0.15 * i, 0.0, 0.3 + 0.25 * i, *(turn / np.linalg.norm(turn))]
-        v += [*rng.normal(size=2), -1.0, *(4.0 * rng.normal(size=3))]
-    pairs = [pair("floor", f"s{i}", mu, law) for i in range(len(kinds))]
-    pairs += [pair(f"s{i}", f"s{i + 1}", mu, law) for i in range(1, len(kinds) - 1)]
-    joints = tuple(Joint(name=body.name, body=body.name, type="free") for body in bodies)
-    scene = Scene(bodies=tuple(bodies), joints=joints, shapes=tuple(shapes), pairs=tuple(pairs))
-    return scene, np.array(q), np.array(v), mu
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -207,7 +182,6 @@ def test_systems_with_wrong_friction_are_refused(given: dict[str, object], told:
     ("options", "error", "told"),
     [
         ({"fsm": "edge"}, InvalidValue, "friction"),
-        ({"solver": "cvode"}, InvalidValue, "friction"),
         ({"solver": "ida"}, InvalidValue, "friction"),
     ],
 )

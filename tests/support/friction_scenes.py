@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ G = 9.81
 LAW = RowLaw(a0=1e4, a1=200.0)
 PLANAR = (("x", (1, 0, 0), "slide"), ("z", (0, 0, 1), "slide"), ("turn", (0, 1, 0), "hinge"))
 HALF = (0.2, 0.15, 0.1)
+ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
+EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
+HEAVIEST = 2.0  # kg
 
 
 def box_body(name: str, half: tuple[float, ...], mass: float = 1.0) -> Body:
@@ -76,6 +80,26 @@ def stack(mu1: float, mu2: float, m1: float = 2.0, m2: float = 1.0) -> Scene:
         pairs=(pair("floor", "low", mu1), pair("top", "high", mu2)),
         pushes=(Push(name="on low", body="low"), Push(name="on high", body="high")),
     )  # fmt: skip
+
+
+def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int = 3) -> Any:
+    """Return bodies tossed onto a floor, two spheres among them that may meet, their start and mu."""
+    sizes = ROUND | first
+    rng = np.random.default_rng(seed)
+    mu, law = float(rng.uniform(0.0, 1.0)), RowLaw(a0=float(10 ** rng.uniform(3, 4.5)), a1=float(rng.uniform(5, 200)))
+    kinds = [str(rng.choice(list(first))), "sphere", "sphere"][: int(rng.integers(1, 1 + most))]
+    bodies, shapes, q, v = [], [Shape(name="floor", type="plane")], [], []
+    for i, kind in enumerate(kinds):
+        bodies.append(box_body(f"b{i}", HALF, float(rng.uniform(0.5, HEAVIEST))))
+        shapes.append(Shape(name=f"s{i}", body=f"b{i}", type=kind, size=sizes[kind]))
+        turn = rng.normal(size=4)
+        q += [0.15 * i, 0.0, 0.3 + 0.25 * i, *(turn / np.linalg.norm(turn))]
+        v += [*rng.normal(size=2), -1.0, *(4.0 * rng.normal(size=3))]
+    pairs = [pair("floor", f"s{i}", mu, law) for i in range(len(kinds))]
+    pairs += [pair(f"s{i}", f"s{i + 1}", mu, law) for i in range(1, len(kinds) - 1)]
+    joints = tuple(Joint(name=body.name, body=body.name, type="free") for body in bodies)
+    scene = Scene(bodies=tuple(bodies), joints=joints, shapes=tuple(shapes), pairs=tuple(pairs))
+    return scene, np.array(q), np.array(v), mu
 
 
 def run(scene: Scene, q0: Any, v0: Any, t_end: float, **options: Any) -> Trajectory:

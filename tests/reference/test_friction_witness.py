@@ -1,0 +1,98 @@
+"""The second machine for friction, CVODE's: exact motions, and the compiled machine's motions of tossed bodies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from friction_scenes import account, linear, rod_on_floor, run, tossed
+
+from crossbody import cases, engines
+from crossbody.cases import Mode, Outcome, Tier, Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import RowLaw
+from crossbody.reference import simulate
+from crossbody.reports.judging.truth import truth_of
+
+QUICK = [
+    ("sliding_block", "turns"), ("sliding_block", "askew"), ("rolling_sphere", "side_spin"), ("rocking_block", "falls"),
+]  # fmt: skip
+NAMES = ("sliding_block", "rolling_sphere", "rocking_block", "block_on_belt", "stacked_blocks")
+OTHERS = [(name, variant) for name in NAMES for variant in cases.variants(name) if (name, variant) not in QUICK]
+STATE, TIME = 1e-8, 1e-9
+
+
+def events(run_: Trajectory) -> list[tuple[int, Mode, Mode]]:
+    """Return what contacts change, those of one instant by their order."""
+    return [(e.contact, e.before, e.after) for e in sorted(run_.events, key=lambda e: (round(e.t, 8), e.contact))]
+
+
+def times(run_: Trajectory) -> np.ndarray:
+    """Return when."""
+    return np.sort([e.t for e in run_.events])
+
+
+@pytest.mark.parametrize(("name", "variant"), [*QUICK, *(pytest.param(*one, marks=pytest.mark.slow) for one in OTHERS)])
+def test_exact_motions(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    found = engines.load("reference").prepare(case, "cvode", rtol=1e-10).run()
+    assert found.outcome.ok, found.message
+    assert case.closed_form is not None
+    exact = case.closed_form(found.t)
+    assert np.abs(found.q - exact.q).max() < STATE
+    assert np.abs(found.energy - exact.energy).max() < STATE
+    assert events(found) == events(exact)
+    assert np.abs(times(found) - times(exact)).max() < TIME
+
+
+@pytest.mark.parametrize("seed", [0, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 53))])
+def test_both_machines_move_tossed_bodies_alike(seed: int) -> None:
+    scene, q0, v0, _ = tossed(seed)
+    at = np.linspace(0.0, 0.4, 81)
+    one = run(scene, q0, v0, 0.4, rtol=1e-11, samples=at)
+    other = run(scene, q0, v0, 0.4, rtol=1e-9, samples=at, solver="cvode")
+    assert one.outcome is other.outcome is Outcome.FINISHED, other.message
+    assert np.abs(one.q - other.q).max() < STATE
+    assert events(one) == events(other)
+    assert np.abs(times(one) - times(other)).max(initial=0.0) < 1e-8
+    assert account(other) < 1e-7
+
+
+@pytest.mark.parametrize("mu", [0.5, 2.0])
+def test_a_rod_that_is_pushed_jams_in_both(mu: float) -> None:
+    """Painleve's: at mu = 2 friction would press the end that slides into the floor."""
+    scene = rod_on_floor(mu, law=RowLaw(a0=1e4, a1=200.0))
+    q0, v0 = [0.0, 0.5 * np.cos(0.6) + 1e-3, 0.6], [-2.0, 0.0, 0.0]
+    ends = [run(scene, q0, v0, 0.05, rtol=1e-8, solver=solver).outcome for solver in ("compiled", "cvode")]
+    assert ends[0] is ends[1]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_both_decide_alike_where_one_set_agrees(seed: int) -> None:
+    rng, compared = np.random.default_rng(seed), 0
+    for _ in range(6):
+        k = int(rng.integers(1, 3))
+        n, mu = 2 * k + int(rng.integers(0, 3)), float(rng.uniform(0.05, 1.0))
+        H = rng.normal(size=(2 * k, n)) * 0.6 + np.eye(2 * k, n)
+        force = rng.normal(size=n) * 2.0 - H[:k].T @ np.abs(rng.normal(size=k)) * 2.0
+        made = linear(H, force, mu, k)
+        one, other = (
+            simulate(made, np.zeros(n), np.zeros(n), 1e-3, rtol=1e-9, samples=[1e-3], solver=solver)
+            for solver in ("compiled", "cvode")
+        )
+        if one.outcome is Outcome.FINISHED and not one.counts.get("not_unique"):
+            assert other.outcome is Outcome.FINISHED, other.message
+            assert np.abs(one.v - other.v).max() < 1e-8
+            assert np.array_equal(one.mode[-1], other.mode[-1])
+            compared += 1
+    assert compared > 0
+
+
+def test_a_truth_without_a_closed_form_has_this_witness() -> None:
+    scene, q0, v0, _ = tossed(2)
+    case = replace(case_of(scene, t_end=0.3, v0=v0), q0=q0)
+    truth = truth_of(case)
+    assert truth.tier is Tier.C, truth.source
+    assert "cvode" in truth.source
+    assert truth.trusted == np.inf, truth.source
