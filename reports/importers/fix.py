@@ -37,6 +37,7 @@ SAME = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "armature", 
 """What the new file means as the old one does; bodies that are fixed to the world may have other frames."""
 
 
+MARK = "Written by crossbody audit --fix"
 KEPT = (
     "geom_type", "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_friction", "geom_solref",
     "geom_solimp", "geom_solmix", "geom_margin", "geom_gap", "geom_fluid", "geom_group", "site_type", "site_size",
@@ -58,6 +59,7 @@ def fixed(path: Path, out: Path, without: str = "") -> None:
     """
     before = opened(path, without)
     root = _urdf(path) if is_urdf(path) else _mjcf(path, out)
+    root.insert(0, ElementTree.Comment(f" {MARK} of {path.name.replace('--', '- -')} "))
     ElementTree.indent(root)
     half = out.with_name(f".{out.stem}.half{out.suffix}")
     try:
@@ -66,6 +68,8 @@ def fixed(path: Path, out: Path, without: str = "") -> None:
         if not is_urdf(path):
             _check_model(path, half)
         half.replace(out)
+    except SceneError as error:
+        raise SceneError(str(error).replace(str(half), f"The new form of {path}")) from None
     except OSError as error:
         raise OutputError(f"{out} cannot be written: {error.strerror}.") from None
     finally:
