@@ -62,12 +62,16 @@ def uses(path: Path, urdf: bool) -> list[Use]:
 
 
 def _at(root: Node, places: dict[Node, Place], way: str) -> list[Node]:
-    """Return the elements at a path of ElementTree; behind a ! stand the children that they must not have."""
+    """Return the elements at a path of ElementTree; behind a ! stands what they must not have."""
     if way == ".//include":
         return [node for node in places if node.tag == "include"]
     path, _, without = way.partition("!")
     absent = without.split(",") if without else []
-    return [node for node in root.findall(path) if all(node.find(tag) is None for tag in absent)]
+    return [node for node in root.findall(path) if not any(_has(node, one) for one in absent)]
+
+
+def _has(node: Node, part: str) -> bool:
+    return part[1:] in node.attrib if part.startswith("@") else node.find(part) is not None
 
 
 def left_out(path: Path, features: Sequence[Feature], out: Path) -> None:
@@ -79,7 +83,7 @@ def left_out(path: Path, features: Sequence[Feature], out: Path) -> None:
                 told = re.findall(r"@(\w+)", way.partition("!")[0].rpartition("/")[2])
                 for key in told:
                     node.attrib.pop(key, None)
-                for parent in [] if told else [one for one in root.iter() if node in list(one)]:
+                for parent in [] if told or "!" in way else [one for one in root.iter() if node in list(one)]:
                     parent.remove(node)
     ElementTree.ElementTree(root).write(out, encoding="utf-8")
 
@@ -90,8 +94,8 @@ def explained(
     """Return the rows, those that are wrong with the feature that is to blame and where that stands.
 
     To blame is a feature that the file uses, which the importer fails in its smallest file, and without which it reads
-    the file's quantity as the file then says. Where only all of them together do it, or the file in plainer words does,
-    the nearest is named as a guess.
+    the file's quantity as the file then says. Named as a guess is the nearest where only all of them together do it, or
+    the file in plainer words; what does it though its smallest file is read; and what cannot be left out.
 
     Args:
         path: of the file.
@@ -170,6 +174,8 @@ def _of_engine(engine: str, trials: _Trials, used: Sequence[Use], off: Sequence[
     others = trials.asked(engine, [[use.feature] for use in left])
     for row in (row for row in own if row.quantity not in found):
         same = [use for use, told in zip(left, others, strict=True) if _agrees(row, told)]
+        same = same or [use for (use, small), told in zip(failed, alone, strict=True) if not told and (
+            small.quantity == row.quantity)]  # fmt: skip
         if same:
             found[row.quantity] = _blamed(row, same, "perhaps")
     return found

@@ -16,7 +16,7 @@ from crossbody.cases import installed
 from crossbody.engines import importers
 from crossbody.engines.importers.process import bounds, rotation, tried
 from crossbody.reports.importers.audit import audited, opened
-from crossbody.reports.importers.causes import explained
+from crossbody.reports.importers.causes import explained, uses
 from crossbody.reports.importers.compare import NONE, OK, UNSEEN, WORDS, WRONG, Said, rows
 from crossbody.reports.importers.told import sarif, sentence
 
@@ -231,16 +231,24 @@ def test_a_file_with_a_strange_name_is_told_in_print(tmp_path: Path, capsys: pyt
 
 
 def test_a_cause_is_one_without_which_the_reader_agrees(tmp_path: Path) -> None:
-    """Two things that Pinocchio reads wrongly, one of them in an include: each quantity has its own."""
-    path, part = tmp_path / "arm.xml", tmp_path / "part.xml"
-    path.write_text(ARM.replace("<worldbody>", '<option gravity="0 0 -3"/><worldbody><include file="part.xml"/>'))
-    part.write_text('<mujocoinclude>\n\n<body name="base" euler="30 0 0"/></mujocoinclude>')
+    """Two things that Pinocchio reads wrongly: each quantity has its own, on its line."""
+    path = tmp_path / "arm.xml"
+    text = ARM.replace("<worldbody>", '<option gravity="0 0 -3"/>\n<worldbody>\n<body name="base" pos="1 0 0">')
+    path.write_text(text.replace("</worldbody>", "</body></worldbody>"))
     found = [row for _, _, own in audited(path, ["pinocchio"], seconds=60.0) for row in own]
     told = {row.quantity: row for row in explained(path, urdf=False, rows=found, seconds=60.0) if row.verdict == WRONG}
-    assert {key: (row.cause, row.doubt, Path(row.file).name, row.line) for key, row in told.items()} == {
-        **dict.fromkeys(("gravity", "bias", "energy"), ("gravity", "", "arm.xml", 1)),
-        "frames": ("fixed body with a pose under the world", "", "part.xml", 3),
+    assert {key: (row.cause, row.doubt, row.line) for key, row in told.items()} == {
+        **dict.fromkeys(("gravity", "bias", "energy"), ("gravity", "", 1)),
+        "frames": ("fixed body with a pose under the world", "", 3),
     }
+
+
+def test_a_feature_stands_in_the_file_that_is_included(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.replace("<worldbody>", '<include file="part.xml"/>\n<worldbody>'))
+    (tmp_path / "part.xml").write_text('<mujocoinclude>\n\n<option gravity="0 0 -3"/></mujocoinclude>')
+    told = {use.feature.name: [(file.name, line) for file, line in use.places] for use in uses(path, urdf=False)}
+    assert (told["gravity"], told["included file"]) == ([("part.xml", 3)], [("arm.xml", 1)])
 
 
 def test_words_of_a_warning_are_whole(tmp_path: Path) -> None:
