@@ -182,8 +182,11 @@ def _of_engine(engine: str, trials: _Trials, used: Sequence[Use], off: Sequence[
 
 
 def _agrees(row: Row, told: Sequence[Row]) -> bool:
-    """Return whether a row is no longer wrong; of a reader that fails, whether it reads, or fails by something else."""
-    for one in told:
+    """Return whether a row is no longer wrong; of a reader that fails, whether it reads, or fails by something else.
+
+    Shapes agree where there are none: what leaves them out explains nothing of them.
+    """
+    for one in told if row.quantity not in ("bodies", "shapes", "contacts") else ():
         if one.quantity == row.quantity:
             same = one.why == row.why if row.quantity == "reading" else one.verdict not in (OK, NONE)
             return not same

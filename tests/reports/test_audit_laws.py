@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,12 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robot_readers import ARM, HEAD, rows_of, run
 
-from crossbody.cases import installed
+from crossbody.cases import CrossbodyError, installed
+from crossbody.cases.files.conformance import FEATURES
 from crossbody.engines import importers
 from crossbody.engines.importers.process import bounds, rotation, tried
 from crossbody.reports.importers.audit import audited, opened
 from crossbody.reports.importers.causes import explained, uses
 from crossbody.reports.importers.compare import NONE, OK, UNSEEN, WORDS, WRONG, Said, rows
+from crossbody.reports.importers.fix import MARK
 from crossbody.reports.importers.told import sarif, sentence
 
 PARTS = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
@@ -184,7 +188,7 @@ def test_nothing_is_written_over_what_is_read_or_is_somebody_elses(
         assert Path(words[1]).read_text() == before
     for words in (["--force"], []):  # what it has written it may write again
         assert run(["audit", str(path), "-e", "mujoco", "--fix", str(other), *words], capsys)[0] == 0
-    assert "Written by crossbody audit --fix of arm.xml" in other.read_text()
+    assert MARK in other.read_text()
 
 
 def test_what_is_no_file_or_nobody_reads_is_a_sentence(
@@ -257,3 +261,76 @@ def test_words_of_a_warning_are_whole(tmp_path: Path) -> None:
 
 def test_every_importer_says_what_it_was_tried_with() -> None:
     assert all(len(importers.REGISTRY.load(name).TRIED) == 2 for name in importers.names())
+
+
+PLAIN = [
+    feature for feature in FEATURES
+    if feature.format == "mjcf" and not feature.files and {j.type for j in feature.scene.joints} <= {"hinge", "slide"}
+]  # fmt: skip
+
+
+def of_mujoco(path: Path) -> Any:
+    """What gives M and forces at a state by MuJoCo alone, and the names of its joints."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+
+    def at(q: Any, v: Any) -> tuple[Any, Any]:
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        M = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, M)
+        return M - np.diag(model.dof_armature), data.qfrc_bias - data.qfrc_gravcomp
+
+    return at, [model.joint(i).name for i in range(model.njnt)], model.qpos0
+
+
+def of_pinocchio(path: Path, names: list[str]) -> Any:
+    """The same by Pinocchio alone; nothing where it has other joints."""
+    import pinocchio
+
+    model = pinocchio.buildModelAndConstraintsFromMJCF(str(path))[0]
+    data = model.createData()
+    if list(model.names)[1:] != names or model.nv != len(names):
+        return None
+
+    def at(q: Any, v: Any) -> tuple[Any, Any]:
+        M = np.triu(pinocchio.crba(model, data, q))
+        return M + np.triu(M, 1).T - np.diag(model.armature), pinocchio.nonLinearEffects(model, data, q, v)
+
+    return at
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_verdicts_are_what_two_libraries_say_of_a_changed_file(seed: int, tmp_path: Path) -> None:
+    """A number of a feature's file is changed, 20 a seed: M, weight and bias differ by the audit where they do."""
+    draw, seen = np.random.default_rng(seed), 0
+    for k in range(20):
+        feature = PLAIN[draw.integers(len(PLAIN))]
+        found = list(re.finditer(r'(?<=[" ])-?\d*\.?\d+(?=[" ])', feature.text))
+        one, path = found[draw.integers(len(found))], tmp_path / f"{k}.xml"
+        new = float(one.group()) * draw.choice([1.0001, -1.0, 2.0, 0.0]) + draw.choice([0.0, 0.3])
+        path.write_text(feature.text[: one.start()] + repr(float(new)) + feature.text[one.end() :])
+        try:
+            truth, names, home = of_mujoco(path)
+            told = {engine: own for _, engine, own in audited(path, ["mujoco", "pinocchio"], seconds=60.0)}
+        except (ValueError, CrossbodyError):
+            continue
+        if "gravcomp" in feature.text and new < 0.0:  # MuJoCo 4.0 leaves it out where no body has a positive one
+            continue
+        assert {row.verdict for row in told["mujoco"]} <= {OK, NONE}, (feature.name, one.group(), new)
+        other = of_pinocchio(path, names) if told["pinocchio"][0].verdict == OK else None
+        if other is None:
+            continue
+        seen += 1
+        off = dict.fromkeys(("M", "gravity", "bias"), 0.0)
+        for _ in range(4):
+            q, v = home + draw.uniform(-1.0, 1.0, len(home)), draw.normal(size=len(home))
+            for quantity, i, rate in (("M", 0, v), ("gravity", 1, 0.0 * v), ("bias", 1, v)):
+                mine, theirs = truth(q, rate), other(q, rate)
+                size = np.abs(mine[i]).max() + np.abs(mine[0]).max()
+                off[quantity] = max(off[quantity], float(np.abs(mine[i] - theirs[i]).max() / size))
+        for row in told["pinocchio"]:
+            if row.quantity in off and not 1e-12 < off[row.quantity] < 1e-6:
+                assert (row.verdict == OK) == (off[row.quantity] < 1e-9), (feature.name, new, row, off)
+    assert seen >= 3
