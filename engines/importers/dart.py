@@ -45,6 +45,8 @@ class _Robot:
             self._world = world
         if not self._s:
             raise ValueError("DART's reader returns nothing")
+        bound = (s.getJoint(i) for s in self._s for i in range(s.getNumJoints()))
+        loops += sum(joint.getActuatorType() == dartpy.dynamics.ActuatorType.MIMIC for joint in bound)
         self.loops: Any = [("", [], [])] * loops
         self.joints, self._joints = [], []
         self.nq = 0

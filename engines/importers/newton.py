@@ -83,6 +83,9 @@ class _Robot:
             factors[:, :2] = np.column_stack([m.constraint_mimic_coef0.numpy(), m.constraint_mimic_coef1.numpy()])
             rows = zip(*pair, factors, strict=True)
             self.loops += [("joint", [last[i], last[j]], row.tolist()) for i, j, row in rows]
+        followed = m.joint_mimic_joint.numpy().tolist()  # how it keeps those of a URDF
+        for i, j in ((i, j) for i, j in enumerate(followed) if j >= 0):
+            self.loops.append(("joint", [last[i], last[j]], [*m.joint_mimic_coeffs.numpy()[i].tolist(), 0.0, 0.0, 0.0]))
         self.numbers = self._numbers()
 
     def _motors(self, named: dict[str, str]) -> None:

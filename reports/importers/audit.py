@@ -132,6 +132,7 @@ def opened(path: Path, without: str = "") -> Audit:
     found.named = lines_named(path)
     if is_urdf(path):
         found.wanted["planar"] = planar(path)
+        found.wanted["contacts"] = None  # which of its links may touch each other a URDF does not say
         for name, both in bounds(path).items():
             for key, value in zip(("lower", "upper"), both, strict=True):
                 if name in found.wanted["numbers"][key]:

@@ -99,7 +99,7 @@ def _check_model(path: Path, half: Path) -> None:
 def _at(after: Audit, before: Audit) -> dict[str, Any]:
     from crossbody.reports.importers.expected import expected
 
-    return expected(after.scene, before.job)
+    return expected(after.scene, before.job) | {"numbers": after.wanted["numbers"]}
 
 
 def _numbers(text: str) -> Floats:

@@ -353,6 +353,8 @@ def _shapes(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[int
 
 def _contacts(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[int, tuple[int, float]]) -> Any:
     """Which shapes may touch each other, of those that both have."""
+    if wanted["contacts"] is None:
+        return None
     there, name = {i: k for k, (i, _) in of.items()}, [shape[0] for shape in wanted["shapes"]]
     mine = {frozenset((there[i], there[j])) for i, j in found["contacts"] if i in there and j in there}
     theirs = {frozenset(pair) for pair in wanted["contacts"] if set(pair) <= of.keys()}

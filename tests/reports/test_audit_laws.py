@@ -334,3 +334,11 @@ def test_verdicts_are_what_two_libraries_say_of_a_changed_file(seed: int, tmp_pa
             if row.quantity in off and not 1e-12 < off[row.quantity] < 1e-6:
                 assert (row.verdict == OK) == (off[row.quantity] < 1e-9), (feature.name, new, row, off)
     assert seen >= 3
+
+
+def test_a_joint_that_mimics_in_dart_is_not_said_to_be_missing(tmp_path: Path) -> None:
+    """Its Python tells that there is one, and not of which joint."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(next(feature.text for feature in FEATURES if feature.name == "URDF: mimic"))
+    [(_, _, found)] = audited(path, ["dart"], seconds=60.0)
+    assert {row.quantity: row.verdict for row in found}["loops"] == UNSEEN
