@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Event, Mode, Trajectory
 
 CLOSED = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
@@ -45,6 +46,7 @@ class Contact:
         )
 
 
+@remembered(8)
 def contacts(run: Trajectory, joined: bool = False) -> tuple[Contact, ...]:
     """Every contact in order of its touch; joined, those between which no gap opens are one.
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import SceneError
+from crossbody.cases.remembered import remembered
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import UNBOUNDED, Joint, Pair, Scene, Shape, Tendon, Vector
 
@@ -100,6 +101,7 @@ def parallel(first: Shape, second: Shape) -> float:
     return float(min(WIDEST, np.sqrt(8.0 * SAG) * apart / length)) if length > 0.0 else WIDEST
 
 
+@remembered(4)
 def contacts(scene: Scene) -> tuple[Contact, ...]:
     """Return the pairs that have rows: of shapes whose gap is known in closed form, and that move.
 

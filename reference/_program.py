@@ -19,7 +19,7 @@ from crossbody.reference import kernels
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import advance as core
 from crossbody.reference.core._struct import TABLE
-from crossbody.reference.core.layout import MODEL, STATE, WORK
+from crossbody.reference.core.layout import BUFFERS, MODEL, STATE, WORK
 
 
 def _state() -> Any:
@@ -34,10 +34,14 @@ def _signature() -> Any:
 @cache
 def program() -> Any:
     """The function `advance`, from the cache or compiled (once per installation)."""
-    return compiled(core.advance, [_signature()])
+    from crossbody.reference.ahead import begin
+
+    return compiled(core.advance, [_signature()], beside=begin)
 
 
 _FRICTION = types.float64(types.int64, _state().dtype, MODEL, WORK, types.int64)
+_KERNELS = types.NamedTuple([kernels.function_type(name) for name in kernels.NAMES], core.Kernels)
+_INSTANT = types.int64(types.int64, _KERNELS, _state().dtype, MODEL, WORK, BUFFERS)
 
 
 @cache
@@ -50,8 +54,25 @@ def _friction() -> Any:
 
 def friction_code() -> int:
     """Where that stands, callable by the convention of compiled functions."""
-    found = _friction().overloads[_FRICTION.args]
+    return _code(_friction(), _FRICTION)
+
+
+def _code(function: Any, signature: Any) -> int:
+    found = function.overloads[signature.args]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
+
+
+@cache
+def _instant() -> Any:
+    """What settles modes, from the cache or compiled."""
+    from crossbody.reference.core import instant_answers
+
+    return compiled(instant_answers.answer, [_INSTANT])
+
+
+def instant_code() -> int:
+    """Where that stands, callable by the convention of compiled functions."""
+    return _code(_instant(), _INSTANT)
 
 
 ADDRESSES = types.int64[::1]

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import qr
 
 from crossbody.cases import Mode, Outcome, SceneError, Trajectory
 from crossbody.reference._state import State, started
@@ -95,6 +94,8 @@ def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
         part = scaled[at : at + len(group)]
         part /= np.linalg.norm(part, axis=1).max() or 1.0
         at += len(group)
+    from scipy.linalg import qr  # .2 s of imports that no other scene needs
+
     triangle, order = qr(scaled.T, mode="r", pivoting=True)[-2:]
     count = min(triangle.shape)
     pivots = np.zeros(len(rows))

@@ -18,7 +18,7 @@ from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._dense import Marks, Motion
 from crossbody.reference._interrupt import LONG_S, Interrupts
-from crossbody.reference._program import entry, friction_code
+from crossbody.reference._program import entry, friction_code, instant_code
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
@@ -116,6 +116,7 @@ class CompiledRun:
             "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
             "frictional": system.frictional, "friction_code": friction_code() if system.frictional else 0,
+            "instant_code": instant_code(),
             "loops": system.solve is None and bool(np.any(system.held)),
             "keep_events": options.events, "has_energy": system.energy is not _none.energy,
             "has_control": system.control is not None,

@@ -92,6 +92,12 @@ class Compiled(Lean):
             with store.alone(key):
                 return super().compile(sig)
 
+    def is_kept(self, sig: Any) -> bool:
+        """Return whether the code for a signature can be read back."""
+        with self._marked() as name:
+            store = code_store.current() if name else None
+            return store is not None and store.has(self._cache.key(name, sig))
+
     @contextmanager
     def _marked(self) -> Iterator[str]:
         """Put the digest of what is read into the function's name while it is compiled; empty if there is none.
@@ -235,7 +241,14 @@ class Part(Lean):
         return self.alone(*args, **kws)
 
 
-def compiled(function: Callable[..., Any], signatures: Any = (), *, lazy: Any = (), nogil: bool = False) -> Any:
+def compiled(
+    function: Callable[..., Any],
+    signatures: Any = (),
+    *,
+    lazy: Any = (),
+    nogil: bool = False,
+    beside: Callable[[], None] | None = None,
+) -> Any:
     """Compile a function and keep the code on disk.
 
     Args:
@@ -243,6 +256,7 @@ def compiled(function: Callable[..., Any], signatures: Any = (), *, lazy: Any = 
         signatures: compiled for at once; without them the function is a part of those that call it.
         lazy: signatures that it is compiled for when they are first asked for.
         nogil: threads may run it side by side.
+        beside: called before it is compiled, not where it is read back.
     """
     if numba_config.DISABLE_JIT:
         return function
@@ -250,6 +264,8 @@ def compiled(function: Callable[..., Any], signatures: Any = (), *, lazy: Any = 
     if not signatures and not lazy:
         return Part(function, options)
     found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy))
+    if beside is not None and not all(map(found.is_kept, signatures)):
+        beside()
     for signature in signatures:
         found.compile(signature)
     if signatures and not lazy:

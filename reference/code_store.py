@@ -143,6 +143,10 @@ class Store:
             return None
         return data[start:]
 
+    def has(self, name: str) -> bool:
+        """Return whether something was written under a name."""
+        return os.path.exists(self.folder / (name + CODE))  # unlike that of Path, it raises nothing
+
     def drop(self, name: str, why: str) -> None:
         """Remove a file that is not to be believed, and say so."""
         path = self.folder / (name + CODE)
@@ -170,7 +174,7 @@ class Store:
         """Let one process compile while others wait for its code, until it is there or `WAIT_S` have passed."""
         with ExitStack() as held:
             lock = self._lock(name, held) if fcntl is not None else None
-            if not os.path.exists(self.folder / (name + CODE)):
+            if not self.has(name):
                 slow = Timer(SLOW_S, tell, [COMPILING])
                 slow.daemon = True  # a process that ends meanwhile does not wait for it
                 slow.start()
@@ -184,7 +188,7 @@ class Store:
 
     def _lock(self, name: str, held: ExitStack) -> Path | None:
         path, code = self.folder / (name + LOCK), self.folder / (name + CODE)
-        if os.path.exists(code):  # unlike that of Path, it raises nothing
+        if self.has(name):
             return None
         try:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)

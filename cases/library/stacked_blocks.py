@@ -44,13 +44,7 @@ _TITLES = {
 }
 
 
-_SHARED = (
-    "corners that begin to slide together share their load by least norm, and turn their block at 1e-9 rad/s: "
-    "rates that rest are measured by 1e-4 rad/s"
-)
-
 _LIMITS = (
-    Limit(metric="velocity", value=1e-4, why=_SHARED),
     Limit(
         metric="event_gap", value=2.0, engine="mujoco", profile="default",
         why="a row of MuJoCo's is in contact where it pushes, which may begin and end below its surface",

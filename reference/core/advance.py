@@ -16,6 +16,7 @@ from crossbody.reference.core import (
     exact,
     folds,
     guards,
+    instant,
     journal,
     peaks,
     record,
@@ -24,7 +25,7 @@ from crossbody.reference.core import (
 )
 from crossbody.reference.core.acceleration import GENERAL, accelerate, scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
-from crossbody.reference.core.friction import BEGIN_SLIP, FOLLOW_TURNS, NOTHING, RENEW, ask
+from crossbody.reference.core.friction import BEGIN_SLIP, NOTHING, RENEW, ask
 from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
     DONE,
@@ -42,6 +43,7 @@ from crossbody.reference.core.layout import (
     PAINLEVE,
     ROWS_FULL,
     SHORT,
+    TOO_LONG,
     Buffers,
     Model,
     Work,
@@ -99,10 +101,10 @@ def _take_inputs(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
 def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Settle the modes at the present instant and choose how to go on."""
     s.unsettled = 1
-    code = settle.settle(K, s, m, w, b)
+    code = instant.ask(instant.SETTLE, K, s, m, w, b)
     if code != 0:
         return int(code)
-    s.unsettled = 0
+    s.unsettled, s.jumps, s.watched = 0, 1, 0
     peaks.forget(s, w, b.mode)
     s.method = EXPLICIT
     s.stalled, s.hold, s.full_jacobian = 0, 0, 0
@@ -145,6 +147,8 @@ def _take_over(s: Any, w: Work) -> None:
     copy(w.gaps[last], w.gaps[0])
     copy(w.rates[last], w.rates[0])
     copy(w.guards[last], w.guards[0])
+    if s.watched:
+        copy(w.cones[last], w.cones[0])
 
 
 @compiled
@@ -159,9 +163,6 @@ def _move(s: Any, w: Work, t: float) -> None:
 def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Apply the transitions that fired at the step's end and settle what follows from them."""
     nq = s.nq
-    if s.frictional:
-        K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
-        ask(FOLLOW_TURNS, s, m, w, NOTHING)
     if s.natural:
         if dop853.derivative(K, s, m, w, s.t, w.y, dop853.START) != 0:
             return ILL_POSED
@@ -187,8 +188,10 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             return MODE_CYCLE
         s.one_by_one, s.history = 1, 0
     for i in range(s.ng):
-        if w.guard_hit[i] <= s.theta and settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
-            return LOST
+        if w.guard_hit[i] <= s.theta:
+            s.jumps = 1
+            if settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
+                return LOST
     code = _restart(K, s, m, w, b)
     if code == 0 and s.audited:
         code = audit.account(K, s, m, w)
@@ -199,9 +202,13 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 @compiled
 def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked."""
-    slips = False
+    """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked.
+
+    Leaves in s.jumps whether loads do: not where a force reaches its bound or vanishes.
+    """
+    slips, s.jumps = False, 0
     for i in range(s.nc):
+        s.jumps |= w.hit[i] <= s.theta and w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
         if w.hit[i] <= s.theta and w.kind[i] == guards.JAM:
             marks = b.history[len(b.history) - 1]
             marks[:] = 0
@@ -228,9 +235,13 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         code = stepping.attempt(K, s, m, w, b)
     if code != 0:
         return code
+    code = events.scan(K, s, m, w, b.mode)
+    if code == TOO_LONG:
+        s.rejected += 1
+        s.h, s.watched = 0.5 * s.theta * s.hs, 0
+        return 0
     s.steps += 1
     s.implicit_steps += s.method == IMPLICIT
-    code = events.scan(K, s, m, w, b.mode)
     if code != 0:
         return int(code)
     if s.ng > 0 and not all_finite(w.guards[NODES - 1]):
@@ -271,7 +282,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 @compiled
 def _share_anew(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Ask anew which rows idle: they carry again where they would push, and must have followed their laws."""
-    code = settle.share(K, s, m, w, b)
+    code = instant.ask(instant.SHARE, K, s, m, w, b)
     return _restart(K, s, m, w, b) if code == MOVED else code
 
 

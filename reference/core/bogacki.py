@@ -51,7 +51,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
         _advance(w.y, w.k, stage, h, w.ys)
         if derivative(K, s, m, w, s.t + C[stage] * h, w.ys, stage) != 0:
             return -1.0
-        watch_multipliers(s, w, stage)
+        watch_multipliers(s, m, w, stage)
         keep_velocity(s, w, stage)
     copy(w.ys, w.y1)
     if s.ledger:

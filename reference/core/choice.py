@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import dop853
 from crossbody.reference.core.dop853_table import STABILITY_LIMIT
-from crossbody.reference.core.friction import NOTHING, TURNING_RATE, ask
+from crossbody.reference.core.friction import BEGUN, NOTHING, TURNING_RATE, ask
 from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work
 
 SAFETY = 0.9
@@ -46,7 +46,7 @@ def first_step(K: Any, s: Any, m: Model, w: Work) -> float:
 
 @compiled
 def longest_step(s: Any, m: Model, w: Work) -> float:
-    """The longest step that may be tried: an explicit one is stable for the active rows.
+    """The longest step that may be tried: an explicit one is stable for the active rows and for slips just begun.
 
     Beyond that what the error estimate lets pass is far larger inside the step, where events are located: the dense
     output of a decayed pole p departs from it by 300 times the estimate at |p| h = 16, by 10 at the limit.
@@ -55,9 +55,11 @@ def longest_step(s: Any, m: Model, w: Work) -> float:
     if s.method != EXPLICIT or s.na == 0:
         return float(s.h_max)
     s.row_rate = _row_rate(s, w)
+    rate = s.row_rate
     if s.frictional:
         s.turning_rate = ask(TURNING_RATE, s, m, w, NOTHING)
-    return float(min(s.h_max, STABILITY_LIMIT / s.row_rate) if s.row_rate > 0.0 else s.h_max)
+        rate = max(s.row_rate, ask(TURNING_RATE, s, m, w, BEGUN))
+    return float(min(s.h_max, STABILITY_LIMIT / rate) if rate > 0.0 else s.h_max)
 
 
 @compiled

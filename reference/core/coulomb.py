@@ -22,13 +22,21 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import substitute
 from crossbody.reference.core.filters import STAGES_RANGE
-from crossbody.reference.core.friction import has_friction, is_tangent, slip_along, small_slip
+from crossbody.reference.core.friction import (
+    count_from_none,
+    has_begun,
+    has_friction,
+    is_tangent,
+    most_drift,
+    slip,
+    slip_along,
+    small_slip,
+)
 from crossbody.reference.core.guards import STOP
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array, Floats, Index
 
-STOPPED = 10.0  # times as much as has no direction of its own: a contact with a slip velocity below stands
-CLEAR = 10.0  # times that, from which on it is forgotten with what velocity a slip began that counted as none
+CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip counts from none
 RANK = 1e-10  # part of a contact's own size below which a pivot is that of a row which depends on others
 LIGHT = 1e-12  # part of the largest load at a contact, below which it counts as that
 OPEN = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
@@ -40,62 +48,66 @@ def begin(w: Work) -> None:
     """Forget what another run of the same workspace has left."""
     for left in (w.way, w.rest, w.tolerated):
         left[:] = 0.0
-    w.off[:], w.begins[:] = 0, 0
+    w.off[:], w.begins[:], w.since[:] = 0, 0, -np.inf
 
 
 @compiled
-def stopped_slip(s: Any) -> float:
-    """The slip velocity below which a contact stands."""
-    return float(STOPPED * small_slip(s))
-
-
-@compiled
-def slip_velocity(m: Model, i: int, rate: Array) -> float:
-    """Size of the slip velocity of contact i, from the rates of all rows."""
-    square = 0.0
-    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-        square += (rate[t] - m.drift[t]) ** 2
-    return float(np.sqrt(square))
-
-
-@compiled
-def face(m: Model, w: Work, i: int, rate: Array) -> None:
+def _face(m: Model, w: Work, i: int, rate: Array) -> None:
     """Take the direction of the present slip velocity of contact i for that of reference."""
-    size = slip_velocity(m, i, rate)
+    size = slip(m, w, i, rate)
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-        w.way[t], w.rest[t] = (rate[t] - m.drift[t]) / size, 0.0
+        w.way[t] = (rate[t] - m.drift[t] - w.rest[t]) / size
 
 
 @compiled
-def note_speed(s: Any, m: Model, rate: Array) -> None:
-    """Keep the largest speed seen at contacts with friction."""
+def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
+    """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips."""
     for i in range(s.nc):
         if has_friction(m, i):
-            s.slip_speed = max(s.slip_speed, slip_velocity(m, i, rate), abs(rate[i]))
+            s.slip_speed = max(s.slip_speed, slip(m, w, i, rate), abs(rate[i]))
+    for j in range(s.na):
+        i, size = w.idx[j], 0.0
+        for c in range(m.span[i, 0], m.span[i, 1] if is_tangent(m, i) else 0):
+            size += abs(w.H[j, c] * w.y[s.nq + c])
+        s.slip_speed = max(s.slip_speed, size)
 
 
 @compiled
-def follow_turns(s: Any, m: Model, w: Work) -> None:
-    """Renew directions of slips that have turned by a right angle within a step, and do not stop; rates in w.rate."""
+def turns_aside(s: Any, m: Model, w: Work) -> bool:
+    """Whether a contact whose slip falls to zero along its direction of reference slides on across it; rates in w.rate.
+
+    It has turned by a right angle within the step, and friction with it: too fast for what the step knows of any guard.
+    """
     for i in range(s.nc):
-        if w.hit[i] <= s.theta and w.kind[i] == STOP and slip_velocity(m, i, w.rate) > stopped_slip(s):
-            face(m, w, i, w.rate)
+        if w.hit[i] <= s.theta and w.kind[i] == STOP:
+            along = slip_along(m, w, i, w.rate)
+            if slip(m, w, i, w.rate) ** 2 - along * along > small_slip(s) ** 2:
+                return True
+    return False
+
+
+@compiled
+def _rest(m: Model, w: Work, i: int) -> float:
+    """Size of the slip velocity with which contact i began."""
+    square = 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        square += w.rest[t] * w.rest[t]
+    return float(np.sqrt(square))
 
 
 @compiled
 def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
     """Take the directions of the present slip velocities for those of reference, where they are clear of zero."""
-    note_speed(s, m, rate)
+    note_speed(s, m, w, rate)
     for i in range(s.nc):
         if has_friction(m, i) and w.slides[i]:
-            size, begun = slip_velocity(m, i, rate), 0.0
-            for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-                begun += w.rest[t] * w.rest[t]
-            if begun > 0.0 and size < CLEAR * stopped_slip(s):
-                continue
-            # Behind zero a stop is about to be found, if it is small; else it has turned by a right angle.
-            if size > stopped_slip(s) or (size > small_slip(s) and slip_along(m, w, i, rate) > 0.0):
-                face(m, w, i, rate)
+            if has_begun(w, i) and slip(m, w, i, rate) > CLEAR * max(small_slip(s), _rest(m, w, i)):
+                count_from_none(m, w, i)
+                s.watched = 0
+            if slip(m, w, i, rate) > small_slip(s):
+                _face(m, w, i, rate)
+            if m.tangents[i] > 1:
+                s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
     if s.na > 0 and s.dependent_rows > 0:
         s.redundant = max(s.redundant, s.dependent_rows)
         if not s.indeterminate:
@@ -140,13 +152,17 @@ def undetermined(s: Any, m: Model, w: Work) -> bool:
 
 @compiled
 def _lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
-    """Return the slip velocity (x, y) of contact i, one that is small lengthened along the direction of reference.
+    """Return the slip velocity (x, y) of contact i, one that is small or points back lengthened along its reference.
 
-    So its direction changes steadily to that of reference where it vanishes: a jump would end every step.
+    So its direction changes steadily to that of reference where it vanishes, and is never more than a right angle off
+    it: a jump would end every step. Clear of zero and ahead it is left as it is.
     """
-    t = m.tangent[i]
-    more = max(small_slip(s) - np.sqrt(x * x + y * y), 0.0)
-    return x + more * w.way[t], y + (more * w.way[t + 1] if m.tangents[i] > 1 else 0.0)
+    t, small = m.tangent[i], small_slip(s)
+    p, r = w.way[t], w.way[t + 1]
+    ahead, aside = x * p + y * r, y * p - x * r
+    part = 1.0 - (aside / small) ** 2 if abs(aside) < small else 0.0
+    ahead = max(ahead, small * part * part)
+    return ahead * p - aside * r, ahead * r + aside * p
 
 
 @compiled
@@ -156,13 +172,13 @@ def _directions(s: Any, m: Model, w: Work, turning: bool) -> None:
         i = w.idx[j]
         if not has_friction(m, i) or not w.slides[i]:
             continue
-        t, c, two = m.tangent[i], w.listed[m.tangent[i]], m.tangents[i] > 1
-        x, y = _lengthened(s, m, w, i, w.hda[c] - w.rest[t], w.hda[c + 1] - w.rest[t + 1] if two else 0.0)
-        size, ahead = np.sqrt(x * x + y * y), x * w.way[t] + (y * w.way[t + 1] if two else 0.0)
-        follows = turning and ahead > 0.0
-        w.along[c] = x / size if follows else w.way[t]
-        if two:
-            w.along[c + 1] = y / size if follows else w.way[t + 1]
+        t, c = m.tangent[i], w.listed[m.tangent[i]]
+        w.along[c] = w.way[t]
+        if m.tangents[i] > 1:
+            x, y = _lengthened(s, m, w, i, w.hda[c] - w.rest[t], w.hda[c + 1] - w.rest[t + 1])
+            size = np.sqrt(x * x + y * y)
+            follows = turning and size > 0.0
+            w.along[c], w.along[c + 1] = (x / size, y / size) if follows else (w.way[t], w.way[t + 1])
 
 
 @compiled
@@ -499,14 +515,14 @@ def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
 
 
 @compiled
-def turning_rate(s: Any, m: Model, w: Work) -> float:
+def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
     """Fastest rate, 1/s, at which friction turns a slip into its own direction: mu lam_n / |v_t| over the mass there.
 
     From the last evaluation and what stands at the step's start. It grows without bound as a slip dies out.
     """
     fastest = 0.0
     for i in range(s.nc):
-        if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1:
+        if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1 and (not begun or has_begun(w, i)):
             c, (x, y), size = w.listed[m.tangent[i]], _across(m, w, i), _turning_slip(s, m, w, i)
             light = x * x * w.gram[c, c] + 2.0 * x * y * w.gram[c, c + 1] + y * y * w.gram[c + 1, c + 1]
             if size > 0.0:
@@ -544,7 +560,9 @@ def _within_bound(m: Model, i: int, lam: Array, normal: int, first: int) -> floa
 
 @compiled
 def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether a contact that sticks stays clear of its bound, as far as the stages tell."""
+    """Whether a contact that sticks stays clear of its bound, as far as the stages tell, and where it is."""
+    if slip(m, w, i, w.rates[NODES - 1]) > most_drift(s):
+        return False
     low, high = np.inf, -np.inf
     for stage in range(s.end + 1):
         lam = w.lams[0] if stage == 0 else (w.lam_at[stage] if stage < s.end else w.lams[NODES - 1])

@@ -8,7 +8,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core import bogacki, dop853, esdirk, exact
 from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
 from crossbody.reference.core.algebra import solve_schur
-from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, Model, Work
+from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, SHORT, Model, Work
 from crossbody.reference.kinds import Array
 
 CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one's residue vanish in rounding
@@ -21,12 +21,15 @@ ARRIVED_PART = 0.1  # or this part of the relative tolerance, where nothing is s
 @compiled
 def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
     """Make the dense output of the step, once; 1 if a stage of it is ill posed."""
-    if s.have_dense or (s.method != EXPLICIT and not s.has_velocity):
+    if s.have_dense or (s.method != EXPLICIT and not (s.has_velocity or s.frictional)):
         return 0
     s.have_dense = 1
     if s.method == EXPLICIT:
         return dop853.make_dense(K, s, m, w)
-    _make_quintic(K, s, m, w)
+    if s.has_velocity:
+        _bend(K, s, m, w, s.t_old, w.y, 0, w.bend[0])
+        _bend(K, s, m, w, s.t_old + s.hs, w.y1, s.end, w.bend[1])
+    _travel(s, w)
     return 0
 
 
@@ -43,26 +46,25 @@ def _bend(K: Any, s: Any, m: Model, w: Work, t: float, y: Array, stage: int, out
 
 
 @compiled
-def _make_quintic(K: Any, s: Any, m: Model, w: Work) -> None:
-    """What the interpolant asks for where q' is not v: q'' at both ends, and the integral of v over the step."""
-    _bend(K, s, m, w, s.t_old, w.y, 0, w.bend[0])
-    _bend(K, s, m, w, s.t_old + s.hs, w.y1, s.end, w.bend[1])
+def _travel(s: Any, w: Work) -> None:
+    """Leave in w.travel what v adds up to over the step, by its stages."""
+    v, weight, stages = w.k, esdirk.B, esdirk.STAGES
+    if s.has_velocity:
+        v = w.stage_v
+    if s.method == SHORT:
+        weight, stages = bogacki.B, bogacki.STAGES
     for i in range(s.n):
-        if s.method == IMPLICIT:
-            w.travel[i] = s.hs * esdirk.B[0] * w.y[s.nq + i]
-            for j in range(1, esdirk.STAGES):
-                w.travel[i] += s.hs * esdirk.B[j] * w.stage_v[j, i]
-        else:
-            w.travel[i] = s.hs * bogacki.B[0] * w.y[s.nq + i]
-            for j in range(1, bogacki.STAGES):
-                w.travel[i] += s.hs * bogacki.B[j] * w.stage_v[j, i]
+        w.travel[i] = s.hs * weight[0] * w.y[s.nq + i]
+        for j in range(1, stages):
+            w.travel[i] += s.hs * weight[j] * v[j, i]
 
 
 @compiled
 def _quintic(s: Any, w: Work, theta: float, h: float, out: Array) -> None:
     """Hermite interpolant of q, v and v' at both ends; its derivative is v.
 
-    Where q' is not v there are two: one of q, q' and q'', and one of the integral of v, whose derivative is v.
+    Where q' is not v there are two: one of q, q' and q'', and one of the integral of v, whose derivative is v. With
+    friction that takes the place of q1 - q0 too: over a short step the rounding of q would hide when a slip stops.
     """
     n, nq, end_stage = s.n, s.nq, s.end
     x, x2 = theta, theta * theta
@@ -76,9 +78,9 @@ def _quintic(s: Any, w: Work, theta: float, h: float, out: Array) -> None:
     for i in range(n):
         dq, v, ve = w.y1[i] - w.y[i], h * w.y[nq + i], h * w.y1[nq + i]
         a, ae = h * h * w.k[0, nq + i], h * h * w.k[end_stage, nq + i]
-        if s.has_velocity:
+        if s.has_velocity or s.frictional:
             dq = w.travel[i]
-        else:
+        if not s.has_velocity:
             out[i] = w.y[i] + dq * end + v * v0 + ve * v1 + a * a0 + ae * a1
         out[nq + i] = (dq * end_d + v * v0_d + ve * v1_d + a * a0_d + ae * a1_d) / h
     for i in range(nq if s.has_velocity else 0):

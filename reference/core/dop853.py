@@ -10,6 +10,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import OWN, accelerate
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.dop853_table import DENSE_STAGES, E3, E5, STAGES, A, C, D
+from crossbody.reference.core.friction import watch_slips
 from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.kinds import Array, Floats
 
@@ -110,11 +111,13 @@ def watch_guards(K: Any, s: Any, m: Model, w: Work, t: float, place: int) -> Non
 
 
 @compiled
-def watch_multipliers(s: Any, w: Work, stage: int) -> None:
-    """Keep the multipliers at a stage: a free filter for events."""
+def watch_multipliers(s: Any, m: Model, w: Work, stage: int) -> None:
+    """Keep the multipliers at a stage, and slips: a free filter for events."""
     lam_at, la, idx = w.lam_at, w.la, w.idx
     for j in range(s.na):
         lam_at[stage, idx[j]] = la[j]
+    if s.frictional:
+        watch_slips(s, m, w, stage)
 
 
 @compiled
@@ -139,7 +142,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
         t = s.t + C[stage] * h
         if derivative(K, s, m, w, t, w.ys, stage) != 0:
             return -1.0
-        watch_multipliers(s, w, stage)
+        watch_multipliers(s, m, w, stage)
         if stage == 4 or stage == 8 or stage == 10:
             if s.na < s.nc:
                 watch_gaps(K, s, m, w, t, stage // 4 + stage // 10 - 1)

@@ -312,7 +312,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
             s.full_jacobian = 1
             s.have_jacobian = 0
             return np.inf
-        watch_multipliers(s, w, stage)
+        watch_multipliers(s, m, w, stage)
         if s.na < s.nc and 2 <= stage <= 4:
             watch_gaps(K, s, m, w, s.t + C[stage] * h, stage - 2)
         if s.ng > 0 and 2 <= stage <= 4:

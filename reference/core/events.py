@@ -15,10 +15,11 @@ from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
-from crossbody.reference.core.friction import WATCH, ask
+from crossbody.reference.core.friction import NOTHING, TURNS_ASIDE, WATCH, ask
 from crossbody.reference.core.guards import (
     CATCH,
     CONE,
+    DRIFT,
     HANDOVER,
     JAM,
     LEAVE,
@@ -47,6 +48,7 @@ from crossbody.reference.core.layout import (
     NOT_FINITE,
     SLIP,
     STICK,
+    TOO_LONG,
     Model,
     Work,
 )
@@ -85,10 +87,11 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
         if not second >= place:  # NaN too
             w.kind[i] = other
             place = second
-    if other == STOP:
-        second = first_below(K, s, m, w, mode, JAM, i)
+    if other in (STOP, CONE):
+        third = JAM if other == STOP else DRIFT
+        second = first_below(K, s, m, w, mode, third, i)
         if not second >= place:
-            w.kind[i] = JAM
+            w.kind[i] = third
             return second
     return place
 
@@ -130,16 +133,20 @@ def _fill_nodes(K: Any, s: Any, m: Model, w: Work, multipliers: bool) -> int:
             scatter(s, w, w.lams[node])
             if s.frictional:
                 ask(WATCH, s, m, w, node)
-    for node in range(0, NODES if s.frictional and multipliers else 0, NODES - 1):
-        dense.state(s, m, w, at_node(node), w.ys)
-        if (
-            accelerate(
-                K.dynamics, K.rows, K.solve, s, m, w, s.t_old + at_node(node) * s.hs, w.ys[: s.nq], w.ys[s.nq :], OWN
-            )
-            != 0
-        ):
+    if s.frictional and multipliers:
+        return _watch_ends(K, s, m, w)
+    return 0
+
+
+@compiled
+def _watch_ends(K: Any, s: Any, m: Model, w: Work) -> int:
+    """How far contacts are from sliding, and from jams, at the step's ends; what its last one has told holds still."""
+    for node in range(NODES - 1 if s.watched else 0, NODES, NODES - 1):
+        t, y = (s.t_old, w.y) if node == 0 else (s.t_old + s.hs, w.y1)
+        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], OWN) != 0:
             return 1
         ask(WATCH, s, m, w, node)
+    s.watched = 1
     return 0
 
 
@@ -179,13 +186,18 @@ def _all_free(s: Any, m: Model, mode: Bytes) -> bool:
 
 @compiled
 def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
-    """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all; 0 or a negative code."""
+    """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all.
+
+    Returns:
+        0, TOO_LONG where the step must be taken anew and shorter, or a negative code.
+    """
     s.theta = NEVER
     if s.ng > 0:
         code = _scan_switches(K, s, m, w, mode)
         if code != 0:
             return int(code)
-    any_gap, any_multiplier = False, False
+    any_gap, any_multiplier, watched = False, False, s.watched
+    s.watched = 0
     hit, kind, unilateral, follows = w.hit, w.kind, m.unilateral, m.follows
     for i in range(s.nc):
         hit[i] = NEVER
@@ -206,6 +218,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
         if s.theta <= 1.0:
             _tie(s, w)
         return 0
+    s.watched = watched and any_multiplier
     if dense.prepare(K, s, m, w) != 0 or _fill_nodes(K, s, m, w, any_multiplier) != 0:
         return ILL_POSED
     for i in range(s.nc):
@@ -219,7 +232,17 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             s.theta = min(s.theta, w.hit[i])
     if s.theta <= 1.0:
         _tie(s, w)
+        if s.frictional and _turns_aside(K, s, m, w):
+            return TOO_LONG
     return 0
+
+
+@compiled
+def _turns_aside(K: Any, s: Any, m: Model, w: Work) -> bool:
+    """Whether what seems to be a stop at s.theta is a slip that has turned by a right angle."""
+    dense.state(s, m, w, s.theta, w.ys)
+    K.gaps(s.t_old + s.theta * s.hs, w.ys[: s.nq], w.ys[s.nq :], m.p, w.gap, w.rate)
+    return bool(ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0)
 
 
 @compiled
@@ -260,10 +283,10 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return FREE
     if kind == HANDOVER:
         return CONTACT
-    if kind == CONE:
+    if kind in (CONE, DRIFT):
         return SLIP
-    if kind == STOP:  # else it has turned by more than a right angle within a step
-        return STICK if active_mode(s, m, w, i) == STICK else int(mode[i])
+    if kind == STOP:
+        return STICK
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
         return int(mode[i])
     if s.frozen and m.beta[i, 0] > 0.0:

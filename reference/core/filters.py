@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import bogacki, dop853_table, esdirk
 from crossbody.reference.core.algebra import inverse_diagonal
-from crossbody.reference.core.friction import HOLDS_ON, ask
+from crossbody.reference.core.friction import HOLDS_ON, ask, slip_along
 from crossbody.reference.core.layout import (
     BETWEEN,
     COLLISION,
@@ -22,11 +22,12 @@ from crossbody.reference.core.layout import (
     LEVEL,
     NODES,
     SHORT,
+    SLIP,
     STICK,
     Model,
     Work,
 )
-from crossbody.reference.kinds import Bytes
+from crossbody.reference.kinds import Bytes, Floats2
 
 # What values at the stages say about the whole step (linear programming over all polynomials of a degree).
 STAGES_RANGE = 1.7  # degree 6 within a range at the stages of DOP853: how many times the range it may leave it by
@@ -47,28 +48,45 @@ def _stays_clear(start: float, middle: float, end: float, place: float, off: flo
 
 
 @compiled
-def _multiplier_range(s: Any, w: Work, i: int) -> tuple[float, float]:
-    """Least and largest multiplier of an active row at the stages and at both ends."""
-    start, end = w.lams[0, i], w.lams[NODES - 1, i]
+def _range(s: Any, start: float, end: float, at: Floats2, i: int) -> tuple[float, float]:
+    """Least and largest value of what belongs to row i, at both ends and as it was kept at the stages."""
     low, high = min(start, end), max(start, end)
     for stage in range(1, s.end):
-        low, high = min(low, w.lam_at[stage, i]), max(high, w.lam_at[stage, i])
+        low, high = min(low, at[stage, i]), max(high, at[stage, i])
     return float(low), float(high)
+
+
+@compiled
+def _multiplier_range(s: Any, w: Work, i: int) -> tuple[float, float]:
+    """Least and largest multiplier of an active row at the stages and at both ends."""
+    return _range(s, w.lams[0, i], w.lams[NODES - 1, i], w.lam_at, i)
+
+
+@compiled
+def _stays_positive(s: Any, start: float, end: float, at: Floats2, i: int) -> bool:
+    """Whether what belongs to row i stays positive, as far as both ends and the stages tell."""
+    middle = 9 if s.method == EXPLICIT else 1
+    low, high = _range(s, start, end, at, i)
+    if not low > 0.0 or low > STAGES_RANGE * (high - low):
+        return bool(low > 0.0)
+    off, half = 0.0, at[middle, i]
+    for stage in range(1, s.end):
+        c = stage_place(s, stage)
+        off = max(off, abs(at[stage, i] - _parabola(start, half, end, stage_place(s, middle), c)))
+    return _stays_clear(start, half, end, stage_place(s, middle), off)
 
 
 @compiled
 def _presses_on(s: Any, w: Work, i: int) -> bool:
     """Whether the multiplier of an active row stays positive, as far as the stages tell."""
-    last, middle = NODES - 1, 9 if s.method == EXPLICIT else 1
-    start, end = w.lams[0, i], w.lams[last, i]
-    low, high = _multiplier_range(s, w, i)
-    if not low > 0.0 or low > STAGES_RANGE * (high - low):
-        return bool(low > 0.0)
-    off, half = 0.0, w.lam_at[middle, i]
-    for stage in range(1, s.end):
-        c = stage_place(s, stage)
-        off = max(off, abs(w.lam_at[stage, i] - _parabola(start, half, end, stage_place(s, middle), c)))
-    return _stays_clear(start, half, end, stage_place(s, middle), off)
+    return _stays_positive(s, w.lams[0, i], w.lams[NODES - 1, i], w.lam_at, i)
+
+
+@compiled
+def _slides_on(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether a slip stays clear of zero along its direction of reference, as far as the stages tell."""
+    start, end = slip_along(m, w, i, w.rates[0]), slip_along(m, w, i, w.rates[NODES - 1])
+    return _stays_positive(s, start, end, w.slip_at, i)
 
 
 @compiled
@@ -148,6 +166,8 @@ def row_may_switch(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
         return not (_presses_on(s, w, i) and _stays_elastic(s, w, i))
     if mode[i] == STICK:
         return not (_presses_on(s, w, i) and ask(HOLDS_ON, s, m, w, i) > 0.0)
+    if mode[i] == SLIP:  # near a jam its multiplier grows without bound
+        return not (_presses_on(s, w, i) and _slides_on(s, m, w, i))
     return mode[i] != CONTACT or not _presses_on(s, w, i)
 
 

@@ -10,46 +10,28 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core.apart import number_at
 from crossbody.reference.core.layout import SLIP, Model, Work
 from crossbody.reference.kinds import Array, Bytes
 
 SMALL_SLIP = 1e-9  # of the largest speed: a slip velocity below has no direction of its own,
 SMALL_SLIP_STEPS = 10.0  # or below so many times the relative tolerance
-TOLERATED = 1e-9  # part of the largest acceleration by which a set of modes may be off
+DRIFT = 10.0  # times as much as has no direction, from which on a contact that sticks is known not to
+TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes may be off
 
 (
-    BEGIN, FACTOR, SOLVE, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, FOLLOW_TURNS, STANDS, HOLDS_ON,
+    BEGIN, FACTOR, SOLVE, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS, HOLDS_ON,
     BEGIN_SLIP, DECIDE,
 ) = np.arange(14)  # fmt: skip
-NOTHING = np.int64(0)  # beside what is asked of all rows together
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _call(typingctx: Any, address: Any, what: Any, state: Any, model: Any, work: Any, i: Any) -> Any:
-    """Call the code at an address by the convention of compiled functions, and hand on what it raises."""
-    given = (what, state, model, work, i)
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        convention = context.call_conv
-        kind = convention.get_function_type(types.float64, given)
-        function = builder.inttoptr(args[0], kind.as_pointer())
-        status, found = convention.call_function(builder, function, types.float64, given, args[1:])
-        with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
-        return found
-
-    return types.float64(address, *given), generate
+NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun
 
 
 @compiled
 def ask(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     """Have something done, or told, by the code of friction: `friction_answers` says what."""
-    return _call(s.friction_code, what, s, m, w, i)  # type: ignore[no-any-return]
+    return float(number_at(s.friction_code, (what, s, m, w, i)))
 
 
 @compiled
@@ -65,9 +47,24 @@ def small_slip(s: Any) -> float:
 
 
 @compiled
+def most_drift(s: Any) -> float:
+    """The slip velocity above which a contact that should stick slides: with others it cannot keep where it is."""
+    return DRIFT * small_slip(s)
+
+
+@compiled
 def decided_to(s: Any) -> float:
     """By how much accelerations of rows may be off where modes are decided."""
-    return float(TOLERATED * s.push_scale)
+    return float(TOLERATED * s.push_scale + s.leeway)
+
+
+@compiled
+def slip(m: Model, w: Work, i: int, rate: Array) -> float:
+    """Size of the slip velocity of contact i from that with which it began, by the rates of all rows."""
+    square = 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        square += (rate[t] - m.drift[t] - w.rest[t]) ** 2
+    return float(np.sqrt(square))
 
 
 @compiled
@@ -80,8 +77,25 @@ def slip_along(m: Model, w: Work, i: int, rate: Array) -> float:
 
 
 @compiled
+def has_begun(w: Work, i: int) -> bool:
+    """Whether the slip of contact i counts from the velocity with which it has begun."""
+    return bool(w.since[i] > -np.inf)
+
+
+@compiled
+def count_from_none(m: Model, w: Work, i: int) -> None:
+    """Forget with what velocity the slip of contact i began."""
+    w.since[i] = -np.inf
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        w.rest[t] = 0.0
+
+
+@compiled
 def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """Write which rows slide: a normal row whose tangential ones are not solved for, and these; they have no law."""
+    """Write which rows slide: a normal row whose tangential ones are not solved for, and these; they have no law.
+
+    The next slip of a contact that does not slide counts from what its velocity is then.
+    """
     for i in range(s.nc):
         w.slides[i] = 0
     for i in range(s.nc):
@@ -90,6 +104,20 @@ def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
             for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
                 w.slides[t] = 1
                 w.law[t, 0], w.law[t, 1], w.law[t, 2] = 0.0, 0.0, 0.0
+        elif has_begun(w, i):
+            count_from_none(m, w, i)
+
+
+@compiled
+def watch_slips(s: Any, m: Model, w: Work, stage: int) -> None:
+    """Keep the slips of contacts that slide, along their directions of reference, at a stage of a step."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and w.slides[i]:
+            total = 0.0
+            for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+                total += (w.hda[w.listed[t]] - w.rest[t]) * w.way[t]
+            w.slip_at[stage, i] = total
 
 
 @compiled

@@ -10,7 +10,6 @@ from crossbody.reference.core.friction import (
     BEGIN_SLIP,
     DECIDE,
     FACTOR,
-    FOLLOW_TURNS,
     HOLDS_ON,
     MARGIN,
     RENEW,
@@ -19,7 +18,10 @@ from crossbody.reference.core.friction import (
     STIFFNESS,
     TURN_PART,
     TURNING_RATE,
+    TURNS_ASIDE,
     WATCH,
+    slip,
+    small_slip,
 )
 from crossbody.reference.core.layout import Model, Work
 
@@ -32,13 +34,13 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     STIFFNESS       what a multiplier of contact i does to its own gap
     MARGIN          how far contact i is from sliding
     WATCH           either of all contacts, into w.cones[i]
-    TURNING_RATE    fastest rate at which a slip turns
+    TURNING_RATE    fastest rate at which a slip turns, i = 1 of those that have just begun
     TURN_PART       1/|v_t|, and in w.la what a turn of contact i by one radian makes of all multipliers
     STANDS          1 if contact i has no slip velocity
     HOLDS_ON        1 if contact i, which sticks, surely does so throughout the step
     BEGIN           of a run: forget what another one left
     RENEW           directions of slip after a step
-    FOLLOW_TURNS    those that have turned by a right angle, where a step is cut
+    TURNS_ASIDE     1 if a contact whose slip falls to zero along its direction of reference has one across it there
     BEGIN_SLIP      of contacts that have reached their bounds, there
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
     """
@@ -54,15 +56,15 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == WATCH:
         coulomb.watch_friction(s, m, w, w.cones[i])
     elif what == TURNING_RATE:
-        return float(coulomb.turning_rate(s, m, w))
+        return float(coulomb.turning_rate(s, m, w, i != 0))
     elif what == TURN_PART:
         return float(coulomb.turn_part(s, m, w, i))
     elif what == RENEW:
         coulomb.renew(s, m, w, w.rates[0])
-    elif what == FOLLOW_TURNS:
-        coulomb.follow_turns(s, m, w)
+    elif what == TURNS_ASIDE:
+        return 1.0 if coulomb.turns_aside(s, m, w) else 0.0
     elif what == STANDS:
-        return 1.0 if coulomb.slip_velocity(m, i, w.rate) <= coulomb.stopped_slip(s) else 0.0
+        return 1.0 if slip(m, w, i, w.rate) <= small_slip(s) else 0.0
     elif what == HOLDS_ON:
         return 1.0 if coulomb.holds_on(s, m, w, i) else 0.0
     elif what == BEGIN_SLIP:

@@ -10,16 +10,27 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
-from crossbody.reference.core.friction import MARGIN, STIFFNESS, ask, decided_to, has_friction, slip_along, small_slip
+from crossbody.reference.core.friction import (
+    MARGIN,
+    STIFFNESS,
+    ask,
+    decided_to,
+    has_begun,
+    has_friction,
+    most_drift,
+    slip,
+    slip_along,
+    small_slip,
+)
 from crossbody.reference.core.layout import HANDOVER_PART, MEMORYLESS, NODES, Model, Work
 from crossbody.reference.core.machine import multiplier_if_active, off_law, slow
 from crossbody.reference.kinds import Array, Bytes
 
 # Guards: each fires where all of its functions are below zero.
-NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH, CONE, STOP, JAM = np.arange(12)
-FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1, 1, 1, 1])
+NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH, CONE, STOP, JAM, DRIFT = np.arange(13)
+FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1, 1, 1, 1, 1])
 GRAZE = 0.1  # part of the slip velocity without a direction of its own, by which one may pass zero
-ON_BOUND = 1e-9  # part of the bound of a contact's friction below which one that sticks has only begun to
+ON_BOUND = 1e-10  # part of the bound of a contact's friction below which one that sticks has only begun to
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 
 
@@ -75,8 +86,8 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
         w.bands[0] = slow(s) if abs(w.rates[0, i]) <= slow(s) else 0.0
         w.bands[1] = 2.0 * decided_to(s) if s.frictional else 0.0
     elif kind == STOP:
-        # A slip that grazes zero goes on, and one that begins does not stop.
-        w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + GRAZE * small_slip(s)
+        # A slip that grazes zero goes on; one that has just begun is known no better than a slip with no direction.
+        w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + (1.0 if has_begun(w, i) else GRAZE) * small_slip(s)
     elif kind == CONE:
         begun = max(ON_BOUND * m.friction[i] * abs(w.lams[0, i]), w.tolerated[i])
         if w.cones[0, i] <= begun:
@@ -114,6 +125,9 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
     elif kind == STOP:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         w.parts[0] = slip_along(m, w, i, w.rate)
+    elif kind == DRIFT:
+        K.gaps(t, q, v, m.p, w.gap, w.rate)
+        w.parts[0] = most_drift(s) - slip(m, w, i, w.rate)
     else:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         h, rate = w.gap[i], w.rate[i]
@@ -188,6 +202,8 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
             row[node] = w.guards[node, i]
         elif kind == STOP:
             row[node] = slip_along(m, w, i, w.rates[node]) + w.bands[0]
+        elif kind == DRIFT:
+            row[node] = most_drift(s) - slip(m, w, i, w.rates[node])
         elif kind in (CONE, JAM):
             row[node] = w.cones[node, i] + w.bands[0]
         else:
@@ -237,6 +253,8 @@ def root(
             x3, f3, x2, f2 = x2, f2, x1, f1
         x1, f1 = x, f
         part = _next_part(x1, f1, x2, f2, x3, f3)
+    if kind == JAM:  # behind it a multiplier that grows without bound has the other sign
+        return x1 if f1 > 0.0 else x2
     return x2 if f1 > 0.0 else x1
 
 

@@ -14,6 +14,7 @@ from crossbody.reference.kinds import Bytes, Bytes2, Floats, Floats2, Index, Ind
 DONE, MORE, ROWS_FULL, EVENTS_FULL = 0, 1, 2, 3
 STEP_TOO_SMALL, NOT_FINITE, ILL_POSED, MODE_CYCLE, DIVERGED, LOST, INCONSISTENT = -1, -2, -3, -4, -5, -6, -7
 PAINLEVE, NO_CONSISTENT_MODES = -8, -9
+TOO_LONG = 4  # of a scan: the step tells too little of its guards
 
 # Machines, rules for several contacts, methods.
 LEVEL, EDGE, MEMORYLESS = 0, 1, 2
@@ -32,8 +33,8 @@ HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to C
 SETS = 64  # of modes that are remembered while those of friction are decided
 OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
-    "wants", "begins", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight", "found",
-    "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
+    "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight",
+    "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -69,6 +70,7 @@ STATE = np.dtype(
         ("has_switch", "i8"),
         ("frictional", "i8"),  # some rows in contact have friction
         ("friction_code", "i8"),  # where the code stands that answers for them
+        ("instant_code", "i8"),  # and that which settles modes
         ("rtol", "f8"),
         ("atol", "f8"),
         ("t_end", "f8"),
@@ -105,6 +107,7 @@ STATE = np.dtype(
         ("trial_t", "f8"),
         ("explicit_rate", "f8"),
         ("row_rate", "f8"),  # fastest pole of the active rows, at an explicit step's start
+        ("turning_rate", "f8"),  # fastest at which friction turns a slip, likewise
         ("have_jacobian", "i8"),
         ("full_jacobian", "i8"),
         ("jacobian_scale", "f8"),
@@ -124,7 +127,8 @@ STATE = np.dtype(
         ("spoilt", "i8"),  # a row holds what is not finite
         ("events", "i8"),
         ("switches", "i8"),
-        ("turning_rate", "f8"),  # fastest at which friction turns a slip, at a step's start
+        ("watched", "i8"),  # w.cones has the end of the last step
+        ("jumps", "i8"),  # loads may do so at this instant, so that slips without a direction are decided anew
         ("slip_speed", "f8"),  # largest speed seen at contacts with friction
         ("unknowns", "i8"),  # of the algebra of friction: how many,
         ("normals", "i8"),  # and how many are no sticking rows
@@ -136,6 +140,11 @@ STATE = np.dtype(
         ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
+        ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding
+        (
+            "unsteady",
+            "i8",
+        ),  # a contact that would turn away from the direction in which it begins to slide, or -1
         ("energy_start", "f8"),
         ("energy_unit", "f8"),  # kinetic energy of unit velocities
         ("energy_size", "f8"),
@@ -236,6 +245,7 @@ class Work:
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
     lam_at: Floats2  # (12, nc) multipliers at the stages, 0 left out
+    slip_at: Floats2  # (12, nc) slips along their directions of reference, likewise; empty without friction
     gap_at: Floats2  # (3, nc) gaps at three of the stages
     gap: Floats
     rate: Floats
@@ -296,7 +306,8 @@ class Work:
     state: Bytes  # mode that is tried
     wants: Bytes  # mode that each contact would rather have
     sets: Bytes2  # (64, nc) sets that were tried
-    begins: Bytes  # contacts that have begun to slide at this instant
+    begins: Bytes  # contacts that have reached their bounds at this instant
+    since: Floats  # (nc,) instant since which a slip counts from w.rest; -inf for one that counts from none
     cones: Floats2  # (5, nc) at the nodes of the step: how far a contact is from sliding, or one that slides from a jam
     bare: Floats  # (nc,) right-hand sides without what pulls sticking rows back
     excess: Floats  # (nc,) by how much faster than its law each row moves
@@ -341,7 +352,8 @@ def workspace(
     shapes: dict[str, tuple[int, ...]] = {
         **dict.fromkeys(("y", "y1", "ys", "atol"), (ny,)), "k": (DENSE_STAGES, ny), "F": (DENSE_TERMS, ny),
         "tangent": (turns * nq, n), "stage_v": (6 * turns, n), "bend": (2 * turns, nq),
-        **dict.fromkeys(("place", "turn"), (turns * nq,)), **dict.fromkeys(("travel", "slip"), (turns * n,)),
+        **dict.fromkeys(("place", "turn"), (turns * nq,)),
+        "slip": (turns * n,), "travel": (max(turns, frictional) * n,),
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),
@@ -349,7 +361,8 @@ def workspace(
         **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot", "pull", "shift"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
         **dict.fromkeys(("gaps", "rates", "lams"), (NODES, nc)),
-        "lam_at": (STAGES_MOST, nc), "gap_at": (BETWEEN, nc), "guard_at": (BETWEEN, ng),
+        "lam_at": (STAGES_MOST, nc), "slip_at": (STAGES_MOST * frictional, nc),
+        "gap_at": (BETWEEN, nc), "guard_at": (BETWEEN, ng),
         "window": (WINDOW_LEVELS, FUNCTIONS_MOST * (NODES + 2) + NODES),
         **dict.fromkeys(("parts", "bands", "tiny"), (FUNCTIONS_MOST,)),
         **dict.fromkeys(("guard", "guard_hit"), (ng,)),

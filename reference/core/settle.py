@@ -198,7 +198,7 @@ def begin(s: Any, m: Model, w: Work) -> None:
     A row that another follows has no part in it: the other's multiplier has either sign. Nor have machines but the
     level one, collisions that take no time, and systems with an algebra of their own.
     """
-    w.idle_rows[:], w.spent[:], w.let_go[:] = 0, 0, -np.inf
+    w.idle_rows[:], w.spent[:], w.let_go[:], s.jumps = 0, 0, -np.inf, 1
     if s.frictional:
         ask(BEGIN, s, m, w, NOTHING)
     may = s.fsm == LEVEL and not s.frozen and not s.has_solve and not s.frictional

@@ -19,8 +19,8 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import factor_lu, solve_lu
-from crossbody.reference.core.coulomb import factor_set, note_speed, solve, stiffness, stopped_slip, without_pull
-from crossbody.reference.core.friction import decided_to, has_friction
+from crossbody.reference.core.coulomb import factor_set, note_speed, solve, stiffness, without_pull
+from crossbody.reference.core.friction import count_from_none, decided_to, has_friction, slip, small_slip
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import FREE, NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.kinds import Array
@@ -47,7 +47,8 @@ def _first(m: Model, w: Work, i: int) -> int:
 def _look(s: Any, m: Model, w: Work) -> None:
     """Leave the right-hand sides of the rows in contact without what pulls sticking ones back in w.bare.
 
-    Which contacts stand is left in w.stands, 0 for those that slide on: their direction is that of their slip.
+    Which contacts stand is left in w.stands, 0 for those that slide on: their direction is that of their slip. Where
+    loads do not jump one that is small does so too: to begin anew would turn it, and with it what others carry.
     """
     s.push_scale = 0.0
     for j in range(s.na):
@@ -58,26 +59,34 @@ def _look(s: Any, m: Model, w: Work) -> None:
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
-            first, last = _first(m, w, i), _first(m, w, i) + m.tangents[i]
-            size = 0.0
-            for c in range(first, last):
-                size += w.hda[c] * w.hda[c]
-            size = np.sqrt(size)
-            w.stands[i] = size <= stopped_slip(s)
-            if not w.stands[i]:
-                for c in range(first, last):
-                    w.way[w.idx[c]] = w.hda[c] / size
+            size = slip(m, w, i, w.rate)
+            fresh = w.begins[i] or w.since[i] == s.t or (s.jumps and size <= small_slip(s))
+            w.stands[i] = fresh or not w.slides[i]
+            if not w.stands[i] and size > small_slip(s):
+                for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
+                    w.along[c] = (w.hda[c] - w.rest[w.idx[c]]) / size
+                    w.way[w.idx[c]] = w.along[c]
+
+
+@compiled
+def _put_as_they_are(s: Any, m: Model, w: Work) -> None:
+    """Let contacts that stand stick, unless they have reached their bounds, and the others slide."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i):
             _put(m, w, i, STICK if w.stands[i] and not w.begins[i] else SLIP)
 
 
 @compiled
 def _put(m: Model, w: Work, i: int, state: int) -> None:
-    """Let contact i stick, slide along its direction of reference, or be off (FREE)."""
+    """Let contact i stick, slide along its direction of reference, or as it does already, or be off (FREE)."""
     w.state[i] = state
     first = _first(m, w, i)
     w.off[i], w.slides[i] = state == FREE, state == SLIP
     for c in range(first, first + m.tangents[i]):
-        w.off[w.idx[c]], w.slides[w.idx[c]], w.along[c] = state == FREE, state == SLIP, w.way[w.idx[c]]
+        w.off[w.idx[c]], w.slides[w.idx[c]] = state == FREE, state == SLIP
+        if w.stands[i]:
+            w.along[c] = w.way[w.idx[c]]
 
 
 @compiled
@@ -177,6 +186,8 @@ def _fill_turns(s: Any, m: Model, w: Work) -> int:
         i = w.idx[w.turning[b]]
         w.turn_by[b] = -_aside(m, w, i)
         w.turns[b, b] -= max(_ahead(m, w, i), 0.0) + decided_to(s)  # definite where loads are shared
+        if w.turns[b, b] > 0.0:
+            s.unsteady = i
     return count
 
 
@@ -186,6 +197,7 @@ def _turn(s: Any, m: Model, w: Work) -> float:
 
     Directions taken from accelerations alone run away where these are small beside what friction does.
     """
+    s.unsteady = -1
     count = _fill_turns(s, m, w)
     if factor_lu(w.turns, count, w.turned) != 0:
         return 0.0
@@ -272,20 +284,26 @@ def _face(s: Any, m: Model, w: Work, i: int, angle: float) -> float:
 
 @compiled
 def _look_around(s: Any, m: Model, w: Work, i: int) -> None:
-    """Search all directions for one in which contact i, once it slides, is accelerated."""
+    """Search all directions for one in which contact i, once it slides, is accelerated, and towards which it turns.
+
+    One from which it turns away is none in which it could begin. If there is none it keeps the one that it has.
+    """
+    first = _first(m, w, i)
+    kept = np.arctan2(w.along[first + 1], w.along[first])
     start, aside = 0.0, _face(s, m, w, i, 0.0)
     for k in range(1, AROUND + 1):
         low, high = start, 2.0 * np.pi * k / AROUND
         start, before, aside = high, aside, _face(s, m, w, i, high)
-        if (aside > 0.0) != (before > 0.0):
+        if before > 0.0 >= aside:
             for _ in range(HALVINGS):
                 middle = 0.5 * (low + high)
-                if (_face(s, m, w, i, middle) > 0.0) == (before > 0.0):
+                if _face(s, m, w, i, middle) > 0.0:
                     low = middle
                 else:
                     high = middle
-            if _ahead(m, w, i) >= 0.0:
+            if _ahead(m, w, i) > decided_to(s):
                 return
+    _face(s, m, w, i, kept)
 
 
 @compiled
@@ -296,6 +314,8 @@ def _judge(s: Any, m: Model, w: Work) -> int:
         if _turn(s, m, w) <= TURNED:
             break
         _evaluate(s, m, w)
+    if s.unsteady >= 0:
+        _look_around(s, m, w, s.unsteady)
     worst = _worst(s, m, w)
     if worst >= 0 and w.state[worst] == SLIP and w.wants[worst] == STICK and m.tangents[worst] > 1:
         _look_around(s, m, w, worst)
@@ -362,7 +382,7 @@ def _sweep(s: Any, m: Model, w: Work) -> None:
                     if w.stands[i]:
                         _relax(s, m, w, c)
                     else:
-                        w.la[c] = -m.friction[i] * w.la[j] * w.way[w.idx[c]]
+                        w.la[c] = -m.friction[i] * w.la[j] * w.along[c]
                 size = _size(m, w, i, w.la)
                 for c in range(first, last):
                     w.la[c] *= min(1.0, m.friction[i] * w.la[j] / size) if size > 0.0 else 1.0
@@ -495,22 +515,50 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
+def _found(s: Any, m: Model, w: Work) -> bool:
+    """Whether a consistent set is found, contacts as they are tried first."""
+    _put_as_they_are(s, m, w)
+    return bool(_iterate(s, m, w, ALL) or _swept(s, m, w, ALL) or _swept(s, m, w, WORST) or _near_sets(s, m, w))
+
+
+@compiled
+def _most_pull(s: Any, m: Model, w: Work) -> float:
+    """The most that pulls a contact back which stands: what it moves by is an error, and so is that.
+
+    Rows of a body that rocks on several contacts which stick cannot all keep their velocities at zero.
+    """
+    most = 0.0
+    for j in range(s.na):
+        n = m.follows[w.idx[j]]
+        if n >= 0 and has_friction(m, n) and w.stands[n]:
+            most = max(most, abs(m.alpha[w.idx[j], 1] * w.hda[j]))
+    return float(most)
+
+
+@compiled
 def decide(s: Any, m: Model, w: Work) -> int:
     """Leave in w.state the mode that the present instant, as evaluated, asks for, of every contact with friction.
 
     Returns:
         0, or NO_CONSISTENT_MODES or PAINLEVE; with one of these w.wants marks contacts.
     """
-    note_speed(s, m, w.rate)
+    note_speed(s, m, w, w.rate)
+    s.leeway = 0.0
     _look(s, m, w)
-    if not (_iterate(s, m, w, ALL) or _swept(s, m, w, ALL) or _swept(s, m, w, WORST) or _near_sets(s, m, w)):
-        return _mark(s, m, w)
+    if not _found(s, m, w):
+        s.leeway = _most_pull(s, m, w)
+        if not (s.leeway > 0.0 and _found(s, m, w)):
+            return _mark(s, m, w)
     _count_others(s, m, w)
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
-            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
-                w.rest[w.idx[c]] = w.hda[c] if w.stands[i] and w.state[i] == SLIP else 0.0
+            if w.stands[i]:
+                count_from_none(m, w, i)
+            if w.stands[i] and w.state[i] == SLIP:
+                w.since[i] = s.t
+                for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
+                    w.rest[w.idx[c]] = w.hda[c]
             w.tolerated[i] = decided_to(s) / w.gram[j, j]
     for i in range(s.nc):
         w.off[i], w.begins[i] = 0, 0

@@ -126,19 +126,35 @@ def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
 
 @kernels.helper
 def _slip(p: Array, w: Array, i: int) -> Any:
-    """Return of the tangential row i where its shapes meet, its direction, the velocity along it and H'v."""
+    """Return of the tangential row i where its pair stands in p, where its shapes meet, and both directions there.
+
+    Its own comes first; the other one is that of its partner, the next row of a contact in space.
+    """
     at, row = slip.place_of(p, i)
     x, one, other = slip.meeting(p, w, at, row)
-    way = one if p[row + pairs.ACROSS].real == 0.0 else other
-    rate, turned = slip.velocity(p, w, at, x, way)
-    return x, way, rate, turned
+    if p[row + pairs.ACROSS].real == 0.0:
+        return at, x, one, other
+    return at, x, other, one
+
+
+@kernels.helper
+def _has_partner(p: Array, i: int, k: int) -> bool:
+    """Return whether row k is the second tangential row of the contact of which row i is the first one."""
+    o, step = int(p[layout.AT_ROW].real), layout.ROW
+    one, other = o + step * i, o + step * k
+    first = p[one + pairs.ACROSS].real == 0.0 and int(p[other].real) == layout.TANGENT
+    across = p[other + pairs.ACROSS].real != 0.0 and p[one + pairs.WHICH].real == p[other + pairs.WHICH].real
+    return bool(first and across and p[one + pairs.PLACE].real == p[other + pairs.PLACE].real)
 
 
 @kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
     """Of every row; where points or shapes of bodies are to meet their poses are computed first."""
     w = sweeps.posed(q, v, p) if p[layout.POSED].real > 0.0 else np.empty(0, dtype=q.dtype)
+    paired = -1
     for i in range(len(h)):
+        if i == paired:
+            continue
         kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real)
         if kind == layout.CONNECT:
             h[i], hd[i], _ = loops.connect(p, i, w)
@@ -150,7 +166,11 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
         elif kind == layout.TANGENT:
-            h[i], hd[i] = 0.0 * w[0], _slip(p, w, i)[2]
+            at, x, way, other = _slip(p, w, i)
+            h[i], hd[i] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[0]
+            if i + 1 < len(h) and _has_partner(p, i, i + 1):
+                paired = i + 1
+                h[paired], hd[paired] = 0.0 * w[0], slip.velocity(p, w, at, x, other)[0]
         else:
             h[i], hd[i], _ = _row(q, v, p, i)
 
@@ -159,7 +179,10 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
 def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, H: Array, h: Array, Hdv: Array) -> None:
     """The active ones."""
     H[:na] = 0.0
+    paired = -1
     for j in range(na):
+        if j == paired:
+            continue
         kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * idx[j]].real)
         if kind == layout.CONNECT:
             h[j], _, Hdv[j] = loops.connect(p, idx[j], w)
@@ -175,9 +198,13 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
             h[j], Hdv[j] = gap[0], gap[2]
             gradient(p, w, at, n, place, H[j])
         elif kind == layout.TANGENT:
-            x, way, _, Hdv[j] = _slip(p, w, idx[j])
-            h[j] = 0.0 * w[0]
-            slip.columns(p, w, slip.place_of(p, idx[j])[0], x, way, H[j])
+            at, x, way, other = _slip(p, w, idx[j])
+            h[j], Hdv[j] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[1]
+            slip.columns(p, w, at, x, way, H[j])
+            if j + 1 < na and _has_partner(p, idx[j], idx[j + 1]):
+                paired = j + 1
+                h[paired], Hdv[paired] = 0.0 * w[0], slip.velocity(p, w, at, x, other)[1]
+                slip.columns(p, w, at, x, other, H[paired])
         else:
             h[j], _, Hdv[j] = _row(q, v, p, idx[j])
             _gradient(q, v, p, idx[j], H[j])

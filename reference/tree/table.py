@@ -13,6 +13,7 @@ import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.cases.arrays import Floats
+from crossbody.cases.remembered import remembered
 from crossbody.cases.scene import WIDTHS, Actuator, Body, Joint, Loop, Push, Scene, Shape, Tendon, Vector
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.reference.kinds import Index
@@ -122,6 +123,7 @@ def rotation(quaternion: tuple[float, ...] | Floats) -> Floats:
     ])  # fmt: skip
 
 
+@remembered(4)
 def tabulate(scene: Scene) -> Table:
     """Return the table of a scene.
 

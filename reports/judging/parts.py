@@ -10,8 +10,9 @@ each other, so that behind an event that moved states are compared at equal time
     step        the engine at its step against its own converged motion
 
 The converged motion is the truth of the equations that the engine follows, where those are known; else it follows from
-three steps or more, each half of the one before, by the order that they show: without one nothing is extrapolated. Of
-an engine with a tolerance instead of a step it is the run at the tightest. What a part is known to stands beside it.
+three steps or more, each half of the one before, by the order that they show. Without one nothing is extrapolated: it
+is the finest run, known to what further differences sum to where they fall, else it is not known. Of an engine with a
+tolerance instead of a step it is the run at the tightest. What a part is known to stands beside it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -158,7 +160,13 @@ def _step(
         looser, tight = errors
         text = f"Converged at {study.setting} = {study.sizes[-1]:g}."
         return here - tight, _most(looser - tight), text
-    ratio, seen = observed([positions(run) for run in study.runs], study.sizes)
+    try:
+        ratio, seen = observed([positions(run) for run in study.runs], study.sizes)
+    except NotMeasuredError as why:
+        if math.isnan(rest := remaining(errors)):
+            raise
+        falling = f"but each is at least {LEAST_RATIO:.2f} times the next: if they go on so, they sum to {rest:.1e}."
+        return here - errors[-1], rest, f"{str(why).removesuffix('.')}; {falling}"
     limit, known = extrapolated(errors[-3:], ratio)
     if math.isinf(ratio):
         return here - limit, known, f"Runs at steps of {_listed(study.sizes)} s differ by rounding."
@@ -194,6 +202,19 @@ def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, S
         f"No order between steps of {_listed(sizes[k : k + 3])} s, so nothing is extrapolated: the differences fall "
         f"{ratio:.2g} times from one pair to the next, and {unlike:.0%} of them is no power of the step."
     )
+
+
+def remaining(errors: Sequence[Floats]) -> float:
+    """Return what all further differences sum to if each falls as those of the runs do; NaN where these do not fall.
+
+    Events that a step rounds to its own instants leave differences that fall with the step and are no power of it.
+
+    Args:
+        errors: of four runs or more (samples, components), the coarsest first; of fewer it is NaN.
+    """
+    sizes = [_most(one - other) for one, other in pairwise(errors)]
+    falling = len(sizes) > 2 and all(one >= LEAST_RATIO * other for one, other in pairwise(sizes))
+    return sizes[-1] / (LEAST_RATIO - 1.0) if falling else math.nan
 
 
 def _listed(sizes: Sequence[float]) -> str:

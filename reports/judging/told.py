@@ -35,6 +35,18 @@ class EngineRun:
         return sorted((row for row in self.rows if row["verdict"] in WRONG), key=share, reverse=True)
 
     @property
+    def deviates(self) -> bool:
+        """Whether a number is beyond its limit within bounds that are known of the engine."""
+        return any(row["verdict"] == Word.EXPECTED for row in self.rows)
+
+    @property
+    def unbounded(self) -> Row | None:
+        """The number beyond its limit of which it is known that it may be, not how far: of position if there is one."""
+        loose = [row for row in self.rows if row["verdict"] == Word.INFO and (row["limit"] or 0.0) > 0.0]
+        beyond = [row for row in loose if 1.0 < share(row) < math.inf]
+        return max(beyond, key=lambda row: (row["metric"] == "position", share(row)), default=None)
+
+    @property
     def skipped(self) -> bool:
         """Whether it did not run."""
         return all(row["verdict"] == Word.SKIPPED for row in self.rows)
@@ -62,24 +74,32 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
     right = [run for run in ran if not run.wrong]
-    known = [run.who for run in right if any(row["verdict"] == Word.EXPECTED for row in run.rows)]
-    text = f"{len(right) - len(known)} of {len(ran)} runs are within all limits"
+    known = [run.who for run in right if run.deviates]
+    beyond = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
+    text = f"{len(right) - len(known) - len(beyond)} of {len(ran)} runs are within all limits"
     text += f", {len(known)} deviate as is known of them ({', '.join(dict.fromkeys(known))})." if known else "."
     if off:
-        more = f"; and {len(off) - NAMED} more" if len(off) > NAMED else ""
-        text += f" Off: {'; '.join(_off(run) for run in off[:NAMED])}{more}."
+        text += f" Off: {_named([_off(run, run.wrong[0]) for run in off])}."
+    if beyond:
+        beyond.sort(key=lambda one: -share(one[1]))
+        text += f" Beyond a limit as is known of them, by how much is not: {_named([_off(*one) for one in beyond])}."
     return text
 
 
-def _off(run: EngineRun) -> str:
-    """The farthest number of a run, in a few words."""
-    row, times = run.wrong[0], share(run.wrong[0])
+def _named(texts: Sequence[str]) -> str:
+    more = f"; and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
+    return "; ".join(texts[:NAMED]) + more
+
+
+def _off(run: EngineRun, row: Row) -> str:
+    """A number of a run that is off, in a few words."""
+    times = share(row)
     size = f"{row['value']:.2g}, {times:.2g} times its limit" if math.isfinite(times) else row["verdict"]
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
 
 
 def _blamed(run: EngineRun, metric: str) -> str:
-    """The largest part of an error, where its parts are told."""
+    """The part that is more than half of an error, where its parts are told."""
     values = {row["metric"]: abs(row["value"]) for row in run.rows if row["value"] is not None}
-    parts = {part: size for part in PARTS if math.isfinite(size := values.get(part_of(metric, part), math.nan))}
-    return f", mostly its {max(parts, key=lambda part: parts[part])}" if parts else ""
+    most = [part for part in PARTS if values.get(part_of(metric, part), 0.0) > 0.5 * values.get(metric, math.nan)]
+    return f", mostly its {' and '.join(most)}" if most else ""

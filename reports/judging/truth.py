@@ -78,15 +78,21 @@ def truth_of(case: Case) -> Truth:
     return replace(told, trusted=math.inf, parted=math.inf, agreement=_agreement(truth, second, case))
 
 
-def cache_of_one(function: Callable[[Floats], Trajectory]) -> Callable[[Floats], Trajectory]:
-    """Keep the last answer: every metric asks for the truth at the same instants of a run."""
-    last: list[tuple[bytes, Trajectory]] = []
+ANSWERS = 64 << 20
+"""Multipliers of the answers that are kept, bytes: about a third of what they take."""
+
+
+def answers_kept(function: Callable[[Floats], Trajectory]) -> Callable[[Floats], Trajectory]:
+    """Keep the last answers: every metric asks for the truth at the same instants of a run."""
+    last: dict[bytes, Trajectory] = {}
 
     def cached(times: Floats) -> Trajectory:
         key = times.tobytes()
-        if not last or last[0][0] != key:
-            last[:] = [(key, function(times))]
-        return last[0][1]
+        if key not in last:
+            while last and sum(run.lam.nbytes for run in last.values()) > ANSWERS:
+                del last[next(iter(last))]
+            last[key] = function(times)
+        return last[key]
 
     return cached
 
@@ -148,7 +154,7 @@ def _integrated(case: Case, first: Trajectory, other: str) -> Truth:
 
     reference = load("reference")
 
-    @cache_of_one
+    @answers_kept
     def at(times: Floats) -> Trajectory:
         run = _motion(reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)))
         # A run that is asked for samples need not take the same steps: its events move by the tolerance.

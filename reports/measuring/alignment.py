@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import Contact, contacts
+from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Mode, Trajectory
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
     return mapped
 
 
+@remembered(4)
 def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDArray[np.bool_], Trajectory]:
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run, releases)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import CaseUnsupported
+from crossbody.cases.remembered import remembered
 from crossbody.engines.equations import system_of
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 SAMPLES = 400
 
 
+@remembered(4)
 def equations(case: Case) -> System | None:
     """The mechanism with the law of its rows; None where the reference has none."""
     try:

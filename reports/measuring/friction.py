@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
+from crossbody.cases.remembered import remembered
 from crossbody.cases.scene_contacts import contacts
 from crossbody.reports.measuring.equations import equations
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
-    from crossbody.reference import System
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,23 +47,14 @@ class Rubbing:
 
 SLOW = 1e-3
 """Part of the largest slip, and of the largest force, below which a direction is not looked at."""
-_LAST: list[tuple[Trajectory, Rubbing]] = []
-"""The motions that were looked at last: every metric asks for the same."""
 
 
+@remembered(4)  # every metric asks for the same
 def rubbing(run: Trajectory, case: Case) -> Rubbing | None:
     """Return where a motion may slip; None where no contact has friction."""
     system = equations(case)
     if system is None or not system.frictional:
         return None
-    for known, found in _LAST:
-        if known is run:
-            return found
-    _LAST[:] = [*_LAST[-3:], (run, _rubbing(run, case, system))]
-    return _LAST[-1][1]
-
-
-def _rubbing(run: Trajectory, case: Case, system: System) -> Rubbing:
     rows = np.flatnonzero(system.tangents)
     count = system.tangents[rows][:, None]
     ways = np.arange(count.max())

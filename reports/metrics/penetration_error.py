@@ -20,10 +20,12 @@ ROUNDING = 1e-12
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |min(gap, 0) - min(gap_truth, 0)| / max penetration of the truth; None where nothing penetrates."""
-    inside, exact = aligned(truth, run)
     rows = case.law.unilateral
     deepest = float(np.max(-truth.trajectory.gap[:, rows], initial=0.0))
-    if deepest <= ROUNDING * float(np.max(np.abs(truth.trajectory.gap), initial=0.0)) or not inside.any():
+    if deepest <= ROUNDING * float(np.max(np.abs(truth.trajectory.gap), initial=0.0)):
+        return None
+    inside, exact = aligned(truth, run)
+    if not inside.any():
         return None
     return (
         float(np.max(np.abs(np.minimum(run.gap[inside][:, rows], 0.0) - np.minimum(exact.gap[:, rows], 0.0)))) / deepest

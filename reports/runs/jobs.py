@@ -35,9 +35,9 @@ DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
 FINEST_TOLERANCE = 1e-12
 LOOSER = 10.0
 """A tolerance of a study over the tightest: how far their runs are apart tells what the tightest is known to."""
-MANY_STEPS, HALVINGS = 10_000, 5
+MANY_STEPS, HALVINGS, LEAST_SIZES = 10_000, 5, 3
 """A step is halved twice for its study, and up to five times while that takes no more steps; a run that has more by
-itself is studied at twice and four times its step."""
+itself is studied at twice and four times its step. An order needs three of them."""
 _EXAMPLES = {"--set": "a1=0", "--set-engine": "dt=1e-4"}
 TRUTHS = 3.0
 """A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
@@ -390,6 +390,9 @@ def _study(
     setting = next(iter(size))
     for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
         cost = _cost(setting, sizes, size[setting], took)
+        while case.general and cost > STUDIES_S and len(sizes) > LEAST_SIZES:
+            sizes = sizes[:-1]
+            cost = _cost(setting, sizes, size[setting], took)
         if case.general and cost > STUDIES_S:
             return Study(why=f"Runs with other {setting} that tell it would take about {cost:.0f} s.", **told)
         known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}

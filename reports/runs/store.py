@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from crossbody.cases import Event, Ledger, LogFormatError, Mode, Outcome, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
@@ -69,33 +70,47 @@ def save(path: Path, trace: Trace) -> None:
         "outcome": run.outcome.value, "message": run.message, "steps": run.steps, "wall_s": run.wall_s,
         "counts": dict(run.counts), "control_s": run.control_s,
     }  # fmt: skip
-    columns = pa.table(data).replace_schema_metadata({_KEY: json.dumps(about, default=_plain).encode()})
-    pq.write_table(columns, path, compression="zstd")
+    columns = {name: _column(values) for name, values in data.items()}
+    table = pa.table(columns, metadata={_KEY: json.dumps(about, default=_plain).encode()})
+    pq.write_table(table, path, compression="zstd")
+
+
+def _column(values: Floats) -> pa.Array:
+    """Return the bytes of an array as a column: `pa.array` imports pandas (.3 s) to see whether it is one of its."""
+    held = pa.py_buffer(np.ascontiguousarray(values))
+    return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, held])
 
 
 def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
 
 
-def _block(data: pa.Table, name: str) -> Floats:
-    """Columns name0, name1, ... as one array (n, k)."""
-    columns: list[Floats] = []
-    while f"{name}{len(columns)}" in data.column_names:
-        columns.append(data.column(f"{name}{len(columns)}").to_numpy())
-    return np.stack(columns, axis=1) if columns else np.zeros((len(data), 0))
+def _blocks(data: pa.Table) -> dict[str, Floats]:
+    """Return all columns, those called name0, name1, ... as one array (n, k).
+
+    Raises:
+        ValueError: for columns out of order.
+    """
+    found: dict[str, list[NDArray[Any]]] = {}
+    for name, column in zip(data.column_names, data.itercolumns(), strict=True):
+        block = found.setdefault(name.rstrip("0123456789"), [])
+        if name[-1].isdigit() and not name.endswith(f"{len(block)}"):
+            raise ValueError(f"its column {name!r} is out of order")
+        block.append(np.from_dlpack(column.combine_chunks()))  # `to_numpy` imports pandas
+    return {name: np.stack(block, axis=1) for name, block in found.items()}
 
 
-def _motion(data: pa.Table, prefix: str) -> Trajectory:
-    q, v, gap, lam, energy, mode = (_block(data, prefix + name) for name in _ARRAYS)
-    t = data.column("t").to_numpy()
+def _motion(blocks: Mapping[str, Floats], prefix: str = "") -> Trajectory:
+    t = blocks["t"][:, 0]
+    none = np.zeros((len(t), 0))
+    q, v, gap, lam, energy, mode = (blocks.get(prefix + name, none) for name in _ARRAYS)
     return Trajectory(t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode.astype(np.int8))
 
 
-def _ledger(data: pa.Table) -> Ledger | None:
-    if "work0" not in data.column_names:
+def _ledger(blocks: Mapping[str, Floats]) -> Ledger | None:
+    if "work" not in blocks:
         return None
-    given, lost = (data.column(name).to_numpy() for name in ("input", "loss"))
-    return Ledger(contact=_block(data, "work"), input=given, dissipated=lost)
+    return Ledger(contact=blocks["work"], input=blocks["input"][:, 0], dissipated=blocks["loss"][:, 0])
 
 
 def _event(t: float, contact: int, before: int, after: int, impulse: float = 0.0) -> Event:
@@ -188,12 +203,13 @@ def _loaded(path: Path) -> Trace:
     data = _table(path)
     about = decoded((data.schema.metadata or {})[_KEY])
     _check(about, "", _TOLD)
+    blocks = _blocks(data)
     run = replace(
-        _motion(data, ""),
-        ledger=_ledger(data),
+        _motion(blocks),
+        ledger=_ledger(blocks),
         events=tuple(_event(*given) for given in about["events"]),
         outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"], wall_s=about["wall_s"],
         counts=about["counts"], control_s=float(about.get("control_s", 0.0)),
     )  # fmt: skip
-    truth = _motion(data, "truth_") if "truth_q0" in data.column_names else None
+    truth = _motion(blocks, "truth_") if "truth_q" in blocks else None
     return Trace(about=about["about"], run=run, truth=truth)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow.csv import ConvertOptions, ParseOptions, read_csv
 
 from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
@@ -107,16 +108,21 @@ def write_table(stem: Path, rows: pd.DataFrame, provenance: Mapping[str, Any]) -
 
 
 def write_rows(stem: Path, rows: Sequence[Row], kinds: Mapping[str, type], provenance: Mapping[str, Any]) -> None:
-    """The same of plain rows whose columns are known."""
-    plain = [{name: finite(row[name]) for name in kinds} for row in rows]
-    columns = {
-        name: pa.array([row[name] for row in rows], _ARROW[kind], from_pandas=True) for name, kind in kinds.items()
-    }
-    with stem.with_suffix(".csv").open("w", encoding="utf-8", newline="") as file:
+    """The same of plain rows whose columns are known.
+
+    Parquet is made of what the CSV says: `pa.array` imports pandas (.3 s) to see whether it is given one of its own.
+    """
+    path = stem.with_suffix(".csv")
+    with path.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(kinds)
         lines.writerows(["" if value != value else value for value in (row[name] for name in kinds)] for row in rows)
-    _write_both(stem, pa.table(columns), plain, provenance)
+    table = read_csv(
+        path,
+        parse_options=ParseOptions(newlines_in_values=True),
+        convert_options=ConvertOptions(column_types={name: _ARROW[kind] for name, kind in kinds.items()}),
+    )
+    _write_both(stem, table, [{name: finite(row[name]) for name in kinds} for row in rows], provenance)
 
 
 def _write_both(stem: Path, arrow: pa.Table, plain: Sequence[Row], provenance: Mapping[str, Any]) -> None:

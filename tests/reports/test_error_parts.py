@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +126,27 @@ def test_without_an_order_nothing_is_extrapolated(case: Case) -> None:
         assert row.why.startswith("Not measured. No order between steps of 0.02, 0.01, 0.005 s")
         assert row.command.startswith("again --engine x:chatters")
         assert f"largest position ({part})" not in rows
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_error_that_falls_without_an_order_is_told_to_what_its_differences_sum_to(case: Case, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.A, "")
+    steps = [0.02 / 2**k for k in range(5)]
+
+    def uneven(t: Any) -> Any:
+        return np.sin(np.outer(t, rng.uniform(5.0, 50.0, 2)) + rng.uniform(0.0, 6.0, 2))
+
+    made = study(case, steps, 1e-3, 1.0, uneven)
+    found = split(case, truth, made.runs[0], made)
+    sizes = [np.abs(one.q[:: len(one.t) // 100] - other.q[:: len(other.t) // 100]).max()
+             for one, other in pairwise(made.runs)]  # fmt: skip
+    if found.missing:
+        assert min(one / other for one, other in pairwise(sizes)) < 1.6
+        return
+    assert "No order" in found.says
+    assert "sum to" in found.says
+    assert abs(found.largest["model"] - 1e-3 * case.t_end**2) <= found.known["model"] <= 8.0 * steps[-1]
 
 
 def test_what_differs_by_rounding_alone_has_no_order_and_is_converged(case: Case) -> None:
@@ -347,3 +369,17 @@ def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: p
     assert [study is not None and len(study.runs) > 1 for study in told] == [True, False]
     assert told[1] is not None
     assert "Runs with other dt that tell it would take about" in told[1].why
+
+
+def test_a_study_has_as_many_steps_as_there_is_time_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jobs, "_cost", lambda setting, sizes, size, once: float(len(sizes)))
+    rod = Scene(
+        bodies=(Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0)),),
+        joints=(Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0)),),
+    )
+    pick, swing = jobs.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
+    for seconds, count in ((10.0, 6), (4.5, 4), (3.0, 3), (2.9, 0)):
+        monkeypatch.setattr(jobs, "STUDIES_S", seconds)
+        told = jobs.run_case(swing, [pick], truth=None).entries[0].study
+        assert told is not None
+        assert len(told.runs) == count

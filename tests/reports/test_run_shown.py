@@ -46,6 +46,21 @@ def test_the_table_fits_and_loses_no_digit(given_: list[tuple[float, float, floa
                 assert shown[name] == f"{value:.1e}"
 
 
+def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_as_within() -> None:
+    rows = [
+        row("a", "position", 1e-9, Word.WITHIN, 1e-6),
+        row("b", "velocity", 1e-1, Word.INFO, 1e-6),
+        row("b", "position", 2.4e-5, Word.INFO, 1e-6),
+        row("b", part_of("position", "importer"), 0.0, Word.INFO),
+        row("c", "penetration", 1e-3, Word.INFO),  # without a limit
+    ]
+    text = sentence(runs_of(rows))
+    assert text.startswith("2 of 3 runs are within all limits.")
+    assert text.endswith("by how much is not: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
+    step = row("b", part_of("position", "step"), 2.0e-5, Word.INFO)
+    assert "24 times its limit, mostly its step" in sentence(runs_of([*rows, step]))
+
+
 def test_columns_go_before_digits_and_errors_go_last() -> None:
     rows = [row("mujoco", name, 1.23e-4, Word.INFO) for name in run_shown.SHOWN.values()]
     rows.append(row("mujoco", "velocity", 1.0, Word.EXPECTED))
