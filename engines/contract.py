@@ -100,6 +100,10 @@ class Engine(ABC):
             InvalidValue: for a setting outside its range.
         """
 
+    def planned(self, case: Case, profile: str = "matched", **settings: Any) -> Mapping[str, Any]:
+        """Return the settings that a run would have; an engine that compiles to prepare one overrides this."""
+        return self.prepare(case, profile, **settings).settings
+
     def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
         """Return its derivatives of the accelerations at an equilibrium of the case, by each way that it has.
 

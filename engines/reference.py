@@ -130,14 +130,7 @@ class Reference(Engine):
             InvalidValue: for a setting outside its range.
             SceneError: for a kernel that is wrong, or a start off the rows that are always on (`Case.consistent`).
         """
-        reason = self.why_not(case, profile)
-        if reason is not None:
-            raise CaseUnsupported(reason)
-        solver = _settings.profile_of(self.name, self.profiles, profile)
-        times = {k: v for k, v in settings.items() if k == "samples" and not (v is None or is_number(v))}
-        numbers = {k: v for k, v in settings.items() if k not in times}
-        used = _settings.chosen(self.name, solver, _known(case, solver), numbers)
-        options = _options(case, solver, {k: v for k, v in {**used, **times}.items() if k != "traced"})
+        solver, used, options = self._chosen(case, profile, settings)
         system = system_of(case, TRACED[str(used.get("traced", KEPT))])
         check = getattr(module(case.mechanism), "check_start", None)
         if check is not None:
@@ -148,6 +141,22 @@ class Reference(Engine):
             raise SceneError(_off(case, error)) if case.file else error from None
         inner.warm()
         return ReferenceRun(case=case, system=system, inner=inner, profile=solver, settings=_provenance(used, options))
+
+    def planned(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> Mapping[str, Any]:
+        """Return the settings that a run would have: nothing is built or compiled for that."""
+        _, used, options = self._chosen(case, profile, settings)
+        return _provenance(used, options)
+
+    def _chosen(self, case: Case, profile: str, settings: Mapping[str, Any]) -> tuple[str, dict[str, Any], Options]:
+        """Return profile, settings by name, and the solver's options."""
+        reason = self.why_not(case, profile)
+        if reason is not None:
+            raise CaseUnsupported(reason)
+        solver = _settings.profile_of(self.name, self.profiles, profile)
+        times = {k: v for k, v in settings.items() if k == "samples" and not (v is None or is_number(v))}
+        numbers = {k: v for k, v in settings.items() if k not in times}
+        used = dict(_settings.chosen(self.name, solver, _known(case, solver), numbers))
+        return solver, used, _options(case, solver, {k: v for k, v in {**used, **times}.items() if k != "traced"})
 
 
 def _no_friction(case: Case, solver: str) -> str | None:

@@ -25,7 +25,7 @@ import click
 from crossbody.cases import CrossbodyError, installed
 from crossbody.reports.commands.replay_options import identify, memory_option, replay
 from crossbody.reports.runs.watch import stopping
-from crossbody.reports.voice import as_json, quiet, speaks
+from crossbody.reports.voice import as_json, folded, quiet, speaks
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
 
@@ -372,11 +372,12 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
 )
 @click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
 @click.option("--fix", type=click.Path(path_type=Path), metavar="OUT", help="Write FILE so that more readers agree.")
+@click.option("--force", is_flag=True, help="Let --fix write over a file that it did not write itself.")
 @click.option("--sarif", type=click.Path(path_type=Path), metavar="F", help="Write the findings as SARIF too.")
 @click.option("--markdown", type=click.Path(path_type=Path), metavar="F", help="Write a summary in Markdown too.")
 @speaks
 def audit(
-    file: Path, engines: tuple[str, ...], without: str, limit: float, explain: bool, fix: Path | None,
+    file: Path, engines: tuple[str, ...], without: str, limit: float, explain: bool, fix: Path | None, force: bool,
     sarif: Path | None, markdown: Path | None,
 ) -> int:  # fmt: skip
     """Say whether every engine's own reader makes the same robot of FILE (MJCF or URDF), where not, and why."""
@@ -384,7 +385,7 @@ def audit(
     from crossbody.reports.commands.audit import audit as work
 
     asked = Ask(
-        path=file, engines=engines, without=without, seconds=limit, explain=explain, fix=fix, sarif=sarif,
+        path=file, engines=engines, without=without, seconds=limit, explain=explain, fix=fix, force=force, sarif=sarif,
         markdown=markdown,
     )  # fmt: skip
     return work(asked)
@@ -535,7 +536,7 @@ def _drop_what_cannot_be_printed() -> None:
 
 def _say(text: str, code: int = 2) -> int:
     with suppress(OSError):  # the code tells where stderr cannot
-        click.echo("crossbody: " + " ".join(text.split()), err=True)
+        click.echo(folded(f"crossbody: {text}"), err=True)
     return code
 
 

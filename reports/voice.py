@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
@@ -62,7 +63,13 @@ def silent() -> bool:
 def note(text: str) -> None:
     """Say something beside the result, in one line on stderr."""
     if not silent():
-        print(f"crossbody: {' '.join(text.split())}", file=sys.stderr)
+        print(folded(f"crossbody: {text}"), file=sys.stderr)
+
+
+def folded(text: str) -> str:
+    """Return a sentence in one line; on a terminal in lines of 80 columns."""
+    line = " ".join(text.split())
+    return textwrap.fill(line, 80, subsequent_indent="    ", break_on_hyphens=False) if sys.stderr.isatty() else line
 
 
 def rows_as_json(rows: pd.DataFrame) -> str:
@@ -101,9 +108,12 @@ def progress(steps: int, hidden: bool = False) -> Iterator[Callable[[str], None]
         shown.TimeRemainingColumn(), shown.TextColumn("{task.description}"),
     )  # fmt: skip
     with shown.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=steps, completed=-1)
+        task = bar.add_task("", total=steps)
+        told = 0
 
         def tell(text: str) -> None:
-            bar.update(task, description=text, advance=1)
+            nonlocal told  # what is told of first is begun, not done
+            bar.update(task, description=text, completed=told)
+            told += 1
 
         yield tell

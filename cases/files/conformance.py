@@ -29,8 +29,8 @@ class Feature:
         text: the smallest file that has it.
         scene: what it means.
         about: quantities by which a reader is judged.
-        finds: paths of ElementTree by which a file is seen to use it; behind a ! children that are not there; empty
-            for what no path tells.
+        finds: paths of ElementTree by which a file is seen to use it; behind a ! children and @attributes that are
+            not there; empty for what no path tells.
         rule: what the format says, in a sentence.
         rewrite: how to write it so that every reader reads the same; empty where there is no such way.
         files: what else stands beside it, name -> text.
@@ -219,7 +219,8 @@ def _joints() -> list[Feature]:
     bare = '<joint name="elbow"/>'
     return [
         _written("arm", mjcf(), arm(), ".//inertial[@diaginertia]", "An <inertial> says mass, centre and moments."),
-        _written("no model name", mjcf(model=""), arm(), rule="The attribute model of <mujoco> may be left out.",
+        _written("no model name", mjcf(model=""), arm(), ".!@model",
+            rule="The attribute model of <mujoco> may be left out.",
             rewrite='Write <mujoco model="NAME">.'),
         _written("integrator", mjcf(head='<option integrator="implicitfast"/>'), arm(), "option[@integrator]",
             "The integrator is MuJoCo's own and no physics of the robot.", "Leave it out for other readers."),
@@ -256,7 +257,8 @@ def _joints() -> list[Feature]:
         _written("joint position", mjcf(elbow='<joint name="elbow" axis="1 0 0" pos="0 .1 .05"/>'),
             arm(elbow={"anchor": (0.0, 0.1, 0.05)}), ".//body/joint[@pos]",
             "A joint turns about a point of its body."),
-        _written("axis not given", mjcf(elbow=bare), arm(elbow=z), rule="A hinge or slide without axis has 0 0 1.",
+        _written("axis not given", mjcf(elbow=bare), arm(elbow=z), ".//body/joint!@axis",
+            rule="A hinge or slide without axis has 0 0 1.",
             rewrite=AXIS_WAY),
         _written("axis not of length 1", mjcf(elbow='<joint name="elbow" axis="3 0 4"/>'), arm(elbow={"axis": (0.6,
             0.0, 0.8)}), rule="An axis is brought to length 1.", rewrite="Write axes of length 1."),
@@ -349,7 +351,8 @@ def _poses() -> list[Feature]:
         _written("fixed body in the tree",
             mjcf(lower_inertial=LOWER_INERTIAL + f'<body name="hand" pos="0 .1 -.3" quat="{hw!r} {hx!r} {hy!r} '
             f'{hz!r}"><inertial pos=".02 0 .01" mass=".5" diaginertia=".003 .004 .005"/></body>'),
-            arm().replace(bodies=(UPPER, LOWER, hand)), rule="A body without joints is part of its parent."),
+            arm().replace(bodies=(UPPER, LOWER, hand)), ".//body/body!joint,freejoint",
+            rule="A body without joints is part of its parent."),
         _written("frame", mjcf(inside='<frame pos="0 0 -.1" euler="0 0 90">',
             behind="").replace("</body>\n    </body>", "</body></frame>\n    </body>"), arm(lower={"position": (-0.05,
             0.0, -0.5)} | turned(("z", 90))), ".//frame", "A <frame> moves what stands in it.",
@@ -405,7 +408,7 @@ def _inertias() -> list[Feature]:
             head='<default><geom density="500"/></default>'),
         of("shape of a class", '<geom name="g"/>', weighing(of_shape("box", (0.05, 0.1, 0.15))),
             ".//default/geom[@size]", head='<default><geom type="box" size=".05 .1 .15"/></default>'),
-        of("type of geom not given", '<geom size=".1" pos="0 0 -.1"/>', weighing(ball)),
+        of("type of geom not given", '<geom size=".1" pos="0 0 -.1"/>', weighing(ball), ".//body/geom!@type"),
         of("two geoms",
             '<geom type="sphere" size=".1" pos="0 0 -.1"/><geom type="box" size=".05 .1 .15" pos="0 .2 0"/>',
             weighing(ball, box), ".//body/geom[2]"),
@@ -528,11 +531,11 @@ def _rows() -> list[Feature]:
             rule="Equalities hold from the start.",
         )
 
-    def driven(name: str, actuator: str, finds: str, joint: str = "elbow") -> Feature:
+    def driven(name: str, actuator: str, finds: str, **more: Any) -> Feature:
         return _written(
             name,
             mjcf(tail=f"<actuator>{actuator}</actuator>"),
-            arm(actuators=(Actuator(name="m", joint=joint, gear=(1.0,)),)),
+            arm(actuators=(Actuator(name="m", joint="elbow", gear=(1.0,), **more),)),
             finds,
             about=("actuators",),
             rule="An actuator acts on a joint by its name.",
@@ -543,19 +546,23 @@ def _rows() -> list[Feature]:
     both = '<tendon><fixed name="t"><joint joint="shoulder" coef="1"/><joint joint="elbow" coef="2"/></fixed></tendon>'
     return [
         row("points of two bodies", '<connect name="c" body1="lower" body2="upper" anchor="0 0 -.3"/>', Loop(name="c",
-            type="connect", first="lower", second="upper"), ".//connect[@body1]"),
+            type="connect", first="lower", second="upper", first_position=(0.0, 0.0, -0.3),
+            second_position=(0.0, 0.05, -0.7)), ".//connect[@body1]"),
         row("point of the world", '<connect name="c" body1="lower" anchor="0 0 -.3"/>', Loop(name="c", type="connect",
-            first="lower"), ".//connect[@body1]"),
+            first="lower", first_position=(0.0, 0.0, -0.3), second_position=(0.1, 0.25, 0.3)), ".//connect[@body1]"),
         row("two frames", '<weld name="c" body1="lower" body2="upper"/>', Loop(name="c", type="weld", first="lower",
-            second="upper"), ".//weld[@body1]"),
+            second="upper", first_position=(0.0, -0.05, 0.4)), ".//weld[@body1]"),
         row("coupled joints", '<joint name="c" joint1="elbow" joint2="shoulder" polycoef="0 2 0 0 0"/>', Loop(name="c",
-            type="joint", first="elbow", second="shoulder"), "equality/joint"),
+            type="joint", first="elbow", second="shoulder", polynomial=(0.0, 2.0, 0.0, 0.0, 0.0)), "equality/joint"),
         row("fixed joint by an equality", '<joint name="c" joint1="elbow"/>', Loop(name="c", type="joint",
             first="elbow"), "equality/joint"),
         driven("motor", '<motor name="m" joint="elbow"/>', ".//motor"),
-        driven("position servo", '<position name="m" joint="elbow" kp="10"/>', ".//position"),
-        driven("velocity servo", '<velocity name="m" joint="elbow" kv="2"/>', ".//velocity"),
-        driven("general actuator", '<general name="m" joint="elbow" gainprm="10"/>', ".//general"),
+        driven("position servo", '<position name="m" joint="elbow" kp="10"/>', ".//position", gain=(10.0, 0.0, 0.0),
+            bias=(0.0, -10.0, 0.0)),
+        driven("velocity servo", '<velocity name="m" joint="elbow" kv="2"/>', ".//velocity", gain=(2.0, 0.0, 0.0),
+            bias=(0.0, 0.0, -2.0)),
+        driven("general actuator", '<general name="m" joint="elbow" gainprm="10"/>', ".//general",
+            gain=(10.0, 0.0, 0.0)),
         _written("actuator on a tendon", mjcf(tail=both + '<actuator><motor name="m" tendon="t"/></actuator>'),
             arm(tendons=(tendon,), actuators=(Actuator(name="m", tendon="t", gear=(1.0,)),)),
             ".//motor[@tendon] | .//general[@tendon]", about=("actuators",), rule="A fixed tendon is a sum of joints.",
@@ -620,7 +627,7 @@ def _urdf() -> list[Feature]:
         of("floating joint", urdf(shoulder=urdf_joint("shoulder", "base", "upper", UPPER_AT, "floating")),
             urdf_arm(shoulder={"type": "free", **free}, base=False), "joint[@type='floating']",
             "A floating joint has six degrees of freedom.", about=("coordinates", "inertia")),
-        of("axis not given", urdf(elbow=elbow(LOWER_AT)), plain, rule="A joint without axis has 1 0 0.",
+        of("axis not given", urdf(elbow=elbow(LOWER_AT)), plain, "joint!axis", rule="A joint without axis has 1 0 0.",
             rewrite="Write the axis."),
         of("axis not of length 1", urdf(elbow=elbow(LOWER_AT + '<axis xyz="3 0 4"/>')), urdf_arm(elbow={"axis": (0.6,
             0.0, 0.8)}), rule="An axis is brought to length 1.", rewrite="Write axes of length 1."),

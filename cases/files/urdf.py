@@ -105,6 +105,28 @@ def findings(path: Path) -> list[str]:
     return told
 
 
+PLANAR = ("_TX", "_TY", "_RZ")
+"""What MuJoCo's compiler puts behind the name of a planar joint for the three that it makes of it."""
+
+
+def planar(path: Path) -> list[str]:
+    """Return the names of the planar joints."""
+    return [joint.get("name", "") for joint in parsed(path).findall("joint") if joint.get("type") == "planar"]
+
+
+def bounds(path: Path) -> dict[str, tuple[float, float]]:
+    """Return lowest and highest coordinate of every joint that is bounded: 0 where a <limit> does not say them.
+
+    The compiler takes bounds that are alike for none.
+    """
+    found = {}
+    for joint in parsed(path).findall("joint"):
+        name, limit = joint.get("name", ""), joint.find("limit")
+        if joint.get("type") in ("revolute", "prismatic") and limit is not None:
+            found[name] = (_number(name, limit, "lower"), _number(name, limit, "upper"))
+    return found
+
+
 def inertial(link: ElementTree.Element) -> tuple[float, Floats, Floats]:
     """Return mass, centre (3,) and inertia about it (3, 3), in the link's axes."""
     own = link.find("inertial")

@@ -1,9 +1,10 @@
 """What an engine's own reader makes of a robot file: one module an importer, each run in a process of its own.
 
-A module has `FORMATS` (of "mjcf" and "urdf"), `PACKAGE` (what has to be installed), `MODULE` (what is imported of it)
-and `open_robot(path, urdf)`, which returns a `Robot`. It is loaded by its path where crossbody may not be installed, so
-it imports nothing of ours, and its engine only inside its functions: CROSSBODY_PYTHON_NEWTON=/path/to/python names the
-interpreter of the importer newton, where that is not this one.
+A module has `FORMATS` (of "mjcf" and "urdf"), `PACKAGE` (what has to be installed), `MODULE` (what is imported of it),
+`TRIED` (first and last version that it was tried with; it may be left out) and `open_robot(path, urdf)`, which returns
+a `Robot`. It is loaded by its path where crossbody may not be installed, so it imports nothing of ours, and its engine
+only inside its functions: CROSSBODY_PYTHON_NEWTON=/path/to/python names the interpreter of the importer newton, where
+that is not this one.
 """
 
 from __future__ import annotations
@@ -15,20 +16,27 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.errors import UnknownName
+from crossbody.cases.errors import InvalidValue, UnknownName
 from crossbody.cases.registry import Registry
 
 REGISTRY = Registry("importer", __name__, hidden=("process",))
 SECONDS, BYTES = 20.0, 3 << 30
 """What an importer may take: time, s, and memory, bytes."""
+GRACE = 2.0
+"""What it has in any case when its job is there, s: it may have waited for that."""
 TOLD = 100_000
 """Bytes of what an importer says that are read."""
+WITHOUT = {"exudyn": " (its LoadURDFrobot is roboticstoolbox's)", "pymunk": "", "reference": ": it is the yardstick"}
+"""Engines that there is nothing to ask."""
 PROCESS = Path(__file__).parent / "process.py"
 
 
@@ -41,10 +49,13 @@ class Robot(Protocol):
             is compared by name alone), first position and first velocity.
         free, ball: conventions of their coordinates, of those in `process.CONVENTIONS`.
         nq, nv: numbers of positions and of velocities.
-        numbers: quantity (armature, damping, stiffness, rest, lower, upper, friction) -> joint -> one number or more.
+        numbers: quantity (of `compare.NUMBERS`) -> joint -> one number, or one a velocity.
         actuators: which joints each moves.
-        loops: number of equalities.
+        loops: of every equality its type (connect, weld, joint; empty where the engine tells their number alone), the
+            two joints of one of joints, the coefficients of its polynomial.
+        tendons: damping, stiffness, friction loss, rest and range of each.
         hidden: quantity -> why this engine does not have it.
+        unseen: quantity -> why what it has of it cannot be looked at.
         precision: what rounding is to it, of the largest entry.
     """
 
@@ -56,8 +67,10 @@ class Robot(Protocol):
     nv: int
     numbers: Mapping[str, Mapping[str, Sequence[float]]]
     actuators: Mapping[str, Sequence[str]]
-    loops: int
+    loops: Sequence[tuple[str, Sequence[str], Sequence[float]]]
+    tendons: Mapping[str, Sequence[float]]
     hidden: Mapping[str, str]
+    unseen: Mapping[str, str]
     precision: float
 
     def place(self, q: Floats, v: Floats) -> None:
@@ -74,6 +87,24 @@ class Robot(Protocol):
 
     def frames(self) -> Mapping[str, tuple[Floats, Floats]]:
         """Return origin (3,), m, and rotation (3, 3) of every body."""
+
+    def ends(self) -> Sequence[Sequence[tuple[Floats, Floats]]]:
+        """Return of every loop the two frames whose origins (connect) or which (weld) it holds together, or none."""
+
+    def drives(self) -> tuple[Mapping[str, Floats], Floats]:
+        """Return the force (nv,) of each actuator for one of its control, and of all of them at no control."""
+
+    def lengths(self) -> Mapping[str, float]:
+        """Return the length of every tendon."""
+
+    def shapes(self) -> Sequence[tuple[str, str, str, Sequence[float], Floats, Floats, Floats]]:
+        """Return of every shape that may touch: name, kind, joint that moves it, and what else `process.bounds` needs.
+
+        That is size, points, and where it stands: origin (3,) and rotation (3, 3).
+        """
+
+    def contacts(self) -> Sequence[tuple[int, int]]:
+        """Return which of these may touch each other, by their numbers."""
 
     def inertias(self) -> Sequence[tuple[str, float, Floats, Floats]]:
         """Return of every body: joint that moves it, mass, kg, centre (3,), inertia about it (3, 3); world axes."""
@@ -95,9 +126,10 @@ class Reading:
         self.python = os.environ.get(f"CROSSBODY_PYTHON_{name.upper()}", sys.executable)
         self.formats = tuple(module.FORMATS)
         self._files = tempfile.TemporaryDirectory(prefix="crossbody-reading-")
-        self._out, self._told = (Path(self._files.name) / kind for kind in ("answer.json", "told.txt"))
-        kind = "urdf" if urdf else "mjcf"
+        self._out, self._told = (Path(self._files.name) / kind for kind in ("answers", "told.txt"))
+        kind, self._began = ("urdf" if urdf else "mjcf"), time.monotonic()
         self._process = self._started(str(module.__file__), str(path.resolve()), kind)
+        self._there = self.python != sys.executable or find_spec(module.MODULE) is not None
 
     def _started(self, *words: str) -> subprocess.Popen[bytes] | None:
         """Return the process, which ends with this one; None for a format that it has no reader for."""
@@ -120,28 +152,44 @@ class Reading:
         Args:
             job: `joints` (name, body, kind) in the order of the coordinates, and `states`, each with `q` and `v`.
         """
+        return self.answers([job])[0]
+
+    def answers(self, jobs: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Return an answer a job, up to the first one that ended the process; all but the first name their `file`."""
         with self._files:
             if self._process is None:
-                said = self._told.read_text(encoding="utf-8") if self._told.exists() else ""
-                why = said or f"{self.name} reads no files of this format; valid: {', '.join(self.formats)}."
-                return {"status": "failed" if said else "unsupported", "told": [], "why": why}
-            why = self._waited(self._process, json.dumps(job).encode())
+                return [self._without()] * len(jobs)
+            why = self._waited(self._process, "".join(json.dumps(job) + "\n" for job in jobs).encode())
             found = _loaded(self._out)
-            told = _lines(self._told)
-        if found is None:
-            found = {"status": "failed", "why": why or "It ended without an answer."}
-        if found["status"] == "failed" and told:
-            found["why"] = f"{found['why']} ({told[-1]})"
-        return found | {"told": told}
+            if len(found) < len(jobs):
+                begin = found[-1]["to"] if found else 0
+                found.append({"status": "failed", "why": why or "It ended without an answer.", "from": begin})
+            for one in found:
+                one["told"] = _lines(self._told, one["from"], one.get("to", -1))
+                one["error"] = one.get("why", "")
+                if one["status"] == "failed" and one["told"]:
+                    one["why"] = f"{one['why']} ({one['told'][-1]})"
+                if one["status"] == "failed" and one.get("strange"):
+                    one["why"] = f"{one['why']} {one['strange']}"
+        return found
 
-    def _waited(self, process: subprocess.Popen[bytes], job: bytes) -> str:
+    def _without(self) -> dict[str, Any]:
+        """Return the answer of a process that there is not."""
+        why = self._told.read_text(encoding="utf-8") if self._told.exists() else ""
+        status = "failed" if why else "unsupported"
+        if not self._there:
+            status, why = "absent", f"It needs the package {self.package}, which is not installed."
+        return {
+            "status": status, "told": [],
+            "why": why or f"{self.name} reads no files of this format; valid: {', '.join(self.formats)}.",
+        }  # fmt: skip
+
+    def _waited(self, process: subprocess.Popen[bytes], jobs: bytes) -> str:
         """Return why the process did not come to its end; empty where it did."""
         try:
-            process.communicate(job, timeout=self.seconds)
+            self._talked(process, jobs)
         except subprocess.TimeoutExpired:
             return f"It did not come back within {self.seconds:g} s and was ended."
-        except BrokenPipeError:
-            pass
         finally:
             self._kill()
         number = -process.returncode
@@ -149,6 +197,21 @@ class Reading:
             return ""
         name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
         return f"Its process was ended by {name}."
+
+    def _talked(self, process: subprocess.Popen[bytes], jobs: bytes) -> None:
+        """Give the jobs, and wait as long as there is an answer in the time that one may take."""
+        left = max(self.seconds - (time.monotonic() - self._began), min(self.seconds, GRACE))
+        sender = threading.Thread(target=_given, args=(process, jobs), daemon=True)
+        sender.start()
+        answers = -1
+        while True:
+            try:
+                process.wait(left)
+                return
+            except subprocess.TimeoutExpired:
+                before, answers, left = answers, len(_loaded(self._out)), self.seconds
+                if answers <= max(before, 0):
+                    raise
 
     def abandon(self) -> None:
         """End the process, whose answer is not wanted."""
@@ -160,23 +223,41 @@ class Reading:
         if self._process is not None:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(self._process.pid, signal.SIGKILL)
-            with suppress(OSError):
+            with suppress(OSError, ValueError):
                 self._process.stdin.close() if self._process.stdin is not None else None
             self._process.wait()
 
 
-def _loaded(path: Path) -> dict[str, Any] | None:
+def answers(
+    name: str, files: Sequence[Path], urdf: bool, jobs: Sequence[Mapping[str, Any]], seconds: float = SECONDS
+) -> list[dict[str, Any]]:
+    """Return what an importer makes of files, one process behind another only where one of them ends it."""
+    told: list[dict[str, Any]] = []
+    named = [{"file": str(path.resolve())} | dict(job) for path, job in zip(files, jobs, strict=True)]
+    while len(told) < len(files):
+        told += Reading(name, files[len(told)], urdf, seconds).answers(named[len(told) :])
+    return told
+
+
+def _given(process: subprocess.Popen[bytes], jobs: bytes) -> None:
+    with suppress(OSError, ValueError):
+        if process.stdin is not None:
+            process.stdin.write(jobs)
+            process.stdin.close()
+
+
+def _loaded(path: Path) -> list[dict[str, Any]]:
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     except (OSError, ValueError):
-        return None
-    return found
+        return []
 
 
-def _lines(path: Path) -> list[str]:
-    """Return what was said, each line once, without the colours of a terminal."""
+def _lines(path: Path, begin: int, end: int) -> list[str]:
+    """Return what was said between two bytes, each line once, without the colours of a terminal."""
     with path.open("rb") as file:
-        text = file.read(TOLD).decode(errors="replace")
+        file.seek(begin)
+        text = file.read(min(TOLD, end - begin) if end >= 0 else TOLD).decode(errors="replace")
     plain = re.sub(r"\x1b\[[0-9;]*m", "", text)
     return list(dict.fromkeys(line.strip() for line in plain.splitlines() if line.strip()))
 
@@ -191,8 +272,11 @@ def known(wanted: Sequence[str]) -> tuple[str, ...]:
 
     Raises:
         UnknownName: for one that there is not.
+        InvalidValue: for an engine that reads no robot files.
     """
     for name in wanted:
+        if name in WITHOUT and name not in names():
+            raise InvalidValue(f"{name} has no reader of robot files of its own{WITHOUT[name]}.")
         if name not in names():
             raise UnknownName("importer", name, names())
     return tuple(dict.fromkeys(wanted)) or names()

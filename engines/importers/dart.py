@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "dartpy", "dartpy"
+TRIED = ("6.20", "6.20")
 KINDS = {"FreeJoint": "free", "BallJoint": "ball", "RevoluteJoint": "hinge", "PrismaticJoint": "slide"}
 
 
@@ -14,14 +15,19 @@ class _Robot:
     free, ball = "rotation vector, p; world, world", "rotation vector; body"
     hidden = {  # noqa: RUF012
         "armature": "DART's joints have no armature.", "actuators": "DART's reader makes no actuators of a file.",
+        "damping v|v|": "DART's dampers are linear.", "damping v^3": "DART's dampers are linear.",
+        "stiffness x^2": "DART's springs are linear.", "stiffness x^3": "DART's springs are linear.",
+        "tendons": "DART has no tendons.",
     }  # fmt: skip
+    unseen: dict[str, str] = {}  # noqa: RUF012
+    tendons: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 0.0
-    loops = 0
 
     def __init__(self, path: str, urdf: bool) -> None:
         import dartpy
 
         self.version = dartpy.__version__
+        loops = 0
         if urdf:
             options = dartpy.utils.DartLoaderOptions(defaultRootJointType=dartpy.utils.DartLoaderRootJointType.FIXED)
             loader = dartpy.utils.DartLoader()
@@ -35,10 +41,13 @@ class _Robot:
                 raise ValueError("DART's reader returns nothing")
             self._s = [world.getSkeleton(i) for i in range(world.getNumSkeletons())]
             gravity = world.getGravity()
-            self.loops = world.getConstraintSolver().getNumConstraints() if world.getNumSkeletons() else 0
+            loops = world.getConstraintSolver().getNumConstraints() if world.getNumSkeletons() else 0
             self._world = world
         if not self._s:
             raise ValueError("DART's reader returns nothing")
+        bound = (s.getJoint(i) for s in self._s for i in range(s.getNumJoints()))
+        loops += sum(joint.getActuatorType() == dartpy.dynamics.ActuatorType.MIMIC for joint in bound)
+        self.loops: Any = [("", [], [])] * loops
         self.joints, self._joints = [], []
         self.nq = 0
         for s in self._s:
@@ -59,6 +68,8 @@ class _Robot:
             self.nq += s.getNumDofs()
         self.nv = self.nq
         self.actuators: dict[str, list[str]] = {}
+        if any(node.getShape().getType() == "MeshShape" for _, node in self._solids()):
+            self.unseen = {"shapes": "DART's Python does not show the corners of meshes."}
         self.numbers = self._numbers()
 
     def _numbers(self) -> dict[str, dict[str, Any]]:
@@ -68,13 +79,13 @@ class _Robot:
             if n > 1 or (bounds == (0.0, 0.0) and not j.areLimitsEnforced()):
                 bounds = (-np.inf, np.inf)
             values = {
-                "damping": j.getDampingCoefficient(0), "friction": j.getCoulombFriction(0),
-                "stiffness": j.getSpringStiffness(0),
+                "damping": [j.getDampingCoefficient(k) for k in range(n)],
+                "friction": [j.getCoulombFriction(k) for k in range(n)], "stiffness": j.getSpringStiffness(0),
                 "rest": j.getRestPosition(0) if n == 1 and j.getSpringStiffness(0) else 0.0,
                 "lower": bounds[0], "upper": bounds[1],
             }  # fmt: skip
             for key, value in values.items():
-                told.setdefault(key, {})[j.getName()] = [float(value)]
+                told.setdefault(key, {})[j.getName()] = np.atleast_1d(value).astype(float).tolist()
         return told
 
     def place(self, q: Any, v: Any) -> None:
@@ -120,19 +131,67 @@ class _Robot:
         placed = {b.getName(): b.getWorldTransform() for b in bodies}
         return {name: (np.array(X.translation()), np.array(X.rotation())) for name, X in placed.items()}
 
+    def ends(self) -> Any:
+        return [[] for _ in self.loops]
+
+    def _solids(self) -> Any:
+        bodies = [s.getBodyNode(i) for s in self._s for i in range(s.getNumBodyNodes())]
+        nodes = [(body, body.getShapeNode(k)) for body in bodies for k in range(body.getNumShapeNodes())]
+        return [(body, node) for body, node in nodes if node.hasCollisionAspect()]
+
+    def shapes(self) -> Any:
+        told = []
+        for body, node in self._solids():
+            X, (kind, size, points) = node.getWorldTransform(), _solid(node.getShape())
+            told.append(
+                (node.getName(), kind, _mover(body), size, points, np.array(X.translation()), np.array(X.rotation()))
+            )
+        return told
+
+    def contacts(self) -> Any:
+        """Of one skeleton its bodies meet where it says so, those of one joint where it says that too."""
+        bodies, found = [body for body, _ in self._solids()], []
+        for i, a in enumerate(bodies):
+            for j, b in enumerate(bodies[i + 1 :], start=i + 1):
+                s, near = a.getSkeleton(), a.getParentBodyNode() == b or b.getParentBodyNode() == a
+                own = s == b.getSkeleton()
+                fixed = not (s.getNumDofs() or b.getSkeleton().getNumDofs())
+                if a != b and not fixed and (not own or (
+                    s.isEnabledSelfCollisionCheck() and (s.isEnabledAdjacentBodyCheck() or not near)
+                )):  # fmt: skip
+                    found.append((i, j))
+        return found
+
     def inertias(self) -> Any:
         told = []
         for s in self._s:
             for b in (s.getBodyNode(i) for i in range(s.getNumBodyNodes())):
-                joint = b.getParentJoint()
-                while not joint.getNumDofs() and joint.getParentBodyNode() is not None:
-                    joint = joint.getParentBodyNode().getParentJoint()
-                if joint.getNumDofs():
+                if joint := _mover(b):
                     X, own = b.getWorldTransform(), b.getInertia()
                     R, mass, c = np.array(X.rotation()), float(b.getMass()), np.array(own.getLocalCOM())
                     J = np.array(own.getMoment())
-                    told.append((joint.getName(), mass, X.translation() + R @ c, R @ J @ R.T))
+                    told.append((joint, mass, X.translation() + R @ c, R @ J @ R.T))
         return told
+
+
+def _mover(body: Any) -> str:
+    """Return the joint that moves a body; none of what stands on the world."""
+    joint = body.getParentJoint()
+    while not joint.getNumDofs() and joint.getParentBodyNode() is not None:
+        joint = joint.getParentBodyNode().getParentJoint()
+    return str(joint.getName()) if joint.getNumDofs() else ""
+
+
+def _solid(shape: Any) -> tuple[str, list[float], Any]:
+    """Return kind, sizes as MuJoCo's, and corners of one of DART's shapes."""
+    kind, none = shape.getType().removesuffix("Shape").lower(), np.zeros((0, 3))
+    if kind == "box":
+        return kind, [float(x) / 2 for x in shape.getSize()], none
+    if kind == "ellipsoid":
+        return kind, [float(x) for x in shape.getRadii()], none
+    if kind in ("sphere", "capsule", "cylinder"):
+        return kind, [shape.getRadius(), *([] if kind == "sphere" else [shape.getHeight() / 2])], none
+    return kind, [], none
 
 
 def open_robot(path: str, urdf: bool) -> _Robot:

@@ -6,18 +6,21 @@ from typing import Any
 
 import numpy as np
 
-FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "mujoco", "mujoco"
+FORMATS, PACKAGE, MODULE, TRIED = ("mjcf", "urdf"), "mujoco", "mujoco", ("4.0", "4.0")
 KINDS = ("free", "ball", "slide", "hinge")
+SHAPES = ("plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
+FUSED = "MuJoCo's compiler makes links of a URDF that no joint moves one with what they stand on (fusestatic)."
 
 
 class _Robot:
     free = ball = "mujoco"
-    hidden: dict[str, str] = {}  # noqa: RUF012
+    unseen: dict[str, str] = {}  # noqa: RUF012
     precision = 0.0
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, urdf: bool) -> None:
         import mujoco
 
+        self.hidden = {"bodies": FUSED} if urdf else {}
         self._lib = mujoco
         self.version = mujoco.__version__
         self._m = m = mujoco.MjModel.from_xml_path(path)
@@ -31,20 +34,26 @@ class _Robot:
         ]
         self.numbers = self._numbers()
         self.actuators = {m.actuator(i).name or f"actuator{i}": self._moved(i) for i in range(m.nu)}
-        self.loops = int(sum(m.eq_active0))
+        self._loops = [i for i in range(m.neq) if m.eq_active0[i]]
+        self.loops = [self._loop(i) for i in self._loops]
+        self._tendons = [m.tendon(i).name or f"tendon{i}" for i in range(m.ntendon)]
+        self.tendons = {name: self._tendon(i) for i, name in enumerate(self._tendons)}
 
     def _numbers(self) -> dict[str, dict[str, Any]]:
         m, told = self._m, dict[str, dict[str, Any]]()
         for i, (name, _, kind, at, dof) in enumerate(self.joints):
-            single = kind in ("slide", "hinge")
+            single, dofs = kind in ("slide", "hinge"), slice(dof, dof + {"free": 6, "ball": 3}.get(kind, 1))
             bounds = m.jnt_range[i] if m.jnt_limited[i] else (-np.inf, np.inf)
+            stiff, here = [m.jnt_stiffness[i], *m.jnt_stiffnesspoly[i]], slice(at, at + 1 if single else at)
             values = {
-                "armature": m.dof_armature[dof], "damping": m.dof_damping[dof], "friction": m.dof_frictionloss[dof],
-                "stiffness": m.jnt_stiffness[i], "rest": m.qpos_spring[at] if single and m.jnt_stiffness[i] else 0.0,
-                "lower": bounds[0] if single else -np.inf, "upper": bounds[1],
+                "armature": m.dof_armature[dofs], "friction": m.dof_frictionloss[dofs],
+                "damping": m.dof_damping[dofs] + self._damped(i), "damping v|v|": m.dof_dampingpoly[dofs, 0],
+                "damping v^3": m.dof_dampingpoly[dofs, 1], "stiffness": stiff[0], "stiffness x^2": stiff[1],
+                "stiffness x^3": stiff[2], "rest": m.qpos_spring[here if kind != "ball" else slice(at, at + 4)]
+                if any(stiff) else (), "lower": bounds[0] if single else -np.inf, "upper": bounds[1],
             }  # fmt: skip
             for key, value in values.items():
-                told.setdefault(key, {})[name] = [float(value)]
+                told.setdefault(key, {})[name] = np.atleast_1d(value).astype(float).tolist()
         return told
 
     def _moved(self, i: int) -> list[str]:
@@ -55,6 +64,92 @@ class _Robot:
                 self.joints[m.wrap_objid[k]][0] for k in wrapped if m.wrap_type[k] == self._lib.mjtWrap.mjWRAP_JOINT
             ]
         return [self.joints[to][0]] if kind == self._lib.mjtTrn.mjTRN_JOINT else []
+
+    def _damped(self, joint: int) -> float:
+        """Return what actuators add to the damping of a joint."""
+        m = self._m
+        own = (m.actuator_trntype == int(self._lib.mjtTrn.mjTRN_JOINT)) & (m.actuator_trnid[:, 0] == joint)
+        return float((m.actuator_gear[own, 0] ** 2 * m.actuator_damping[own]).sum())
+
+    def _loop(self, i: int) -> tuple[str, list[str], list[float]]:
+        m, kind = self._m, self._lib.mjtEq(self._m.eq_type[i]).name.removeprefix("mjEQ_").lower()
+        names = {"joint": [joint[0] for joint in self.joints], "tendon": [m.tendon(k).name for k in range(m.ntendon)]}
+        if kind not in names:
+            return kind, [], []
+        return kind, [names[kind][k] for k in (m.eq_obj1id[i], m.eq_obj2id[i]) if k >= 0], m.eq_data[i, :5].tolist()
+
+    def ends(self) -> Any:
+        m, d, told = self._m, self._d, list[Any]()
+        for i, (kind, *_) in zip(self._loops, self.loops, strict=True):
+            one, two, data = m.eq_obj1id[i], m.eq_obj2id[i], m.eq_data[i]
+            if kind not in ("connect", "weld"):
+                told.append([])
+            elif m.eq_objtype[i] == int(self._lib.mjtObj.mjOBJ_SITE):
+                told.append([(d.site_xpos[k], d.site_xmat[k].reshape(3, 3)) for k in (one, two)])
+            else:
+                welded = kind == "weld"
+                places, turn = ((data[3:6], data[:3]) if welded else (data[:3], data[3:6])), np.zeros(9)
+                self._lib.mju_quat2Mat(turn, data[6:10] if welded else np.array([1.0, 0.0, 0.0, 0.0]))
+                frames = [(d.xpos[k], d.xmat[k].reshape(3, 3)) for k in (one, two)]
+                turns = (turn.reshape(3, 3), np.eye(3))
+                told.append([(p + R @ at, R @ by) for (p, R), at, by in zip(frames, places, turns, strict=True)])
+        return told
+
+    def _tendon(self, i: int) -> list[float]:
+        m = self._m
+        bounds = m.tendon_range[i] if m.tendon_limited[i] else (-np.inf, np.inf)
+        parts = (m.tendon_damping[i], m.tendon_dampingpoly[i], m.tendon_stiffness[i], m.tendon_stiffnesspoly[i],
+                 m.tendon_frictionloss[i], m.tendon_lengthspring[i], bounds)  # fmt: skip
+        return [float(x) for part in parts for x in np.atleast_1d(part)]
+
+    def lengths(self) -> Any:
+        return dict(zip(self._tendons, self._d.ten_length.tolist(), strict=True))
+
+    def drives(self) -> Any:
+        """Forces by gears, gains and biases alone: no bound of a control or force, no activation."""
+        m, d = self._m, self._d
+        moments, gain, held = np.zeros((m.nu, m.nv)), m.actuator_gainprm, np.zeros(m.nv)
+        self._lib.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
+        fixed, none = m.actuator_gaintype == int(self._lib.mjtGain.mjGAIN_FIXED), int(self._lib.mjtBias.mjBIAS_NONE)
+        motion = np.column_stack([np.ones(m.nu), d.actuator_length, d.actuator_velocity])
+        factors = np.where(fixed, gain[:, 0], (gain[:, :3] * motion).sum(axis=1))
+        held = ((m.actuator_biasprm[:, :3] * motion).sum(axis=1) * (m.actuator_biastype != none)) @ moments
+        return dict(zip(self.actuators, factors[:, None] * moments, strict=True)), held
+
+    def shapes(self) -> Any:
+        m, d, told = self._m, self._d, []
+        for i in self._touching():
+            kind, mesh = SHAPES[m.geom_type[i]] if m.geom_type[i] < len(SHAPES) else "other", m.geom_dataid[i]
+            first = m.mesh_vertadr[mesh] if kind == "mesh" else 0
+            points = m.mesh_vert[first : first + m.mesh_vertnum[mesh]] if kind == "mesh" else np.zeros((0, 3))
+            place = (d.geom_xpos[i].copy(), d.geom_xmat[i].reshape(3, 3).copy())
+            name, joint = m.geom(i).name or f"shape{i}", self._mover(m.geom_bodyid[i])
+            told.append((name, kind, joint, m.geom_size[i], points, *place))
+        return told
+
+    def _touching(self) -> list[int]:
+        m = self._m
+        paired = {*m.pair_geom1.tolist(), *m.pair_geom2.tolist()}
+        return [i for i in range(m.ngeom) if m.geom_contype[i] or m.geom_conaffinity[i] or i in paired]
+
+    def contacts(self) -> Any:
+        m, at = self._m, {geom: k for k, geom in enumerate(self._touching())}
+        if m.opt.disableflags & int(self._lib.mjtDisableBit.mjDSBL_CONTACT):
+            return []
+        moved, out = m.body_weldid[m.geom_bodyid], {int(one) for one in m.exclude_signature}
+        above = m.body_weldid[m.body_parentid[moved]]
+        found = {tuple(sorted(pair)) for pair in zip(m.pair_geom1.tolist(), m.pair_geom2.tolist(), strict=True)}
+        filtered = not m.opt.disableflags & int(self._lib.mjtDisableBit.mjDSBL_FILTERPARENT)
+        for i in at:
+            for j in range(i + 1, m.ngeom):
+                a, b = sorted((int(m.geom_bodyid[i]), int(m.geom_bodyid[j])))
+                near = moved[i] == above[j] or moved[j] == above[i]
+                if (m.geom_contype[i] & m.geom_conaffinity[j] or m.geom_contype[j] & m.geom_conaffinity[i]) and not (
+                    moved[i] == moved[j] or (filtered and near and moved[i] and moved[j]) or (a << 16) + b in out
+                    or (b << 16) + a in out
+                ):  # fmt: skip
+                    found.add((i, j))
+        return [(at[i], at[j]) for i, j in found]
 
     def place(self, q: Any, v: Any) -> None:
         self._d.qpos[:], self._d.qvel[:] = q, v
@@ -83,17 +178,20 @@ class _Robot:
         d = self._d
         return {name: (np.array(d.xpos[i]), d.xmat[i].reshape(3, 3)) for i, name in enumerate(self._bodies) if i}
 
+    def _mover(self, body: int) -> str:
+        """Return the joint that moves a body; none of what stands on the world."""
+        m, moved = self._m, self._m.body_weldid[body]
+        return self.joints[m.body_jntadr[moved] + m.body_jntnum[moved] - 1][0] if m.body_jntnum[moved] else ""
+
     def inertias(self) -> Any:
         m, d, told = self._m, self._d, []
         for i in range(1, m.nbody):
-            moved = m.body_weldid[i]
-            if m.body_jntnum[moved]:
+            if joint := self._mover(i):
                 R = d.ximat[i].reshape(3, 3)
-                joint = self.joints[m.body_jntadr[moved] + m.body_jntnum[moved] - 1][0]
                 told.append((joint, float(m.body_mass[i]), np.array(d.xipos[i]), R @ np.diag(m.body_inertia[i]) @ R.T))
         return told
 
 
 def open_robot(path: str, urdf: bool) -> _Robot:
     """Return what MuJoCo makes of a file; its compiler reads both formats."""
-    return _Robot(path)
+    return _Robot(path, urdf)

@@ -8,13 +8,21 @@ from typing import Any
 import numpy as np
 
 FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "newton", "newton"
+TRIED = ("1.8", "1.8")
 KINDS = {0: "slide", 1: "hinge", 2: "ball", 4: "free"}
 FIXED = 3
+SHAPES = ("", "plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "cone", "mesh")
+COLLIDES = 2
 
 
 class _Robot:
     free, ball = "p, xyzw; world, world", "xyzw; parent"
-    hidden = {"energy": "Newton tells no energy."}  # noqa: RUF012
+    hidden = {  # noqa: RUF012
+        "damping v|v|": "Newton's dampers are linear.", "damping v^3": "Newton's dampers are linear.",
+        "stiffness x^2": "Newton's springs are linear.", "stiffness x^3": "Newton's springs are linear.",
+    }  # fmt: skip
+    unseen = {"energy": "Newton tells no energy.", "tendons": "Newton keeps tendons for its MuJoCo solver alone."}  # noqa: RUF012
+    tendons: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 2e-4
 
     def __init__(self, path: str, urdf: bool) -> None:
@@ -37,13 +45,8 @@ class _Robot:
         kinds, self._child, at, first = (
             getattr(m, f"joint_{key}").numpy() for key in ("type", "child", "q_start", "qd_start")
         )
-        self._up = dict(
-            zip(
-                self._child.tolist(),
-                zip(m.joint_parent.numpy().tolist(), kinds.tolist(), last, strict=True),
-                strict=True,
-            )
-        )
+        ups = zip(self._child.tolist(), m.joint_parent.numpy().tolist(), kinds.tolist(), last, loops, strict=True)
+        self._up = {child: (parent, kind, name) for child, parent, kind, name, closes in ups if not closes}
         dofs = np.diff([*first[: m.joint_count], self.nv])
         self._frees = []
         self.joints = []
@@ -69,10 +72,89 @@ class _Robot:
             if kind == "free":
                 self._frees.append((int(first[i]), int(self._child[i])))
         self.actuators: dict[str, list[str]] = {}
-        self.hidden = self.hidden | {"actuators": "Newton's actuators carry no names of the file's."}
-        equalities = getattr(m.mujoco, "equality_constraint_count", 0) if hasattr(m, "mujoco") else 0
-        self.loops = max(sum(loops) + len(m.constraint_mimic_label), int(equalities))
+        self._motors(named)
+        closing = [i for i, one in enumerate(loops) if one]
+        self._closing = [i for i in closing if kinds[i] in (2, FIXED)]
+        self.loops: Any = [("connect" if kinds[i] == 2 else "weld", [], []) for i in self._closing]
+        self.loops += [("", [], [])] * (len(closing) - len(self._closing))
+        factors = np.zeros((len(m.constraint_mimic_label), 5))
+        if len(factors):
+            pair = m.constraint_mimic_joint0.numpy(), m.constraint_mimic_joint1.numpy()
+            factors[:, :2] = np.column_stack([m.constraint_mimic_coef0.numpy(), m.constraint_mimic_coef1.numpy()])
+            rows = zip(*pair, factors, strict=True)
+            self.loops += [("joint", [last[i], last[j]], row.tolist()) for i, j, row in rows]
+        followed = m.joint_mimic_joint.numpy().tolist()  # how it keeps those of a URDF
+        for i, j in ((i, j) for i, j in enumerate(followed) if j >= 0):
+            self.loops.append(("joint", [last[i], last[j]], [*m.joint_mimic_coeffs.numpy()[i].tolist(), 0.0, 0.0, 0.0]))
         self.numbers = self._numbers()
+
+    def _motors(self, named: dict[str, str]) -> None:
+        """Find the actuators that it keeps for its MuJoCo solver, if all of them act on joints."""
+        own = getattr(self._m, "mujoco", None)
+        self._driven: list[tuple[str, int, Any, Any]] = []
+        labels = list(getattr(own, "actuator_label", []))
+        if not labels:
+            return
+        kept = [getattr(own, f"actuator_{key}").numpy() for key in ("trntype", "trnid", "gear", "gainprm", "biasprm")]
+        moved = {joint[4]: joint for joint in self.joints}
+        if kept[0].any() or any(dof not in moved for dof in kept[1][:, 0]):
+            self.unseen = self.unseen | {"actuators": "Newton keeps actuators of tendons for its MuJoCo solver alone."}
+            return
+        for label, dof, gear, gain, bias in zip(labels, *(part for part in kept[1:]), strict=True):
+            name = label.rpartition("/")[2]
+            name = named.get(name, name)
+            self.actuators[name] = [moved[dof[0]][0]]
+            self._driven.append((name, int(dof[0]), gear, (gain, bias)))
+
+    def drives(self) -> Any:
+        driven, held = {}, np.zeros(self.nv)
+        for name, dof, gear, (gain, bias) in self._driven:
+            kind, at = next((joint[2], joint[3]) for joint in self.joints if joint[4] == dof)
+            width = {"free": 6, "ball": 3}.get(kind, 1)
+            moment, scalar = np.zeros(self.nv), width == 1
+            moment[dof : dof + width] = gear[:width]
+            motion = [1.0, gear[0] * self._q[at] if scalar else 0.0, float(moment @ self._v)]
+            driven[name] = moment * float(gain[:3] @ motion)
+            held += moment * float(bias[:3] @ motion)
+        return driven, held
+
+    def _frame(self, i: int) -> Any:
+        return self.frames()[self._bodies[i]] if i >= 0 else (np.zeros(3), np.eye(3))
+
+    def ends(self) -> Any:
+        m, told = self._m, []
+        for i in self._closing:
+            sides = ((m.joint_parent, m.joint_X_p), (m.joint_child, m.joint_X_c))
+            told.append([_behind(self._frame(int(body.numpy()[i])), X.numpy()[i]) for body, X in sides])
+        return told + [[] for _ in self.loops[len(told) :]]
+
+    def _touching(self) -> list[int]:
+        return [i for i, flags in enumerate(self._m.shape_flags.numpy().tolist()) if flags & COLLIDES]
+
+    def shapes(self) -> Any:
+        m, told = self._m, []
+        kinds, scales, bodies, places = (
+            getattr(m, f"shape_{key}").numpy() for key in ("type", "scale", "body", "transform"))  # fmt: skip
+        for i in self._touching():
+            source = m.shape_source[i]
+            points = np.array(source.vertices) * scales[i] if source is not None else np.zeros((0, 3))
+            name, kind = m.shape_label[i].rpartition("/")[2], SHAPES[kinds[i]] if kinds[i] < len(SHAPES) else "other"
+            told.append(
+                (
+                    name,
+                    kind,
+                    self._mover(int(bodies[i])),
+                    scales[i],
+                    points,
+                    *_behind(self._frame(int(bodies[i])), places[i]),
+                )
+            )
+        return told
+
+    def contacts(self) -> Any:
+        at = {shape: k for k, shape in enumerate(self._touching())}
+        pairs = self._m.shape_contact_pairs.numpy().tolist()
+        return [(at[i], at[j]) for i, j in pairs if i in at and j in at]
 
     def _numbers(self) -> dict[str, dict[str, Any]]:
         told: dict[str, dict[str, Any]] = {}
@@ -81,19 +163,22 @@ class _Robot:
             for key in ("armature", "friction", "limit_lower", "limit_upper", "damping", "stiffness")
         }
         for name, _, kind, at, dof in self.joints:
-            single = kind in ("hinge", "slide")
+            single, dofs = kind in ("hinge", "slide"), slice(dof, dof + {"free": 6, "ball": 3}.get(kind, 1))
             values = {
-                **{key: arrays[key][dof] for key in ("armature", "friction", "damping", "stiffness")},
+                **{key: arrays[key][dofs] for key in ("armature", "friction", "damping")},
+                "stiffness": arrays["stiffness"][dof],
                 "rest": float(self._m.joint_rest_q.numpy()[at]) if arrays["stiffness"][dof] else 0.0,
                 "lower": arrays["limit_lower"][dof] if single else -np.inf,
                 "upper": arrays["limit_upper"][dof] if single else np.inf,
             }  # fmt: skip
             for key, value in values.items():
-                told.setdefault(key, {})[name] = [float(np.sign(value) * np.inf if abs(value) > 1e9 else value)]
+                every = np.atleast_1d(value).astype(float)
+                told.setdefault(key, {})[name] = np.where(np.abs(every) > 1e9, np.sign(every) * np.inf, every).tolist()
         return told
 
     def place(self, q: Any, v: Any) -> None:
         wp, m, s = self._wp, self._m, self._s
+        self._q, self._v = q, v
         self._shift = np.eye(self.nv)
         self._turn = np.zeros(self.nv)
         s.joint_q.assign(q.astype(np.float32))
@@ -132,29 +217,37 @@ class _Robot:
 
     def frames(self) -> Any:
         told = {}
-        for name, X in zip(self._bodies, self._s.body_q.numpy().astype(float), strict=True):
-            x, y, z, w = X[3:] / np.linalg.norm(X[3:])
-            R = np.array([
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ])  # fmt: skip
-            told[name] = (X[:3], R)
+        for name, X in zip(self._bodies, self._s.body_q.numpy(), strict=True):
+            told[name] = _behind((np.zeros(3), np.eye(3)), X)
         return told
+
+    def _mover(self, body: int) -> str:
+        """Return the joint that moves a body; none of what stands on the world."""
+        while body in self._up and self._up[body][1] == FIXED:
+            body = self._up[body][0]
+        moved = {name: joint for joint, name, *_ in self.joints}
+        return moved.get(self._bodies[body], "") if body >= 0 else ""
 
     def inertias(self) -> Any:
         m, frames, told = self._m, self.frames(), []
         mass, com, J = m.body_mass.numpy(), m.body_com.numpy().astype(float), m.body_inertia.numpy().astype(float)
-        moved = {body: name for name, body, *_ in self.joints}
         for i, name in enumerate(self._bodies):
-            up = i
-            while up in self._up and self._up[up][1] == FIXED:
-                up = self._up[up][0]
-            joint = moved.get(self._bodies[up]) if up >= 0 else None
-            if joint is not None:
+            if joint := self._mover(i):
                 p, R = frames[name]
                 told.append((joint, float(mass[i]), p + R @ com[i], R @ J[i] @ R.T))
         return told
+
+
+def _behind(frame: Any, X: Any) -> Any:
+    """Return origin and rotation of what stands at p and xyzw in a frame."""
+    X = np.asarray(X, dtype=float)
+    x, y, z, w = X[3:] / np.linalg.norm(X[3:])
+    R = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    return frame[0] + frame[1] @ X[:3], frame[1] @ R
 
 
 def _named(path: str) -> dict[str, str]:

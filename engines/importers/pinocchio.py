@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "pin", "pinocchio"
+TRIED = ("4.1", "4.1")
 NO_SPRINGS = "Pinocchio's model has no springs."
 
 
@@ -26,13 +27,19 @@ def kind_of(name: str) -> str:
 
 class _Robot:
     free, ball = "p, xyzw; body, body", "xyzw; body"
-    hidden = {"stiffness": NO_SPRINGS, "rest": NO_SPRINGS, "actuators": "Pinocchio's model has no actuators."}  # noqa: RUF012
+    hidden = {  # noqa: RUF012
+        "stiffness": NO_SPRINGS, "stiffness x^2": NO_SPRINGS, "stiffness x^3": NO_SPRINGS, "rest": NO_SPRINGS,
+        "damping v|v|": "Pinocchio's dampers are linear.", "damping v^3": "Pinocchio's dampers are linear.",
+        "actuators": "Pinocchio's model has no actuators.", "tendons": "Pinocchio's model has no tendons.",
+    }  # fmt: skip
+    tendons: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         import pinocchio as pin
 
         self._pin = pin
+        self.unseen = {"contacts": "Pinocchio's readers leave the choice of pairs to the user."}
         self.version = pin.__version__
         constraints: Any = []
         if urdf:
@@ -43,7 +50,14 @@ class _Robot:
         self._bare = self._m.copy()
         self._bare.armature[:] = 0.0
         self.nq, self.nv = self._m.nq, self._m.nv
-        self.loops = sum(len(group) for group in constraints)
+        self._loops = [one for group in constraints for one in group]
+        kinds = {"PointAnchorConstraintModel": "connect", "FrameAnchorConstraintModel": "weld"}
+        self.loops: Any = [(kinds.get(type(one).__name__, ""), [], []) for one in self._loops]
+        try:
+            read = pin.buildGeomFromUrdf if urdf else pin.buildGeomFromMJCF
+            self._shapes = list(read(self._m, path, pin.GeometryType.COLLISION).geometryObjects)
+        except Exception as error:  # shapes are read by a call of their own
+            self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes: {error}"}
         self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
         self._last: dict[int, str] = {}
         self.joints = [joint for i in range(1, self._m.njoints) for joint in self._joints(i)]
@@ -66,21 +80,38 @@ class _Robot:
 
     def _numbers(self) -> dict[str, dict[str, Any]]:
         m, told = self._m, dict[str, dict[str, Any]]()
-        for name, _, kind, at, dof in self.joints:
-            bounded = kind in ("hinge", "slide")
+        for name, _, kind, at, first in self.joints:
+            bounded, dof = kind in ("hinge", "slide"), slice(first, first + {"free": 6, "ball": 3}.get(kind, 1))
             values = {
                 "armature": m.armature[dof], "damping": m.damping[dof], "friction": m.upperDryFrictionLimit[dof],
                 "lower": m.lowerPositionLimit[at] if bounded else -np.inf,
                 "upper": m.upperPositionLimit[at] if bounded else np.inf,
             }  # fmt: skip
             for key, value in values.items():
-                large = abs(value) >= np.finfo(float).max
-                told.setdefault(key, {})[name] = [float(np.sign(value) * np.inf if large else value)]
+                values_ = np.atleast_1d(value).astype(float)
+                values_[np.abs(values_) >= np.finfo(float).max] *= 2.0
+                told.setdefault(key, {})[name] = values_.tolist()
         return told
 
     def place(self, q: Any, v: Any) -> None:
         self._q, self._v = q, v
         self._pin.framesForwardKinematics(self._m, self._d, q)
+
+    def ends(self) -> Any:
+        told = []
+        for one in self._loops:
+            pairs = ((one.joint1_id, one.joint1_placement), (one.joint2_id, one.joint2_placement))
+            placed = [self._d.oMi[i] * place for i, place in pairs]
+            told.append([(np.array(M.translation), np.array(M.rotation)) for M in placed])
+        return told
+
+    def shapes(self) -> Any:
+        told = []
+        for one in self._shapes:
+            M, kind, size, points = self._d.oMi[one.parentJoint] * one.placement, *_solid(one.geometry, one.meshScale)
+            joint = self._last.get(one.parentJoint, "")
+            told.append((one.name, kind, joint, size, points, np.array(M.translation), np.array(M.rotation)))
+        return told
 
     def mass_matrix(self) -> Any:
         M = np.triu(self._pin.crba(self._m, self._d, self._q))
@@ -105,6 +136,22 @@ class _Robot:
             Y = self._d.oMi[i].act(self._m.inertias[i])
             told.append((self._last[i], float(Y.mass), np.array(Y.lever), np.array(Y.inertia)))
         return told
+
+
+def _solid(shape: Any, scale: Any) -> tuple[str, list[float], Any]:
+    """Return kind, sizes as MuJoCo's, and corners of one of coal's shapes."""
+    kind, none = type(shape).__name__, np.zeros((0, 3))
+    own = {"Sphere": ("radius",), "Capsule": ("radius", "halfLength"), "Cylinder": ("radius", "halfLength")}
+    if kind in own:
+        return kind.lower(), [float(getattr(shape, key)) for key in own[kind]], none
+    if kind in ("Box", "Ellipsoid"):
+        return kind.lower(), list(map(float, shape.halfSide if kind == "Box" else shape.radii)), none
+    if kind in ("Halfspace", "Plane"):
+        return "plane", [], none
+    points = shape.vertices() if callable(getattr(shape, "vertices", None)) else none
+    if not len(points) and hasattr(shape, "points"):
+        points = shape.points()
+    return "mesh", [], np.array(points)
 
 
 def open_robot(path: str, urdf: bool) -> _Robot:

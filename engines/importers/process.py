@@ -2,8 +2,9 @@
 
 It is started by the path of this file, in an interpreter that has NumPy and the engine, and imports nothing of ours:
 
-    python -P process.py IMPORTER.py FILE mjcf|urdf ANSWER.json BYTES < job
+    python -P process.py IMPORTER.py FILE mjcf|urdf ANSWERS BYTES < jobs
 
+A job is a line of JSON; all but the first name their file, and each has its line in ANSWERS.
 Velocities of the scene are v = J v_e of the engine's, with v' = J v_e' + bend: M_e = J^T M J, b_e = J^T (b + M bend).
 """
 
@@ -12,11 +13,12 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import re
 import resource
 import signal
 import sys
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -116,6 +118,9 @@ def matched(ours: Any, theirs: Any) -> dict[str, int]:
     return found
 
 
+VIEWS = [rotation(q) for q in ((1, 0, 0, 0), (0.8, 0.3, -0.5, 0.2), (0.6, -0.4, 0.1, 0.7), (0.5, 0.2, 0.6, -0.3))]
+
+
 class Measured:
     """An engine's robot in the scene's coordinates.
 
@@ -131,18 +136,27 @@ class Measured:
 
     def at(self, q: Any, v: Any) -> dict[str, Any]:
         """Return what the engine has at a state."""
-        moving = self._of_state(q, v)
+        robot = self.robot
+        lacks = robot.hidden.keys() | robot.unseen.keys()
         still = self._of_state(q, [np.zeros(len(part)) for part in v])
-        frames = {
-            name: [np.asarray(p, dtype=float).tolist(), np.asarray(R, dtype=float).tolist()]
-            for name, (p, R) in self.robot.frames().items()
-        }
-        self._of_state(q, v)
+        moving = self._of_state(q, v)
         shown = {"M": moving[0], "bias": moving[1], "gravity": still[1]}
-        told = {key: value.tolist() for key, value in shown.items() if key not in self.robot.hidden}
-        if "energy" not in self.robot.hidden:
-            told["energy"] = float(self.robot.energy())
-        return told | {"frames": frames, "v": [x for part in v for x in part]}
+        told = {key: value.tolist() for key, value in shown.items() if key not in lacks}
+        told["frames"] = {name: posed(*pose) for name, pose in robot.frames().items()}
+        told["ends"] = [[posed(*pose) for pose in ends] for ends in robot.ends()]
+        if "energy" not in lacks:
+            told["energy"] = float(robot.energy())
+        if "tendons" not in lacks:
+            told["tendons"] = {name: float(length) for name, length in robot.lengths().items()}
+        if "actuators" not in lacks:
+            driven, held = robot.drives()
+            told["driven"] = {name: self._forces(force).tolist() for name, force in driven.items()}
+            told["held"] = self._forces(held).tolist()
+        return told | {"v": [x for part in v for x in part]}
+
+    def _forces(self, force: Any) -> Any:
+        """Return forces of the scene by those of the engine, at the state that was last asked for."""
+        return np.linalg.solve(self._J.T, np.asarray(force, dtype=float)[self._order])
 
     def _of_state(self, q: Any, v: Any) -> Any:
         robot, n = self.robot, sum(len(part) for part in v)
@@ -158,6 +172,7 @@ class Measured:
             order[here] = np.arange(first, first + len(v_j))
             row += len(v_j)
         robot.place(q_e, v_e)
+        self._J, self._order = J, order
         M, b = np.zeros((n, n)), np.zeros(n)
         if "M" not in robot.hidden:
             M = np.linalg.solve(J.T, np.linalg.solve(J.T, np.asarray(robot.mass_matrix())[np.ix_(order, order)]).T)
@@ -169,6 +184,15 @@ class Measured:
         of = {"free": self.robot.free, "ball": self.robot.ball, "unbounded": "unbounded"}
         return CONVENTIONS[of.get(kind, "mujoco")](np.asarray(q, dtype=float), np.asarray(v, dtype=float))
 
+    def shapes(self, named: Any) -> list[Any]:
+        """Return name, kind, joint that moves it, and boxes in the axes of that joint's body, of every shape."""
+        frames, told = self.robot.frames(), []
+        bodies = {joint[0]: body for (_, body, _), joint in zip(self.ours, self.to, strict=True)}
+        for name, kind, joint, size, points, p, R in self.robot.shapes():
+            frame = frames.get(bodies.get(joint, ""), (np.zeros(3), np.eye(3)))
+            told.append([name, kind, named.get(joint, joint), boxes(kind, size, points, p, R, frame)])
+        return told
+
     def inertias(self) -> dict[str, Any]:
         """Return mass, centre and inertia about it of what each joint moves up to the next ones, in the body's axes."""
         frames, parts = self.robot.frames(), list(self.robot.inertias())
@@ -178,6 +202,48 @@ class Measured:
             if own and body in frames:
                 told[name] = composite(own, *frames[body])
         return told
+
+
+def posed(p: Any, R: Any) -> Any:
+    """Return a pose as lists."""
+    return [np.asarray(p, dtype=float).tolist(), np.asarray(R, dtype=float).tolist()]
+
+
+def boxes(kind: str, size: Any, points: Any, p: Any, R: Any, frame: Any) -> list[list[float]]:
+    """Return `bounds` of a shape as seen from four sides of a frame (p, R): one side alone would hide how it stands."""
+    origin, axes = (np.asarray(part, dtype=float) for part in frame)
+    place, turn = axes.T @ (np.asarray(p, dtype=float) - origin), axes.T @ np.asarray(R, dtype=float)
+    return [bounds(kind, size, points, view @ place, view @ turn) for view in VIEWS]
+
+
+def bounds(kind: str, size: Any, points: Any, p: Any, R: Any) -> list[float]:
+    """Return lowest and highest x, y and z of a shape: the same for every way of writing it.
+
+    Args:
+        kind: sphere, capsule, cylinder, box, ellipsoid or plane; of any other the points count.
+        size: radius; radius and half length along z; half sides; semi-axes, m.
+        points: of a mesh (n, 3), in its own axes.
+        p: where it stands (3,).
+        R: how it is turned (3, 3).
+
+    Returns:
+        (6,); of a plane, which has no bounds, its normal and the distance along it, twice.
+    """
+    p, R = np.asarray(p, dtype=float), np.asarray(R, dtype=float)
+    if kind == "plane":
+        return [*R[:, 2], *[float(R[:, 2] @ p)] * 3]
+    if kind in ("sphere", "capsule", "cylinder", "box", "ellipsoid"):
+        a, b, c = (np.abs(R[:, k]) for k in range(3))
+        x, y, z = (float(one) for one in (*size, 0.0, 0.0, 0.0)[:3])
+        reach: dict[str, Any] = {
+            "sphere": lambda: np.full(3, x), "capsule": lambda: x + y * c,
+            "cylinder": lambda: x * np.hypot(a, b) + y * c,
+            "box": lambda: x * a + y * b + z * c, "ellipsoid": lambda: np.linalg.norm(R * [x, y, z], axis=1),
+        }  # fmt: skip
+        far = reach[kind]()
+        return [*(p - far).tolist(), *(p + far).tolist()]
+    at = p + np.asarray(points, dtype=float).reshape(-1, 3) @ R.T if len(points) else p[None]
+    return [*at.min(axis=0).tolist(), *at.max(axis=0).tolist()]
 
 
 def composite(parts: Any, p: Any, R: Any) -> list[float]:
@@ -206,41 +272,86 @@ def measured(robot: Any, job: Any) -> dict[str, Any]:
     }
     named = {theirs[i][0]: name for name, i in found.items()}
     told: dict[str, Any] = {
-        "status": "read", "version": robot.version, "hidden": dict(robot.hidden), "numbers": numbers,
+        "status": "read", "version": robot.version, "hidden": dict(robot.hidden), "unseen": dict(robot.unseen),
+        "numbers": numbers,
         "precision": robot.precision, "missing": [name for name, *_ in ours if name not in found], "extra": extra,
         "actuators": {name: sorted(named.get(one, one) for one in of) for name, of in robot.actuators.items()},
-        "loops": robot.loops, "states": [],
+        "loops": [[kind, [named.get(one, one) for one in of], list(numbers)] for kind, of, numbers in robot.loops],
+        "tendons": {name: list(numbers) for name, numbers in robot.tendons.items()}, "states": [],
     }  # fmt: skip
     if not told["missing"] and not extra:
         whole = Measured(robot, ours, found)
         for state in job["states"]:
             told["states"].append(whole.at(state["q"], state["v"]))
         told["inertias"] = whole.inertias()
+        lacks = robot.hidden.keys() | robot.unseen.keys()
+        told["shapes"] = [] if "shapes" in lacks else whole.shapes(named)
+        told["contacts"] = [] if "contacts" in lacks else [list(map(int, pair)) for pair in robot.contacts()]
     return told
 
 
-def main(importer: str, file: str, kind: str, answer: str, size: str) -> None:
-    """Read, measure, and leave the answer in a file; what engines print is the messages."""
+def tried(module: Any) -> str:
+    """Return a sentence on a version of the engine that no importer was tried with; empty for one that was."""
+    try:
+        found = version(module.PACKAGE)
+    except PackageNotFoundError:
+        return ""
+    low, high = getattr(module, "TRIED", ("0", "999999"))
+    number = [int(word) for word in re.findall(r"\d+", found)[:2]]
+    if [int(word) for word in low.split(".")] <= number <= [int(word) for word in high.split(".")]:
+        return ""
+    return f"{module.PACKAGE} is of version {found}; its importer was tried with {low} to {high}."
+
+
+def answered(module: Any, file: str, urdf: bool, job: Any, size: int) -> dict[str, Any]:
+    """Return what was measured of one file, or why there is nothing.
+
+    Args:
+        module: the importer.
+        file: what it reads.
+        urdf: whether that is a URDF.
+        job: gives the job, which may come later than the file.
+        size: bytes that it may take.
+    """
+    try:
+        robot = module.open_robot(file, urdf)
+        asked = job()
+        return measured(robot, asked)
+    except ModuleNotFoundError as error:
+        lacking = (error.name or "").partition(".")[0]
+        own = lacking == module.MODULE
+        why = f"It needs the package {module.PACKAGE if own else lacking}, which is not installed."
+        return {"status": "absent" if own else "failed", "why": why}
+    except MemoryError:
+        return {"status": "failed", "why": f"It wants more than {size >> 20} MiB of memory."}
+    except Exception as error:
+        return {"status": "failed", "why": " ".join(f"{type(error).__name__}: {error}".split())}
+
+
+def main(importer: str, file: str, kind: str, answers: str, size: str) -> None:
+    """Read, measure, and leave a line for every job in a file; what engines print is the messages."""
     limit(int(size))
     spec = spec_from_file_location("importer", importer)
     if spec is None or spec.loader is None:
         raise ImportError(f"{importer} is no Python file")
     module = module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-        told = measured(module.open_robot(file, kind == "urdf"), json.load(sys.stdin))
-    except ModuleNotFoundError as error:
-        lacking = (error.name or "").partition(".")[0]
-        own = lacking == module.MODULE
-        why = f"It needs the package {module.PACKAGE if own else lacking}, which is not installed."
-        told = {"status": "absent" if own else "failed", "why": why}
-    except MemoryError:
-        told = {"status": "failed", "why": f"It wants more than {int(size) >> 20} MiB of memory."}
-    except Exception as error:
-        told = {"status": "failed", "why": " ".join(f"{type(error).__name__}: {error}".split())}
-    Path(answer).write_text(json.dumps(told), encoding="utf-8")
-    sys.stdout.flush()
-    sys.stderr.flush()
+    spec.loader.exec_module(module)
+    strange, said, line = tried(module), 0, list[str]()
+
+    def job() -> Any:
+        line[:] = line or [sys.stdin.readline()]
+        return json.loads(line[0] or "{}")
+
+    while file:
+        told = answered(module, file, kind == "urdf", job, int(size)) | {"strange": strange, "from": said}
+        job()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        said = os.lseek(1, 0, os.SEEK_CUR)
+        with open(answers, "a", encoding="utf-8") as out:
+            out.write(json.dumps(told | {"to": said}) + "\n")
+        line[:] = [sys.stdin.readline()]
+        file = job().get("file", "")
     os._exit(0)  # an engine may crash where it is torn down
 
 

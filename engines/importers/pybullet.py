@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 FORMATS, PACKAGE, MODULE = ("urdf",), "pybullet", "pybullet"
+TRIED = ("3.2", "3.2")
 KINDS = {0: "hinge", 1: "slide", 2: "ball"}
 FIXED = 4
+SHAPES = {2: "sphere", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule"}
 
 
 class _Robot:
@@ -16,10 +18,16 @@ class _Robot:
     hidden = {  # noqa: RUF012
         "armature": "PyBullet's joints have no armature.", "stiffness": "PyBullet's joints have no springs.",
         "rest": "PyBullet's joints have no springs.", "actuators": "PyBullet drives joints, not actuators of a file.",
-        "energy": "PyBullet tells no energy.",
+        "damping v|v|": "PyBullet's dampers are linear.", "damping v^3": "PyBullet's dampers are linear.",
+        "stiffness x^2": "PyBullet's joints have no springs.", "stiffness x^3": "PyBullet's joints have no springs.",
+        "tendons": "PyBullet has no tendons.",
     }  # fmt: skip
+    unseen = {  # noqa: RUF012
+        "energy": "PyBullet tells no energy.", "contacts": "PyBullet does not tell which of its shapes may touch.",
+    }  # fmt: skip
+    tendons: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 1e-5
-    loops = 0
+    loops: list[Any] = []  # noqa: RUF012
 
     def __init__(self, path: str) -> None:
         from importlib.metadata import version
@@ -27,6 +35,8 @@ class _Robot:
         import pybullet
 
         self._lib, self.version = pybullet, version("pybullet")
+        if pybullet.isConnected():
+            pybullet.disconnect()
         pybullet.connect(pybullet.DIRECT)
         pybullet.setGravity(0.0, 0.0, -9.81)
         self._id = pybullet.loadURDF(
@@ -43,6 +53,8 @@ class _Robot:
         self.nq = self.nv = len(self.joints)
         self.actuators: dict[str, list[str]] = {}
         self.numbers = self._numbers()
+        if any(SHAPES.get(one[2], "") in ("", "mesh") for i in range(-1, len(infos)) for one in self._solids(i)):
+            self.unseen = self.unseen | {"shapes": "PyBullet does not show the corners of meshes."}
 
     def _numbers(self) -> dict[str, dict[str, Any]]:
         told: dict[str, dict[str, Any]] = {}
@@ -71,23 +83,50 @@ class _Robot:
         return float("nan")
 
     def frames(self) -> Any:
-        told = {}
+        told = {self._lib.getBodyInfo(self._id)[0].decode(): (np.zeros(3), np.eye(3))}  # it is fixed where it is loaded
         for i, name in enumerate(self._links):
             state = self._lib.getLinkState(self._id, i, computeForwardKinematics=True)
             told[name] = (np.array(state[4]), np.array(self._lib.getMatrixFromQuaternion(state[5])).reshape(3, 3))
         return told
 
+    def ends(self) -> Any:
+        return []
+
+    def _solids(self, link: int) -> Any:
+        return self._lib.getCollisionShapeData(self._id, link)
+
+    def _centre(self, link: int) -> Any:
+        """Return where the centre of mass of a link stands: its shapes are placed there."""
+        if link < 0:
+            return self._lib.getBasePositionAndOrientation(self._id)
+        return self._lib.getLinkState(self._id, link, computeForwardKinematics=True)[:2]
+
+    def shapes(self) -> Any:
+        told = []
+        for link in range(-1, len(self._infos)):
+            for k, one in enumerate(self._solids(link)):
+                kind, (a, b, c) = SHAPES[one[2]], one[3]
+                size = {"box": (a / 2, b / 2, c / 2), "sphere": (a,)}.get(kind, (b, a / 2))
+                p, turn = self._lib.multiplyTransforms(*self._centre(link), one[5], one[6])
+                R = np.array(self._lib.getMatrixFromQuaternion(turn)).reshape(3, 3)
+                name = f"{self._links[link] if link >= 0 else 'base'} {k}"
+                told.append((name, kind, self._mover(link), size, (), np.array(p), R))
+        return told
+
+    def _mover(self, link: int) -> str:
+        """Return the joint that moves a link; none of what stands on the world."""
+        while link >= 0 and self._infos[link][2] == FIXED:
+            link = self._infos[link][16]
+        return str(self._infos[link][1].decode()) if link >= 0 else ""
+
     def inertias(self) -> Any:
         told = []
         for i in range(len(self._infos)):
-            up = i
-            while up >= 0 and self._infos[up][2] == FIXED:
-                up = self._infos[up][16]
-            if up >= 0:
+            if joint := self._mover(i):
                 state = self._lib.getLinkState(self._id, i, computeForwardKinematics=True)
                 mass, _, J, *_ = self._lib.getDynamicsInfo(self._id, i)
                 R = np.array(self._lib.getMatrixFromQuaternion(state[1])).reshape(3, 3)
-                told.append((self._infos[up][1].decode(), float(mass), np.array(state[0]), R @ np.diag(J) @ R.T))
+                told.append((joint, float(mass), np.array(state[0]), R @ np.diag(J) @ R.T))
         return told
 
 

@@ -9,15 +9,17 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from crossbody.cases import EngineUnavailable, OutputError, UnknownName
+from crossbody.cases import EngineUnavailable, InvalidValue, OutputError, UnknownName
+from crossbody.cases.arguments import shown
 from crossbody.cases.files.reading import is_urdf
 from crossbody.engines import importers
 from crossbody.reports import voice
 from crossbody.reports.importers import told
 from crossbody.reports.importers.audit import Audit, audited
 from crossbody.reports.importers.causes import advice, explained
-from crossbody.reports.importers.compare import FAILED, OK, QUANTITIES, UNSUPPORTED, WRONG, Row
-from crossbody.reports.importers.fix import fixed
+from crossbody.reports.importers.compare import FAILED, OK, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
+from crossbody.reports.importers.fix import MARK, fixed
+from crossbody.reports.importers.lines import files_of
 
 WIDTH, FIRST = 80, 13
 
@@ -33,6 +35,7 @@ class Ask:
         seconds: what an importer may take.
         explain: whether causes are looked for.
         fix, sarif, markdown: files to write.
+        force: whether `fix` may write over a file that was not written so.
     """
 
     path: Path
@@ -41,6 +44,7 @@ class Ask:
     seconds: float = importers.SECONDS
     explain: bool = False
     fix: Path | None = None
+    force: bool = False
     sarif: Path | None = None
     markdown: Path | None = None
 
@@ -55,10 +59,13 @@ def audit(ask: Ask) -> int:
         CrossbodyError: for wrong use, a file that is none, engines none of which is there.
     """
     if not ask.path.is_file():
+        if ask.path.exists():
+            raise InvalidValue(f"{shown(str(ask.path))} is a folder, a pipe or a device; it must be a robot file.")
         raise UnknownName("robot file", str(ask.path), ())
+    _check_out(ask)
     found, rows = read_by_all(ask)
     if ask.explain or ask.sarif or ask.markdown:
-        rows = explained(ask.path, is_urdf(ask.path), rows, ask.seconds, os.cpu_count() or 1)
+        rows = explained(ask.path, is_urdf(ask.path), rows, ask.seconds, os.cpu_count() or 1, ask.without)
     for file, text in ((ask.sarif, told.sarif), (ask.markdown, told.markdown)):
         if file is not None:
             _write(file, text(ask.path, rows))
@@ -73,10 +80,23 @@ def audit(ask: Ask) -> int:
     return int(not told.alike(rows)) if ask.fix is None else _fix(ask, ask.fix)
 
 
+def _check_out(ask: Ask) -> None:
+    """Check that nothing is written over what is read, and no file of somebody's over."""
+    read = files_of(ask.path)
+    for option, out in (("--fix", ask.fix), ("--sarif", ask.sarif), ("--markdown", ask.markdown)):
+        if out is not None and out.resolve() in read:
+            raise OutputError(f"{option} {shown(str(out))}: it must be another file than {ask.path} and what it reads.")
+    if ask.fix is None:
+        return
+    if not ask.fix.parent.is_dir():
+        raise OutputError(f"--fix {shown(str(ask.fix))}: there is no folder {shown(str(ask.fix.parent))}.")
+    if ask.fix.exists() and not ask.force and not (ask.fix.is_file() and MARK in ask.fix.read_text("utf-8", "replace")):
+        raise OutputError(f"--fix {shown(str(ask.fix))}: there is such a file, which was not written by --fix; valid: "
+                          "another name, or --force, which writes over it.")  # fmt: skip
+
+
 def _fix(ask: Ask, out: Path) -> int:
     """Write the file in plainer words, and audit that: its exit code."""
-    if not out.parent.is_dir() or (out.exists() and out.samefile(ask.path)):
-        raise OutputError(f"--fix {out}: it must be another file than {ask.path}, in a folder that is there.")
     fixed(ask.path, out, ask.without)
     voice.note(f"{out} means the same as {ask.path}; this is how it is read:")
     return audit(replace(ask, path=out, fix=None, sarif=None, markdown=None))
@@ -89,10 +109,13 @@ def read_by_all(ask: Ask) -> tuple[Audit, list[Row]]:
         found = audit_of
         rows += own
         if len(wanted) > 1:
-            voice.note(f"{name}: {summary(own)}")
+            voice.note(textwrap.shorten(f"{name}: {summary(own)}", WIDTH - len("crossbody: "), placeholder=" ..."))
     if found is None:
         asked = ", ".join(wanted)
         raise EngineUnavailable(f"None of these is installed: {asked}; pip install 'crossbody[engines]' brings two.")
+    if all(row.quantity == "reading" and row.verdict == UNSUPPORTED for row in rows):
+        why = " ".join(told.sentence(row) for row in rows)
+        raise EngineUnavailable(f"No reader that was asked, and is there, reads {ask.path}. {why}")
     rows.sort(key=lambda row: (wanted.index(row.engine), QUANTITIES.index(row.quantity)))
     return found, rows
 
@@ -117,12 +140,12 @@ def _show(found: Audit, rows: Sequence[Row]) -> None:
         scene = found.scene
         counts = {"joints": len(scene.joints), "degrees of freedom": scene.nv, "loops": len(scene.loops),
                   "actuators": len(scene.actuators), "states": len(found.job["states"])}  # fmt: skip
-        print(f"{found.path.name}: {', '.join(f'{count} {name}' for name, count in counts.items())}")
-        for text in found.findings:
+        _say(f"{found.path.name}: {', '.join(f'{count} {name}' for name, count in counts.items())}")
+        for text in (*found.findings, *filter(None, found.strange.values())):
             _say(text)
         print("\n".join(table(rows)))
     for row in rows:
-        if row.verdict in (WRONG, FAILED) or (row.verdict == UNSUPPORTED and not voice.quiet()):
+        if row.verdict in (WRONG, FAILED) or (row.verdict in (UNSUPPORTED, UNSEEN) and not voice.quiet()):
             _say(told.sentence(row))
     for name, why in sorted(found.absent.items()):
         if not voice.quiet():
@@ -131,23 +154,24 @@ def _show(found: Audit, rows: Sequence[Row]) -> None:
 
 def _explain(path: Path, rows: Sequence[Row]) -> None:
     """Say once for every engine and cause what it is, where, what the format says and how to write it."""
-    causes: dict[tuple[str, str], list[Row]] = {}
+    causes: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
         if row.verdict in (WRONG, FAILED):
-            causes.setdefault((row.engine, row.cause), []).append(row)
-    for (engine, cause), own in causes.items():
+            causes.setdefault((row.engine, row.cause, row.doubt), []).append(row)
+    for (engine, cause, doubt), own in causes.items():
         what = ", ".join(row.quantity for row in own)
         print()
         if cause:
-            _say(f"{path.name}:{own[0].line}: {cause} ({engine}: {what})")
-            _say("    " + advice(cause))
+            _say(f"{Path(own[0].file).name}:{own[0].line}: {doubt} {cause} ({engine}: {what})")
+            _say(advice(cause))
             _say(f"    The smallest file that shows it: crossbody conformance --feature '{cause}' -e {engine}")
         else:
             _say(f"{engine}: {what}: no feature of the table that this file uses explains it.")
 
 
 def _say(text: str) -> None:
-    print(textwrap.fill(text, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False))
+    text = " ".join("".join(one if one.isprintable() else "?" for one in word) for word in text.split())
+    print(textwrap.fill(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False))
 
 
 def table(rows: Sequence[Row]) -> list[str]:

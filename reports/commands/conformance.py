@@ -15,7 +15,7 @@ from crossbody.cases.files.conformance import FEATURES
 from crossbody.engines import importers
 from crossbody.reports import voice
 from crossbody.reports.commands.shared import where
-from crossbody.reports.importers.compare import FAILED, OK, UNSUPPORTED, WRONG
+from crossbody.reports.importers.compare import FAILED, OK, UNSEEN, UNSUPPORTED, WRONG
 from crossbody.reports.importers.conformance import table
 from crossbody.reports.pages import site
 from crossbody.reports.runs import output, study
@@ -54,6 +54,7 @@ def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, co
             else:
                 told = {"feature": feature.name, "format": feature.format, "rule": feature.rule}
                 rows.append(told | asdict(row) | {"rewrite": feature.rewrite, "text": feature.text})
+    rows = [row for row in rows if row["engine"] not in absent]
     if not rows:
         raise EngineUnavailable(f"None of these is installed: {', '.join(wanted)}.")
     found, told_by = pd.DataFrame(rows), provenance(command)
@@ -70,7 +71,9 @@ def _show(rows: pd.DataFrame, absent: dict[str, str], out: Path) -> None:
     if not voice.quiet():
         for engine, own in rows.groupby("engine", sort=False):
             counts, version = Counter(own["verdict"]), max(own["version"])
-            told = ", ".join(f"{counts[word]} {word}" for word in (OK, WRONG, UNSUPPORTED, FAILED) if counts[word])
+            told = ", ".join(
+                f"{counts[word]} {word}" for word in (OK, WRONG, UNSUPPORTED, UNSEEN, FAILED) if counts[word]
+            )
             print(f"{engine} {version}: {told}")
         for engine, why in sorted(absent.items()):
             print(f"{engine} is not there: {why}")

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Value
 from crossbody.reports.judging.stored import words
 from crossbody.reports.runs import jobs
@@ -46,6 +47,9 @@ def _settings(case: Case, pick: jobs.Pick, asked: Mapping[str, Value]) -> Mappin
     if pick.skipped:
         return f"skipped: {pick.skipped}"
     try:
-        return jobs.prepare(case, pick, jobs.of_pick(asked, pick)).settings
+        engine, own = engines.load(pick.engine), jobs.of_pick(asked, pick)
+        told = engine.planned(case, pick.profile)
+        own = {key: value for key, value in own.items() if key in told}
+        return engine.planned(case, pick.profile, **own) if own else told
     except CaseUnsupported as error:
         return f"skipped: {error}"

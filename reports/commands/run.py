@@ -42,7 +42,7 @@ def run(
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
     cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
-        click.echo(f"note: {sentence}", err=True)
+        click.echo(voice.folded(f"note: {sentence}"), err=True)
     picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--set-engine")
     jobs.check_asked(asked, picks)
     output.check(out, "run")

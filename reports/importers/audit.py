@@ -14,15 +14,17 @@ import numpy as np
 
 from crossbody.cases import SceneError
 from crossbody.cases.arrays import Floats
+from crossbody.cases.files import mjcf
 from crossbody.cases.files.inertias import of_shapes, six
 from crossbody.cases.files.reading import findings_of, is_urdf, read, scene_of
 from crossbody.cases.files.text import check_text
-from crossbody.cases.files.urdf import parsed
+from crossbody.cases.files.urdf import bounds, parsed, planar
 from crossbody.cases.files.without import without_meshes
 from crossbody.cases.scene import Body, Scene
 from crossbody.engines.importers import SECONDS, Reading
 from crossbody.reports.importers.compare import Row, rows
 from crossbody.reports.importers.expected import expected, job_of
+from crossbody.reports.importers.lines import named as lines_named
 
 KEYS = 4
 """Keyframes at which importers are compared beside the random states."""
@@ -39,6 +41,8 @@ class Audit:
         findings: sentences on what is strange in the file itself.
         told: importer -> what it said while it read.
         absent: importer -> why it is not there.
+        strange: importer -> what is to be said of its version.
+        named: line of the file -> tag -> names of the parts that stand there.
     """
 
     path: Path
@@ -48,6 +52,8 @@ class Audit:
     findings: tuple[str, ...] = ()
     told: dict[str, list[str]] = field(default_factory=dict)
     absent: dict[str, str] = field(default_factory=dict)
+    strange: dict[str, str] = field(default_factory=dict)
+    named: dict[int, dict[str, set[str]]] = field(default_factory=dict)
 
 
 def audited(
@@ -102,7 +108,8 @@ def _answered(found: Audit, readings: Sequence[Reading], left_out: Set[str]) -> 
             if answer["status"] == "absent":
                 found.absent[name] = answer["why"]
             else:
-                told = rows(name, answer, found.wanted, found.job["joints"])
+                found.strange[name] = answer.get("strange", "")
+                told = rows(name, answer, found.wanted, found.job["joints"], found.named)
                 yield found, name, [row for row in told if row.quantity not in left_out]
 
 
@@ -118,7 +125,19 @@ def opened(path: Path, without: str = "") -> Audit:
         raise SceneError(f"{path} has no joint: there is no motion in which readers could differ; valid: one at least.")
     scene = scene if is_urdf(path) else with_closed_forms(path, scene)
     keys = [np.array(key) for key in model.key_qpos[:KEYS]]
-    return of_scene(path, scene, keys, (*told, *findings_of(path)))
+    paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
+    meets = [bool(one) or i in paired for i, one in enumerate(model.geom_contype | model.geom_conaffinity)]
+    named = mjcf.names(model, "geom")
+    found = of_scene(path, scene, keys, (*told, *findings_of(path)), [named(i) for i, one in enumerate(meets) if one])
+    found.named = lines_named(path)
+    if is_urdf(path):
+        found.wanted["planar"] = planar(path)
+        found.wanted["contacts"] = None  # which of its links may touch each other a URDF does not say
+        for name, both in bounds(path).items():
+            for key, value in zip(("lower", "upper"), both, strict=True):
+                if name in found.wanted["numbers"][key]:
+                    found.wanted["numbers"][key][name] = [value]
+    return found
 
 
 def with_closed_forms(path: Path, scene: Scene) -> Scene:
@@ -132,7 +151,10 @@ def with_closed_forms(path: Path, scene: Scene) -> Scene:
     return scene.replace(bodies=tuple(of(body) if body.name in own else body for body in scene.bodies))
 
 
-def of_scene(path: Path, scene: Scene, keys: Sequence[Floats] = (), findings: tuple[str, ...] = ()) -> Audit:
-    """Return the audit of a file of which a scene says what it means."""
+def of_scene(
+    path: Path, scene: Scene, keys: Sequence[Floats] = (), findings: tuple[str, ...] = (),
+    touching: Sequence[str] | None = None,
+) -> Audit:  # fmt: skip
+    """Return the audit of a file of which a scene says what it means; without `touching` shapes are not compared."""
     job = job_of(scene, keys)
-    return Audit(path=path, scene=scene, job=job, wanted=expected(scene, job), findings=findings)
+    return Audit(path=path, scene=scene, job=job, wanted=expected(scene, job, touching), findings=findings)

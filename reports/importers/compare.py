@@ -4,32 +4,29 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from crossbody.cases.arrays import Floats
+from crossbody.reports.importers.gaps import Gap, gaps
 
 TOLERANCE = 1e-9
 """Of the largest entry: the same physics."""
-FLOOR = 1e-4
-"""Part of the largest force that is the scale of the smallest ones: rounding is that of the sums they stand in."""
-OK, WRONG, UNSUPPORTED, FAILED, NONE = "ok", "wrong", "unsupported", "failed", "-"
+OK, WRONG, UNSUPPORTED, FAILED, NONE, UNSEEN = "ok", "wrong", "unsupported", "failed", "-", "not shown"
 QUANTITIES = (
-    "reading", "coordinates", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping", "springs",
-    "limits", "friction", "loops", "actuators",
+    "reading", "coordinates", "bodies", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping",
+    "springs", "limits", "friction", "tendons", "loops", "actuators", "shapes", "contacts",
 )  # fmt: skip
 """Of rows, in their order."""
-OWN = {"springs": ("stiffness", "rest"), "limits": ("lower", "upper")}
-"""Quantity -> numbers of joints that make it up; of others it is their own name."""
 SAID = re.compile(r"unsupported|not (yet )?(been )?(supported|implemented)|(will be |is |are )?ignored|ignoring", re.I)
 """How an importer says what it leaves out."""
+GENERAL = re.compile(r"the tag '\w+' found as a child of '\w+'", re.I)
+"""How one says that it leaves all of a tag out, once; the line of the file is that of the first."""
 WORDS = {
     "armature": "armature|rotor", "damping": "damping", "springs": "stiffness|spring", "limits": "range|limit",
     "friction": "friction", "loops": "equality|connect|weld|mimic|constraint", "gravity": "gravity|gravcomp",
-    "actuators": "actuator|motor|transmission", "coordinates": "joint",
+    "actuators": "actuator|motor|transmission", "coordinates": "joint", "tendons": "tendon|spatial",
+    "shapes": "mesh|shape|collision", "contacts": "exclude|contype|conaffinity|pair",
 }  # fmt: skip
 """Quantity -> what such a sentence speaks of."""
 
@@ -45,10 +42,11 @@ class Row:
         where: joint or body of the largest difference.
         value, expected: there.
         difference: part of the largest entry.
-        verdict: ok, wrong, unsupported, failed; - where the file has nothing of it.
+        verdict: ok, wrong, unsupported, failed, not shown; - where the file has nothing of it.
         why: a sentence, where there is one.
         cause: name of the feature that is read wrongly, where it is known.
         file, line: where that stands.
+        doubt: perhaps, where leaving the feature out alone does not make the importer agree.
     """
 
     engine: str
@@ -64,21 +62,13 @@ class Row:
     cause: str = ""
     file: str = ""
     line: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Gap:
-    """The largest difference of two arrays of numbers with names."""
-
-    size: float
-    where: str = ""
-    value: float = math.nan
-    expected: float = math.nan
+    doubt: str = ""
 
 
 def rows(
-    engine: str, found: Mapping[str, Any], wanted: Mapping[str, Any], joints: Sequence[Sequence[str]]
-) -> list[Row]:
+    engine: str, found: Mapping[str, Any], wanted: Mapping[str, Any], joints: Sequence[Sequence[str]],
+    named: Mapping[int, Mapping[str, Set[str]]] | None = None,
+) -> list[Row]:  # fmt: skip
     """Return what an importer has made of a file, beside what it says.
 
     Args:
@@ -86,9 +76,11 @@ def rows(
         found: its answer.
         wanted: that of a reader without fault.
         joints: name, body and kind of each, in the order of the coordinates.
+        named: line of the file -> tag -> names of the parts that stand there.
     """
     if found["status"] != "read":
-        refused = FAILED if not SAID.search(found["why"]) else UNSUPPORTED
+        error = [found.get("error", found["why"]), *(line for line in found["told"][-1:] if "error" in line.lower())]
+        refused = UNSUPPORTED if any(map(SAID.search, error)) else FAILED
         return [
             Row(
                 engine=engine,
@@ -99,185 +91,88 @@ def rows(
         ]
     told: list[Row] = [Row(engine=engine, version=found["version"], quantity="reading")]
     tolerance = max(TOLERANCE, found["precision"])
-    for quantity, gap in _gaps(found, wanted, joints):
-        told.append(_row(engine, found, quantity, gap, tolerance))
-    return told
+    bodies = {name: {name, body} for name, body, _ in joints}
+    parts = {name for name, body, _ in joints for name in (name, body)} | {*wanted["actuators"], *wanted["tendons"]}
+    said = Said(found["told"], named or {}, parts)
+    for quantity, own in gaps(found, wanted, joints):
+        told.append(_row(engine, found, quantity, own, tolerance, said, bodies))
+    off = {row.quantity for row in told if row.verdict == WRONG}
+    spoiled = off & {"inertia", "M", "frames"}  # then what it leaves out of gravity is not all that is missing there
+    return [replace(row, verdict=WRONG) if spoiled and row.quantity == "gravity" and row.verdict == UNSUPPORTED else row
+            for row in told]  # fmt: skip
 
 
-def _row(engine: str, found: Mapping[str, Any], quantity: str, gap: Gap | None, tolerance: float) -> Row:
-    """Return one row; what the importer hides or says that it leaves out is not wrong."""
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What an importer says while it reads.
+
+    Attributes:
+        lines: each once.
+        named: line of the file -> tag -> names of the parts that stand there.
+        parts: names of the file's parts.
+    """
+
+    lines: Sequence[str]
+    named: Mapping[int, Mapping[str, Set[str]]]
+    parts: Set[str]
+
+    def excuse(self, words: str, names: Set[str]) -> str:
+        """Return the line in which it says that it leaves something out; empty where none does.
+
+        A line that names parts, or the line of the file where they stand, excuses these alone.
+
+        Args:
+            words: pattern of what it speaks of.
+            names: of the part that differs, and of its body; empty for the whole.
+        """
+        for line in self.lines:
+            if words and SAID.search(line) and re.search(rf"\b({words})s?\b", line, re.I):
+                about = self.about(line)
+                if not about or not names or about & names:
+                    return line
+        return ""
+
+    def about(self, line: str) -> set[str]:
+        """Return the names of the parts that a line speaks of; none where it speaks of all with a tag or attribute."""
+        if GENERAL.search(line):
+            return set()
+        quoted = {word for found in re.findall(r"'([^']*)'|\"([^\"]*)\"|\[([^\]]*)\]", line) for word in found}
+        places = [self.named.get(int(number), {}) for number in re.findall(r":(\d+):", line)]
+        places = [{tag: place[tag] for tag in place.keys() & quoted} or place for place in places]
+        return ({name for place in places for own in place.values() for name in own} | quoted) & self.parts
+
+
+def _row(
+    engine: str, found: Mapping[str, Any], quantity: str, own: Iterable[Gap] | None, tolerance: float, said: Said,
+    bodies: Mapping[str, Set[str]],
+) -> Row:  # fmt: skip
+    """Return one row; what the importer hides, or says of each that it leaves it out, is not wrong."""
     common: dict[str, Any] = {"engine": engine, "version": found["version"], "quantity": quantity}
-    hidden = [found["hidden"][key] for key in (quantity, *OWN.get(quantity, ())) if key in found["hidden"]]
-    if gap is None:
+    hidden, unseen = found["hidden"], found["unseen"]
+    if own is None:
         return Row(**common, verdict=NONE)
-    numbers: dict[str, Any] = {
-        "where": gap.where,
-        "difference": gap.size,
-        "value": _number(gap.value),
-        "expected": _number(gap.expected),
-    }
-    if gap.size <= tolerance:
-        return Row(**common, **numbers)
-    if hidden:
-        return Row(**common, where=gap.where, expected=_number(gap.expected), verdict=UNSUPPORTED, why=hidden[0])
-    said = said_of(WORDS.get(quantity, ""), found["told"])
-    return Row(**common, **numbers, verdict=UNSUPPORTED if said else WRONG, why=said)
-
-
-def said_of(words: str, told: Sequence[str]) -> str:
-    """Return the line in which an importer says that it leaves something out, by a pattern; empty where none does."""
-    lines = (line for line in told if words and SAID.search(line) and re.search(rf"\b({words})s?\b", line, re.I))
-    return next(lines, "")
-
-
-def _number(value: float) -> float | None:
-    return None if math.isnan(value) else float(value)
-
-
-def _gaps(
-    found: Mapping[str, Any], wanted: Mapping[str, Any], joints: Sequence[Sequence[str]]
-) -> Iterator[tuple[str, Gap | None]]:
-    """Quantities in their order; None where the file has nothing of it, or where it cannot be compared."""
-    off = [*(f"{name} is missing" for name in found["missing"]), *(f"{name} is more" for name in found["extra"])]
-    yield (
-        "coordinates",
-        Gap(
-            float(len(off)), "; ".join(off[:3]), len(joints) - len(found["missing"]) + len(found["extra"]), len(joints)
-        ),
-    )
+    if quantity in unseen:
+        return Row(**common, verdict=UNSEEN, why=unseen[quantity])
+    told = sorted(own, key=lambda gap: -gap.size)
+    off = [gap for gap in told if not gap.size <= tolerance]
     if not off:
-        names = [name for name, _, kind in joints for _ in range({"free": 6, "ball": 3}.get(kind, 1))]
-        yield "inertia", _inertia(found["inertias"], wanted["inertias"])
-        floor = 1.0 if found["precision"] else FLOOR
-        M = _states(wanted, "M", names)
-        yield "M", _matrix(_states(found, "M", names), M, names, floor)
-        moved = _moved(wanted, M)
-        for key in ("gravity", "bias"):
-            yield key, _forces(_states(found, key, names), _states(wanted, key, names), names, floor, moved)
-        yield "energy", _energy(found, wanted, names)
-        yield "frames", _frames(found["states"], wanted["states"])
-    for key in ("armature", "damping", "springs", "limits", "friction"):
-        yield key, _numbers(key, found["numbers"], wanted["numbers"])
-    loops = (found["loops"], wanted["loops"])
-    yield "loops", Gap(float(loops[0] != loops[1]), "number of them", *loops) if any(loops) else None
-    yield "actuators", _actuators(found["actuators"], wanted["actuators"])
+        return Row(**common, **_numbers(told[0])) if told else Row(**common)
+    words = WORDS.get(quantity, "")
+    why = [_hidden(hidden, quantity, gap) or said.excuse(words, bodies.get(gap.part, {gap.part} - {""})) for gap in off]
+    wrong = [gap for gap, reason in zip(off, why, strict=True) if not reason]
+    if seen := [gap for gap in wrong if not gap.unseen]:
+        return Row(**common, **_numbers(seen[0]), verdict=WRONG)
+    if wrong:
+        return Row(**common, verdict=UNSEEN, why=wrong[0].where)
+    return Row(**common, **_numbers(off[0]), verdict=UNSUPPORTED, why=why[0])
 
 
-def _armature(answer: Mapping[str, Any], names: Sequence[str]) -> Floats:
-    """Return what joints add to the diagonal of M, which is a quantity by itself (nv,)."""
-    own = answer["numbers"].get("armature", {})
-    return np.array([own.get(name, [0.0])[0] for name in names])
+def _hidden(hidden: Mapping[str, str], quantity: str, gap: Gap) -> str:
+    """Return why an engine does not have it; what it has all the same is another matter."""
+    reason = hidden.get(gap.key or quantity, hidden.get(quantity, ""))
+    return str(reason) if gap.lacks or not gap.key else ""
 
 
-def _states(answer: Mapping[str, Any], key: str, names: Sequence[str]) -> Floats | None:
-    if key in answer["hidden"]:
-        return None
-    found = np.array([state[key] for state in answer["states"]])
-    return found - np.diag(_armature(answer, names)) if key == "M" else found
-
-
-def _matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float) -> Gap | None:
-    if found is None or wanted is None:
-        return None
-    size = np.sqrt(np.abs(np.einsum("kii->ki", wanted)))
-    scale = np.maximum(
-        size[:, :, None] * size[:, None, :], min(floor, 1e-5) * float(np.abs(wanted).max(initial=1e-300))
-    )
-    off = np.nan_to_num(np.abs(found - wanted) / scale, nan=math.inf)
-    k, i, j = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
-    where = names[i] if i == j else f"{names[i]}, {names[j]}"
-    return Gap(float(off[k, i, j]), where, float(found[k, i, j]), float(wanted[k, i, j]))
-
-
-def _moved(wanted: Mapping[str, Any], M: Floats | None) -> float:
-    """Return the size of forces at the velocities of the states, where there are no larger ones."""
-    v = np.array([state["v"] for state in wanted["states"]])
-    return 0.0 if M is None else float(np.abs(M).max(initial=0.0) * (v**2).max(initial=0.0))
-
-
-def _forces(
-    found: Floats | None, wanted: Floats | None, names: Sequence[str], floor: float, moved: float
-) -> Gap | None:  # fmt: skip
-    if found is None or wanted is None:
-        return None
-    largest = max(float(np.abs(wanted).max(initial=0.0)), moved)
-    scale = np.maximum(np.abs(wanted).max(axis=0), floor * largest)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    off = np.nan_to_num(np.abs(found - wanted) / scale, nan=math.inf)
-    k, i = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
-    return Gap(float(off[k, i]), names[i], float(found[k, i]), float(wanted[k, i]))
-
-
-def _energy(found: Mapping[str, Any], wanted: Mapping[str, Any], names: Sequence[str]) -> Gap | None:
-    if "energy" in found["hidden"]:
-        return None
-    v = np.array([state["v"] for state in wanted["states"]])
-    mine, theirs = (
-        np.array([state["energy"] for state in answer["states"]]) - v**2 @ _armature(answer, names) / 2
-        for answer in (found, wanted)
-    )
-    mine, theirs = mine - mine[0], theirs - theirs[0]
-    k = int(np.argmax(np.nan_to_num(np.abs(mine - theirs), nan=math.inf)))
-    scale = float(np.abs(theirs).max()) or 1.0
-    return Gap(float(abs(mine[k] - theirs[k])) / scale, "the whole", float(mine[k]), float(theirs[k]))
-
-
-def _frames(found: Sequence[Any], wanted: Sequence[Any]) -> Gap:
-    """The first body of the tree that stands elsewhere: those behind it do too."""
-    worst, named = dict[str, Gap](), [name for name in wanted[0]["frames"] if name in found[0]["frames"]]
-    reach = max((abs(x) for state in wanted for p, _ in state["frames"].values() for x in p), default=0.0) or 1.0
-    for mine, theirs in zip(found, wanted, strict=True):
-        for name in named:
-            (p, R), (p_w, R_w) = mine["frames"][name], theirs["frames"][name]
-            off = np.abs(np.concatenate([np.subtract(p, p_w) / reach, np.subtract(R, R_w).ravel()]))
-            k = int(np.argmax(np.nan_to_num(off, nan=math.inf)))
-            if name not in worst or not off[k] <= worst[name].size:
-                values = (float([*p_, *np.ravel(R_)][k]) for p_, R_ in ((p, R), (p_w, R_w)))
-                worst[name] = Gap(float(off[k]), name, *values)
-    size = max((gap.size for gap in worst.values()), default=0.0)
-    return next((worst[name] for name in named if worst[name].size > 1e-3 * size), Gap(0.0))
-
-
-def _inertia(found: Mapping[str, Sequence[float]], wanted: Mapping[str, Sequence[float]]) -> Gap:
-    worst = Gap(0.0)
-    for name in wanted.keys() & found.keys():
-        mine, theirs = np.array(found[name]), np.array(wanted[name])
-        m, J = abs(theirs[0]), np.abs(theirs[4:]).max()
-        length = float(np.sqrt(J / m) + np.abs(theirs[1:4]).max()) if m else 1.0
-        scale = np.array([m or 1.0, *[length or 1.0] * 3, *[J + m * length**2 or 1.0] * 6])
-        off = np.nan_to_num(np.abs(mine - theirs) / scale, nan=math.inf)
-        k = int(np.argmax(off))
-        if off[k] > worst.size:
-            what = ("mass", "x of com", "y of com", "z of com", "Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz")[k]
-            worst = Gap(float(off[k]), f"{name}: {what}", float(mine[k]), float(theirs[k]))
-    return worst
-
-
-def _numbers(quantity: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> Gap | None:
-    worst, some = Gap(0.0), False
-    for key in OWN.get(quantity, (quantity,)):
-        theirs = {name: value[0] for name, value in wanted[key].items()}
-        mine = {name: value[0] for name, value in found.get(key, {}).items()}
-        usual = -math.inf if key == "lower" else math.inf if key == "upper" else 0.0
-        some |= any(x != usual for x in (*theirs.values(), *mine.values()))
-        for name, x in theirs.items():
-            y = mine.get(name, usual)
-            off = _apart(x, y)
-            if off > worst.size:
-                worst = Gap(min(off, 1e300), name, y, x)
-    return worst if some else None
-
-
-def _apart(x: float, y: float) -> float:
-    """Difference of two numbers over the larger; 1 where one of them alone is infinite."""
-    if x == y:
-        return 0.0
-    return abs(x - y) / max(abs(x), abs(y)) if math.isfinite(x) and math.isfinite(y) else 1.0
-
-
-def _actuators(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> Gap | None:
-    if not found and not wanted:
-        return None
-    off = [name for name in wanted if sorted(found.get(name, [""])) != sorted(wanted[name])]
-    off += [name for name in found if name not in wanted]
-    return Gap(float(len(off)), ", ".join(off[:3]), len(found), len(wanted))
+def _numbers(gap: Gap) -> dict[str, Any]:
+    value, expected = (None if math.isnan(one) else float(one) for one in (gap.value, gap.expected))
+    return {"where": gap.where, "difference": min(gap.size, 1e300), "value": value, "expected": expected}

@@ -11,15 +11,18 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.cases.files.conformance import Feature
-from crossbody.engines.importers import SECONDS, Reading
-from crossbody.reports.importers.audit import of_scene
-from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WRONG, Row, rows, said_of
+from crossbody.engines.importers import SECONDS, answers
+from crossbody.reports.importers.audit import Audit, of_scene
+from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WRONG, Row, Said, rows
 
-WORST = (FAILED, WRONG, UNSUPPORTED, OK, NONE)
+PART = 16
+"""Features that one process of an importer is asked at least."""
+WORST = (FAILED, WRONG, UNSUPPORTED, UNSEEN, OK, NONE)
 
 
 def written(feature: Feature, folder: Path) -> Path:
     """Return the file of a feature, written with what stands beside it."""
+    folder.mkdir(exist_ok=True)
     path = folder / f"feature.{'urdf' if feature.format == 'urdf' else 'xml'}"
     for name, text in {path.name: feature.text, **feature.files}.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -28,16 +31,29 @@ def written(feature: Feature, folder: Path) -> Path:
 
 def judged(feature: Feature, engine: str, seconds: float = SECONDS) -> Row | str:
     """Return the one row that tells what an importer makes of a feature, or why it is not there."""
-    with tempfile.TemporaryDirectory(prefix="crossbody-feature-") as folder:
-        path = written(feature, Path(folder))
-        reading = Reading(engine, path, feature.format == "urdf", seconds)
-        audit = of_scene(path, feature.scene)
-        answer = reading.answer(audit.job)
+    return judged_all([feature], engine, seconds)[0]
+
+
+def judged_all(features: Sequence[Feature], engine: str, seconds: float = SECONDS) -> list[Row | str]:
+    """Return what `judged` does of each, by one process where none of them ends it."""
+    found: dict[str, Row | str] = {}
+    for kind in ("mjcf", "urdf"):
+        own = [feature for feature in features if feature.format == kind]
+        with tempfile.TemporaryDirectory(prefix="crossbody-feature-") as folder:
+            paths = [written(feature, Path(folder) / str(k)) for k, feature in enumerate(own)]
+            audits = [of_scene(path, feature.scene) for path, feature in zip(paths, own, strict=True)]
+            told = answers(engine, paths, kind == "urdf", [audit.job for audit in audits], seconds)
+        for feature, audit, answer in zip(own, audits, told, strict=True):
+            found[feature.name] = _told(feature, engine, audit, answer)
+    return [found[feature.name] for feature in features]
+
+
+def _told(feature: Feature, engine: str, audit: Audit, answer: dict[str, Any]) -> Row | str:
     if answer["status"] == "absent":
         return str(answer["why"])
     found = rows(engine, answer, audit.wanted, audit.job["joints"])
     worst = min((row for row in found if row.quantity in ("reading", *feature.about)), key=_badness)
-    said = said_of(words(feature), answer["told"]) if worst.verdict == WRONG else ""
+    said = Said(answer["told"], {}, set()).excuse(words(feature), set()) if worst.verdict == WRONG else ""
     told: dict[str, Any] = {"verdict": UNSUPPORTED, "why": said} if said else {}
     return replace(worst, version=answer.get("version", ""), cause=feature.name, **told)
 
@@ -55,15 +71,9 @@ def words(feature: Feature) -> str:
 def table(
     features: Sequence[Feature], engines: Sequence[str], seconds: float, jobs: int
 ) -> Iterator[tuple[Feature, str, Row | str]]:
-    """Return what every importer makes of every feature, as it is there; one that is not there is asked once."""
-    asked = [(feature, engine) for engine in engines for feature in features]
-    absent: dict[str, str] = {}
-
-    def one(feature: Feature, engine: str) -> tuple[Feature, str, Row | str]:
-        found = absent[engine] if engine in absent else judged(feature, engine, seconds)
-        if isinstance(found, str):
-            absent[engine] = found
-        return feature, engine, found
-
+    """Return what every importer makes of every feature, as it is there."""
+    parts = [(engine, features[k : k + PART]) for k in range(0, len(features), PART) for engine in engines]
     with ThreadPoolExecutor(jobs) as pool:
-        yield from pool.map(lambda pair: one(*pair), asked)
+        done = pool.map(lambda part: judged_all(part[1], part[0], seconds), parts)
+        for (engine, own), found in zip(parts, done, strict=True):
+            yield from ((feature, engine, row) for feature, row in zip(own, found, strict=True))

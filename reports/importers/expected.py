@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.scene import WIDTHS, Body, Joint, Scene
-from crossbody.engines.importers.process import composite
+from crossbody.cases.rotations import matrices
+from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Scene, Shape, Tendon
+from crossbody.engines.importers.process import boxes, composite, posed
 from crossbody.reports.scenes._kinematics import body_poses
 
 SEED, DRAWN = 20241123, 4
@@ -48,8 +49,14 @@ def _drawn(joint: Joint, draw: np.random.Generator) -> list[float]:
     return [*draw.uniform(-1.0, 1.0, 3).tolist(), *quaternion] if joint.type == "free" else quaternion
 
 
-def expected(scene: Scene, job: dict[str, Any]) -> dict[str, Any]:
-    """Return the answer of a reader without fault."""
+def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None = None) -> dict[str, Any]:
+    """Return the answer of a reader without fault.
+
+    Args:
+        scene: what the file means.
+        job: of `job_of`.
+        touching: names of the shapes that may touch something; without them neither shapes nor contacts are told.
+    """
     states = [
         (np.concatenate([np.zeros(0), *state["q"]]), np.concatenate([np.zeros(0), *state["v"]]))
         for state in job["states"]
@@ -58,17 +65,68 @@ def expected(scene: Scene, job: dict[str, Any]) -> dict[str, Any]:
     frames = [
         {name: [p[k].tolist(), R[k].tolist()] for name, (p, R) in poses.items() if name} for k in range(len(states))
     ]
+    solids = [shape for shape in scene.shapes if shape.name in (touching or ())]
+    numbers, by = {shape.name: k for k, shape in enumerate(solids)}, moved_by(scene)
+    moved = {joint.name: joint.body for joint in scene.joints}
+    of_states = [
+        at | {"frames": here, "ends": _ends(scene, here),
+              "tendons": {part.name: _length(part, scene, q, here) for part in scene.tendons}}
+        for at, here, (q, _) in zip(_dynamics(scene, states, frames), frames, states, strict=True)
+    ]  # fmt: skip
     return {
         "status": "read", "version": "", "hidden": {}, "missing": [], "extra": [], "told": [], "precision": 0.0,
+        "unseen": {} if touching is not None else {"shapes": "", "contacts": ""},
         "numbers": _numbers(scene),
         "actuators": {part.name: _moved(part.joint, part.tendon, scene) for part in scene.actuators},
-        "loops": len(scene.loops),
+        "loops": [[loop.type, [] if loop.in_space else [one for one in (loop.first, loop.second) if one],
+                   [] if loop.in_space else list(loop.polynomial)] for loop in scene.loops],
+        "tendons": {part.name: [*part.damping, *part.stiffness, part.friction_loss, *part.rest, *part.range]
+                    for part in scene.tendons},
+        "shapes": [[shape.name, "mesh" if shape.corners else shape.type, by.get(shape.body, ""),
+                    _boxes(shape, frames[0], moved.get(by.get(shape.body, "")))] for shape in solids],
+        "contacts": [[numbers[pair.first], numbers[pair.second]] for pair in scene.pairs if pair.first in numbers
+                     and pair.second in numbers],
         "inertias": _inertias(scene, frames[0]),
-        "states": [at | {"frames": here} for at, here in zip(_dynamics(scene, states, frames), frames, strict=True)],
+        "states": of_states,
     }  # fmt: skip
 
 
+def _standing(frame: Any, position: Sequence[float], orientation: Sequence[float]) -> tuple[Floats, Floats]:
+    p, R = map(np.array, frame)
+    return p + R @ np.array(position), R @ matrices(np.array(orientation))
+
+
+WORLD = [[0.0] * 3, np.eye(3).tolist()]
+
+
+def _ends(scene: Scene, frames: Any) -> list[Any]:
+    """Return of every loop the two frames whose origins or which it holds together; of coupled joints none."""
+    told = []
+    for loop in scene.loops:
+        sides = ((loop.first, loop.first_position, loop.orientation), (loop.second, loop.second_position, UPRIGHT))
+        placed = [posed(*_standing(frames.get(body, WORLD), at, turn)) for body, at, turn in sides]
+        told.append(placed if loop.in_space else [])
+    return told
+
+
+def _boxes(shape: Shape, frames: Any, body: str | None) -> list[list[float]]:
+    place = _standing(frames.get(shape.body, WORLD), shape.position, shape.orientation)
+    kind = "mesh" if shape.corners else shape.type
+    return boxes(kind, shape.size, shape.corners, *place, frames.get(body, WORLD))
+
+
+def _length(tendon: Tendon, scene: Scene, q: Floats, frames: Any) -> float:
+    if tendon.bodies:
+        ends = [_standing(frames.get(body, WORLD), at, UPRIGHT)[0] for body, at in zip(tendon.bodies, tendon.positions,
+                                                                                       strict=True)]  # fmt: skip
+        return float(np.linalg.norm(ends[1] - ends[0]))
+    at = dict(zip((joint.name for joint in scene.joints), accumulate(
+        (WIDTHS[joint.type][0] for joint in scene.joints), initial=0), strict=False))  # fmt: skip
+    return float(sum(c * q[at[name]] for name, c in zip(tendon.joints, tendon.coefficients, strict=True)))
+
+
 def _moved(joint: str, tendon: str, scene: Scene) -> list[str]:
+    """Return the joints of an actuator; on a tendon of two points none is named."""
     return [joint] if joint else sorted(next(part for part in scene.tendons if part.name == tendon).joints)
 
 
@@ -76,17 +134,22 @@ def _numbers(scene: Scene) -> dict[str, dict[str, list[float]]]:
     def single(joint: Joint) -> bool:
         return joint.type in ("slide", "hinge")
 
-    motors = {
-        joint.name: sum(a.gear[0] ** 2 * a.armature for a in scene.actuators if a.joint == joint.name)
-        for joint in scene.joints
-    }
-    of: dict[str, Callable[[Joint], float]] = {
-        "armature": lambda j: j.armature + motors[j.name], "damping": lambda j: j.damping[0],
-        "stiffness": lambda j: j.stiffness[0], "rest": lambda j: j.rest[0] if single(j) and any(j.stiffness) else 0.0,
+    def of_motors(key: str, joint: Joint) -> float:
+        return float(sum(a.gear[0] ** 2 * getattr(a, key) for a in scene.actuators if a.joint == joint.name))
+
+    of: dict[str, Callable[[Joint], Any]] = {
+        "armature": lambda j: j.armature + of_motors("armature", j), "friction": lambda j: j.friction_loss,
+        "damping": lambda j: j.damping[0] + of_motors("damping", j), "damping v|v|": lambda j: j.damping[1],
+        "damping v^3": lambda j: j.damping[2], "stiffness": lambda j: j.stiffness[0],
+        "stiffness x^2": lambda j: j.stiffness[1], "stiffness x^3": lambda j: j.stiffness[2],
+        "rest": lambda j: j.rest if any(j.stiffness) and j.type != "free" else (),
         "lower": lambda j: j.range[0] if single(j) else -np.inf, "upper": lambda j: j.range[1],
-        "friction": lambda j: j.friction_loss,
     }  # fmt: skip
-    return {key: {joint.name: [float(value(joint))] for joint in scene.joints} for key, value in of.items()}
+    return {key: {joint.name: _listed(value(joint)) for joint in scene.joints} for key, value in of.items()}
+
+
+def _listed(value: Any) -> list[float]:
+    return [float(x) for x in np.atleast_1d(value)]
 
 
 def moved_by(scene: Scene) -> dict[str, str]:
@@ -120,33 +183,44 @@ def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Seq
     from crossbody.reference.tree import mechanism
     from crossbody.reference.tree.table import tabulate
 
-    nothing: dict[str, Any] = {"damping": (0.0,) * 3, "stiffness": (0.0,) * 3, "friction_loss": 0.0}
+    nothing: dict[str, Any] = {"damping": (0.0,) * 3, "stiffness": (0.0,) * 3, "friction_loss": 0.0,
+                               "force_range": UNBOUNDED}  # fmt: skip
+    slack = {key: value for key, value in nothing.items() if key != "force_range"} | {"range": UNBOUNDED}
+    plain: dict[str, Any] = {"armature": 0.0, "damping": 0.0, "activation": "", "time_constant": 0.0} | dict.fromkeys(
+        ("control_range", "force_range", "activation_range"), UNBOUNDED)  # fmt: skip
     bare = scene.replace(
-        joints=tuple(replace(joint, **nothing) for joint in scene.joints), tendons=(), loops=(), pairs=(), shapes=(),
-        pushes=(), actuators=(),
+        joints=tuple(replace(joint, **nothing) for joint in scene.joints), loops=(), pairs=(), shapes=(), pushes=(),
+        tendons=tuple(replace(part, **slack) for part in scene.tendons),
+        actuators=tuple(replace(part, **plain) for part in scene.actuators),
     )  # fmt: skip
-    table = tabulate(bare)
-    w, n = np.zeros(table.scratch), scene.nv
+    table, n = tabulate(bare), scene.nv
+    w, none, units = np.zeros(table.scratch), np.zeros(len(scene.actuators)), np.eye(len(scene.actuators))
     widths = [WIDTHS[joint.type][1] for joint in scene.joints]
     motors = np.repeat([value for (value,) in _numbers(scene)["armature"].values()], widths)
     own = np.repeat([joint.armature for joint in scene.joints], widths)
 
-    def of(q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    def of(q: Floats, v: Floats, u: Floats) -> tuple[Floats, Floats]:
         M, f = np.zeros((n, n)), np.zeros(n)
-        mechanism.dynamics(0.0, q, v, np.zeros(0), table.p, M, f, w)
-        return M + np.diag(motors - own), -f
+        mechanism.dynamics(0.0, q, v, u, table.p, M, f, w)
+        return M + np.diag(motors - own), f
 
     found = []
     for (q, v), here in zip(states, frames, strict=True):
-        M, bias = of(q, v)
+        M, free = of(q, v, np.zeros(0))
+        held = of(q, v, none)[1]
         weight = sum(m * np.array(scene.gravity) @ c for m, c, _ in (_placed(b, here[b.name]) for b in scene.bodies))
         found.append(
             {
                 "M": M.tolist(),
-                "bias": bias.tolist(),
-                "gravity": of(q, np.zeros(n))[1].tolist(),
+                "bias": (-free).tolist(),
+                "gravity": (-of(q, np.zeros(n), np.zeros(0))[1]).tolist(),
                 "energy": float(v @ M @ v / 2 - weight),
                 "v": v.tolist(),
+                "held": (held - free).tolist(),
+                "driven": {
+                    part.name: (of(q, v, unit)[1] - held).tolist()
+                    for part, unit in zip(scene.actuators, units, strict=True)
+                },
             }
         )
     return found

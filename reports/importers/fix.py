@@ -37,6 +37,8 @@ SAME = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "armature", 
 """What the new file means as the old one does; bodies that are fixed to the world may have other frames."""
 
 
+MARK = "Written by the option fix of crossbody audit"
+"""What a file begins with that may be written over; no comment of XML may have two dashes."""
 KEPT = (
     "geom_type", "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_friction", "geom_solref",
     "geom_solimp", "geom_solmix", "geom_margin", "geom_gap", "geom_fluid", "geom_group", "site_type", "site_size",
@@ -58,6 +60,7 @@ def fixed(path: Path, out: Path, without: str = "") -> None:
     """
     before = opened(path, without)
     root = _urdf(path) if is_urdf(path) else _mjcf(path, out)
+    root.insert(0, ElementTree.Comment(f" {MARK} "))
     ElementTree.indent(root)
     half = out.with_name(f".{out.stem}.half{out.suffix}")
     try:
@@ -66,6 +69,8 @@ def fixed(path: Path, out: Path, without: str = "") -> None:
         if not is_urdf(path):
             _check_model(path, half)
         half.replace(out)
+    except SceneError as error:
+        raise SceneError(str(error).replace(str(half), f"The new form of {path}")) from None
     except OSError as error:
         raise OutputError(f"{out} cannot be written: {error.strerror}.") from None
     finally:
@@ -94,7 +99,7 @@ def _check_model(path: Path, half: Path) -> None:
 def _at(after: Audit, before: Audit) -> dict[str, Any]:
     from crossbody.reports.importers.expected import expected
 
-    return expected(after.scene, before.job)
+    return expected(after.scene, before.job) | {"numbers": after.wanted["numbers"]}
 
 
 def _numbers(text: str) -> Floats:

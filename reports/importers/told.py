@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from crossbody.reports.importers.causes import advice
-from crossbody.reports.importers.compare import FAILED, NONE, OK, QUANTITIES, UNSUPPORTED, WRONG, Row
+from crossbody.reports.importers.compare import FAILED, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
 
 LEVELS = {WRONG: "error", FAILED: "error", UNSUPPORTED: "note"}
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -17,11 +18,13 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 def sentence(row: Row) -> str:
     """Return what is wrong, in one sentence."""
-    if row.verdict in (FAILED, UNSUPPORTED):
-        said = "unsupported" if row.verdict == UNSUPPORTED else "failed"
-        return f"{row.engine}: {row.quantity} {said}: {row.why}"
-    values = f" is {row.value:.6g}, and {row.expected:.6g} in the file" if None not in (row.value, row.expected) else ""
-    return f"{row.engine}: {row.quantity}: {row.where}{values}."
+    if row.verdict in (FAILED, UNSUPPORTED, UNSEEN):
+        return f"{row.engine}: {row.quantity} {row.verdict}: {row.why}"
+    if None in (row.value, row.expected):
+        return f"{row.engine}: {row.quantity}: {row.where}."
+    if row.where.endswith((" missing", " more", " joints", " touch")):  # then they are numbers of parts
+        return f"{row.engine}: {row.quantity}: {row.where}: {row.value:g} of them, and {row.expected:g} in the file."
+    return f"{row.engine}: {row.quantity}: {row.where} is {row.value:.6g}, and {row.expected:.6g} in the file."
 
 
 def cell(row: Row | None) -> str:
@@ -64,7 +67,8 @@ def markdown(path: Path, rows: Sequence[Row]) -> str:
 
 
 def _where(row: Row) -> str:
-    return f" Line {row.line}: {row.cause}. {advice(row.cause)}" if row.cause else ""
+    place = f"Line {row.line} of {Path(row.file).name}"
+    return f" {place}: {row.doubt} {row.cause}. {advice(row.cause)}".replace("  ", " ") if row.cause else ""
 
 
 def sarif(path: Path, rows: Sequence[Row]) -> str:
@@ -84,7 +88,11 @@ def _rule(row: Row) -> str:
 
 
 def _result(path: Path, row: Row) -> dict[str, Any]:
-    place: dict[str, Any] = {"artifactLocation": {"uri": path.as_posix()}, "region": {"startLine": row.line or 1}}
+    uri = quote(row.file or path.as_posix())
+    place: dict[str, Any] = {
+        "artifactLocation": {"uri": uri},
+        "region": {"startLine": row.line or 1},
+    }
     return {
         "ruleId": _rule(row), "level": LEVELS[row.verdict], "message": {"text": sentence(row)},
         "locations": [{"physicalLocation": place}],
@@ -93,4 +101,4 @@ def _result(path: Path, row: Row) -> dict[str, Any]:
 
 def alike(rows: Sequence[Row]) -> bool:
     """Return whether nothing is wrong, and no reader fails."""
-    return all(row.verdict in (OK, NONE, UNSUPPORTED) for row in rows)
+    return all(row.verdict not in (WRONG, FAILED) for row in rows)

@@ -14,6 +14,7 @@ from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName
 from crossbody.cases.files.case import case_of
 from crossbody.engines import Engine, Run
+from crossbody.reports.commands.planned import tell
 
 T_END = 0.8
 
@@ -221,3 +222,16 @@ def test_versions_are_stated(name: str) -> None:
     assert FOUND[name].name == name
     assert FOUND[name].versions
     assert all(version[0].isdigit() for version in FOUND[name].versions.values())
+
+
+def test_a_dry_run_builds_nothing_of_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What would be compiled for a run; the settings told are those that it has all the same."""
+    case, engine = cases.load("bouncing_ball"), engines.load("reference")
+    told = {profile: dict(engine.prepare(case, profile).settings) for profile in ("compiled", "ida")}
+
+    def build(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("crossbody.engines.reference.system_of", build)
+    assert {profile: dict(engine.planned(case, profile)) for profile in told} == told
+    assert tell(["bouncing_ball"], ["reference"], None, (), ()) == 0

@@ -12,25 +12,15 @@ import pytest
 import yaml
 from places import ROBOTS, ROOT
 from robot_damage import damaged
+from robot_readers import ARM, rows_of, run
 
 from crossbody.cases import CrossbodyError
-from crossbody.reports.cli import main
 from crossbody.reports.importers.audit import audited, opened
 from crossbody.reports.importers.causes import advice, explained
-from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WORDS, WRONG, Row, said_of
+from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WORDS, WRONG, Row, Said
 from crossbody.reports.importers.told import markdown, sarif
 
 pytest_plugins = ["pytester"]
-
-ARM = """<mujoco model="arm"><worldbody><body name="arm"><joint name="arm" axis="0 1 0"/>
-<inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .01"/></body></worldbody></mujoco>"""
-
-
-def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as end:
-        main(arguments)
-    out, err = capsys.readouterr()
-    return int(str(end.value.code)), out, err
 
 
 @pytest.mark.parametrize("path", sorted(ROBOTS.glob("*/*.xml")), ids=lambda path: path.stem)
@@ -207,15 +197,6 @@ TWO = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="b1"><joint 
 <geom size=".1" pos="0 0 .5" mass="1"/></body></body></worldbody></mujoco>"""
 
 
-def rows_of(path: Path, engine: str, text: str, changed: str) -> dict[str, str]:
-    """Verdicts of a reader that reads one file while the yardstick holds it to another."""
-    path.write_text(text)
-    wanted = opened(path)
-    path.write_text(changed)
-    [(_, _, rows)] = audited(path, [engine], seconds=60.0, audit=wanted)
-    return {row.quantity: row.verdict for row in rows}
-
-
 @pytest.mark.parametrize(
     ("quantity", "own", "other"),
     [
@@ -237,8 +218,8 @@ def test_a_ball_joint_has_a_bound_that_is_compared(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("line", ["warning: the attribute 'inertiagrouprange' will be ignored.", "ranges are here"])
 def test_a_warning_of_something_else_excuses_nothing(line: str) -> None:
-    assert said_of(WORDS["limits"], [line]) == ""
-    assert said_of(WORDS["limits"], ["warning: the attribute 'range' is ignored."]) != ""
+    assert Said([line], {}, set()).excuse(WORDS["limits"], {"j2"}) == ""
+    assert Said(["warning: the attribute 'range' is ignored."], {}, set()).excuse(WORDS["limits"], {"j2"})
 
 
 def test_what_is_asked_to_be_written_changes_no_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

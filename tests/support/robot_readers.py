@@ -1,8 +1,13 @@
-"""Importers that do what importers of robot files have been seen to do, as files of plug-ins."""
+"""Audits in tests, and importers that do what importers of robot files have been seen to do, as files of plug-ins."""
 
 from __future__ import annotations
 
 from pathlib import Path
+
+import pytest
+
+from crossbody.reports.cli import main
+from crossbody.reports.importers.audit import audited, opened
 
 HEAD = 'FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "numpy", "numpy"\n\ndef open_robot(path, urdf):\n'
 BAD = {
@@ -25,3 +30,24 @@ def importer(folder: Path, name: str, body: str) -> Path:
     path = folder / f"{name}.py"
     path.write_text(HEAD + body + "\n", encoding="utf-8")
     return path
+
+
+ARM = """<mujoco model="arm"><worldbody><body name="arm"><joint name="arm" axis="0 1 0"/>
+<inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .01"/></body></worldbody></mujoco>"""
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    """Return exit code, output and messages of a command."""
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(str(end.value.code)), out, err
+
+
+def rows_of(path: Path, engine: str, text: str, changed: str) -> dict[str, str]:
+    """Verdicts of a reader that reads one file while the yardstick holds it to another."""
+    path.write_text(text)
+    wanted = opened(path)
+    path.write_text(changed)
+    [(_, _, rows)] = audited(path, [engine], seconds=60.0, audit=wanted)
+    return {row.quantity: row.verdict for row in rows}

@@ -1,0 +1,344 @@
+"""Whatever a file says is compared: a reader that makes something else of it is told, and excused for nothing else."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from robot_readers import ARM, HEAD, rows_of, run
+
+from crossbody.cases import CrossbodyError, installed
+from crossbody.cases.files.conformance import FEATURES
+from crossbody.engines import importers
+from crossbody.engines.importers.process import bounds, rotation, tried
+from crossbody.reports.importers.audit import audited, opened
+from crossbody.reports.importers.causes import explained, uses
+from crossbody.reports.importers.compare import NONE, OK, UNSEEN, WORDS, WRONG, Said, rows
+from crossbody.reports.importers.fix import MARK
+from crossbody.reports.importers.told import sarif, sentence
+
+PARTS = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
+<site name="s0" pos="0 0 2"/><body name="b1" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="1 .2 .3"
+ stiffness="4 .5 .6"/><geom name="g1" type="capsule" size=".05 .2" mass="1"/>
+<body name="b2" pos="0 .1 .5" euler="10 20 30"><joint name="j2" type="ball" damping=".4" stiffness="2"/>
+<geom name="g2" type="box" size=".1 .2 .3" euler="15 0 0" mass="1"/><body name="b3" pos=".1 0 .4"><joint name="j3"/>
+<geom name="g3" type="cylinder" size=".1 .2" mass="1"/><geom name="g4" type="ellipsoid" size=".1 .2 .3" pos="0 0 .1"/>
+<site name="s1" pos="0 0 .1"/></body></body></body></worldbody>
+<contact><exclude body1="b1" body2="b3"/></contact>
+<tendon><fixed name="t1" stiffness="3"><joint joint="j1" coef="2"/><joint joint="j3" coef="1"/></fixed>
+<spatial name="t2" damping="2" springlength=".1"><site site="s0"/><site site="s1"/></spatial></tendon>
+<equality><connect name="e1" body1="b3" body2="b1" anchor="0 0 .1"/><weld name="e2" body1="b3" relpose="0 0 1 1 0 0 0"/>
+<joint name="e3" joint1="j1" joint2="j3" polycoef=".1 2 0 0 0"/></equality>
+<actuator><motor name="m1" joint="j1" gear="3"/><motor name="m2" joint="j2" gear="1 2 3"/>
+<position name="m3" joint="j3" kp="10" kv="1"/><motor name="m4" tendon="t2" gear="2"/></actuator></mujoco>"""
+CHANGES = [
+    ("damping", '"1 .2 .3"', '"1 .21 .3"'), ("damping", '"1 .2 .3"', '"1 .2 .31"'),
+    ("springs", '"4 .5 .6"', '"4 .5 .7"'),
+    ("damping", 'damping=".4"', 'damping=".5"'), ("springs", 'stiffness="2"', 'stiffness="2.1"'),
+    ("tendons", 'coef="2"', 'coef="2.5"'), ("tendons", 'springlength=".1"', 'springlength=".11"'),
+    ("tendons", 'name="s1" pos="0 0 .1"', 'name="s1" pos="0 0 .2"'), ("loops", 'anchor="0 0 .1"', 'anchor="0 0 .2"'),
+    ("loops", '"0 0 1 1 0 0 0"', '"0 .1 1 1 0 0 0"'), ("loops", '"0 0 1 1 0 0 0"', '"0 0 1 1 .1 0 0"'),
+    ("loops", '".1 2 0 0 0"', '".1 2.1 0 0 0"'), ("loops", 'joint1="j1" joint2="j3"', 'joint1="j3" joint2="j1"'),
+    ("loops", 'body2="b1" anchor', 'body2="b2" anchor'), ("actuators", 'gear="3"', 'gear="-3"'),
+    ("actuators", 'gear="1 2 3"', 'gear="1 2 4"'), ("actuators", 'kp="10"', 'kp="11"'),
+    ("actuators", 'kv="1"', 'kv="2"'),
+    ("actuators", 'tendon="t2"', 'tendon="t1"'), ("shapes", '".1 .2 .3" euler', '".2 .1 .3" euler'),
+    ("shapes", 'euler="15 0 0"', 'euler="-15 0 0"'), ("shapes", 'type="ellipsoid"', 'type="box"'),
+    ("shapes", 'pos="0 0 .1"/>\n', 'pos="0 0 .2"/>\n'),
+    ("shapes", '<geom name="g4"', '<geom name="g4" contype="0" conaffinity="0"'),
+    ("contacts", '<exclude body1="b1" body2="b3"/>', ""),
+    ("contacts", "<contact>", '<contact><pair geom1="g1" geom2="g2"/>'),
+    ("contacts", 'name="g1"', 'name="g1" contype="2" conaffinity="2"'),
+]  # fmt: skip
+"""Quantity, what a file says, and what a reader might take it for."""
+
+
+@pytest.mark.parametrize(("quantity", "here", "there"), CHANGES)
+def test_what_a_reader_might_mistake_is_a_difference(quantity: str, here: str, there: str, tmp_path: Path) -> None:
+    assert here in PARTS
+    assert rows_of(tmp_path / "parts.xml", "mujoco", PARTS, PARTS.replace(here, there, 1))[quantity] == WRONG
+
+
+def test_our_tree_and_mujoco_agree_on_everything_that_is_compared(tmp_path: Path) -> None:
+    """Forces of actuators, lengths of tendons, ends of loops, boxes of shapes and pairs: computed by either alone."""
+    told = rows_of(tmp_path / "parts.xml", "mujoco", PARTS, PARTS)
+    assert set(told.values()) <= {OK, NONE}, told
+    assert {key for key, verdict in told.items() if verdict == NONE} == {"armature", "limits", "friction"}
+
+
+@given(
+    st.sampled_from(["sphere", "capsule", "cylinder", "box", "ellipsoid"]),
+    st.lists(st.floats(0.01, 2.0), min_size=3, max_size=3), st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7),
+)  # fmt: skip
+def test_bounds_of_a_shape_touch_it_from_all_sides(kind: str, size: list[float], place: list[float]) -> None:
+    """A plane 1 m beyond each bound is 1 m from the shape, as another library measures it."""
+    turn = [place[3] + 1.5, *place[4:]]
+    found = np.array(bounds(kind, size, (), place[:3], rotation(turn)))
+    for axis, (low, high) in enumerate(zip(found[:3], found[3:], strict=True)):
+        for sign, edge in ((1.0, high), (-1.0, low)):
+            point, normal = np.array(place[:3]), -sign * np.eye(3)[axis]
+            point[axis] = edge + sign
+            said = (" ".join(f"{x:.17g}" for x in part) for part in (size, place[:3], turn, point, normal))
+            text = "<geom type='{}' size='{}' pos='{}' quat='{}'/><geom type='plane' size='9 9 9' pos='{}' zaxis='{}'/>"
+            body = text.format(kind, *said)
+            model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+            data = mujoco.MjData(model)
+            mujoco.mj_forward(model, data)
+            assert mujoco.mj_geomDistance(model, data, 1, 0, 10.0, None) == pytest.approx(1.0, abs=1e-5)
+
+
+BALL = """<mujoco><compiler angle="radian"/><worldbody><body name="a">
+<joint name="j1" type="ball" range="0 1"/>{0}<body name="b" pos="0 0 1">
+<joint name="j2" axis="0 1 0" range="-1 1"/>{0}</body></body></worldbody></mujoco>""".format(
+    '<inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .1"/>'
+)
+
+
+@pytest.mark.parametrize(
+    ("line", "excuses"),
+    [
+        ("a.xml:2: warning: The attribute 'range' found in a 'joint' tag is unsupported and will be ignored.", {"j1"}),
+        ("warning: range of joint 'j2' is ignored.", {"j2"}), ("warning: ranges are ignored.", {"j1", "j2"}),
+        ("a.xml:2: The tag 'limit' found as a child of 'joint' is currently unsupported.", {"j1", "j2"}),
+    ],
+)  # fmt: skip
+def test_a_warning_excuses_what_it_names(line: str, excuses: set[str], tmp_path: Path) -> None:
+    """A hinge that is read wrongly is wrong, whatever is said of the ball joint; and so is it behind a larger one."""
+    path = tmp_path / "a.xml"
+    path.write_text(BALL)
+    audit = opened(path)
+    for name in ("j1", "j2"):
+        answer = json.loads(json.dumps(audit.wanted)) | {"version": "1", "told": [line]}
+        answer["numbers"]["upper"][name] = [0.5]
+        told = {row.quantity: row.verdict for row in rows("e", answer, audit.wanted, audit.job["joints"], audit.named)}
+        assert (told["limits"] != WRONG) == (name in excuses), name
+    answer["numbers"]["upper"]["j1"] = [1e3]
+    told = {row.quantity: row.verdict for row in rows("e", answer, audit.wanted, audit.job["joints"], audit.named)}
+    assert (told["limits"] != WRONG) == (excuses == {"j1", "j2"})
+
+
+def test_a_body_that_a_reader_does_not_have_is_a_row(tmp_path: Path) -> None:
+    path = tmp_path / "a.xml"
+    path.write_text(BALL)
+    audit = opened(path)
+    answer = json.loads(json.dumps(audit.wanted)) | {"version": "1"}
+    del answer["states"][0]["frames"]["b"]
+    [row] = [row for row in rows("e", answer, audit.wanted, audit.job["joints"]) if row.verdict == WRONG]
+    assert sentence(row) == "e: bodies: b is missing: 1 of them, and 2 in the file."
+
+
+def test_what_no_engine_shows_is_never_ok(tmp_path: Path) -> None:
+    path = tmp_path / "parts.xml"
+    path.write_text(PARTS.replace('"1 .2 .3"', '"1"').replace('"4 .5 .6"', '"4"'))
+    [(_, _, found)] = audited(path, ["pinocchio"], seconds=60.0)
+    told = {row.quantity: row for row in found}
+    assert told["contacts"].verdict == UNSEEN
+    assert "contacts not shown: " in sentence(told["contacts"])
+
+
+LINK = """<inertial><origin xyz="0 0 .1"/><mass value="1"/>
+<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>"""
+URDF = f"""<robot name="r"><link name="base"/><link name="a">{LINK}</link><joint name="j" type="revolute">
+<parent link="base"/><child link="a"/><axis xyz="0 1 0"/><limit %s effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("limit", "bounds_"), [("", (0.0, 0.0)), ('lower=".5" upper=".5"', (0.5, 0.5)), ('upper="1"', (0.0, 1.0))]
+)
+def test_bounds_of_a_urdf_are_what_its_format_says(limit: str, bounds_: tuple[float, float], tmp_path: Path) -> None:
+    """Its compiler takes bounds that are alike, and those that are not given, for none: the audit does not."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF % limit)
+    wanted = opened(path).wanted["numbers"]
+    assert (wanted["lower"]["j"], wanted["upper"]["j"]) == ([bounds_[0]], [bounds_[1]])
+
+
+def test_a_planar_joint_is_called_by_its_own_name(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text((URDF % "").replace("revolute", "planar"))
+    [(_, _, found)] = audited(path, ["pinocchio"], seconds=60.0)
+    told = {row.quantity: row for row in found}
+    assert (told["coordinates"].verdict, told["coordinates"].why[:12]) == (UNSEEN, "j is planar:")
+
+
+def test_nothing_is_written_over_what_is_read_or_is_somebody_elses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, part, other = tmp_path / "arm.xml", tmp_path / "part.xml", tmp_path / "other.xml"
+    joint = '<joint name="arm" axis="0 1 0"/>'
+    path.write_text(ARM.replace(joint, '<include file="part.xml"/>'))
+    part.write_text(f"<mujocoinclude>{joint}</mujocoinclude>")
+    other.write_text("mine")
+    for words in (
+        ["--fix", "part.xml", "--force"],
+        ["--sarif", "part.xml"],
+        ["--markdown", "arm.xml"],
+        ["--fix", "other.xml"],
+    ):
+        words[1] = str(tmp_path / words[1])
+        before = Path(words[1]).read_text()
+        assert run(["audit", str(path), "-e", "mujoco", *words], capsys)[0] == 2, words
+        assert Path(words[1]).read_text() == before
+    for words in (["--force"], []):  # what it has written it may write again
+        assert run(["audit", str(path), "-e", "mujoco", "--fix", str(other), *words], capsys)[0] == 0
+    assert MARK in other.read_text()
+
+
+def test_what_is_no_file_or_nobody_reads_is_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, _, err = run(["audit", str(tmp_path)], capsys)
+    assert (code, "is a folder" in err) == (2, True)
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    monkeypatch.setattr(installed, "_FILES", {})
+    reader = tmp_path / "urdf_only.py"
+    reader.write_text(HEAD.replace('("mjcf", "urdf")', '("urdf",)') + "    return None\n")
+    installed.use([reader])
+    code, _, err = run(["audit", str(path), "-e", "urdf_only"], capsys)
+    assert (code, "reads no files of this format; valid: urdf" in err) == (2, True)
+    reader.write_text(reader.read_text().replace('"numpy", "numpy"', '"nopackage", "nopackage"'))
+    installed.use([reader])
+    code, _, err = run(["audit", str(path), "-e", "urdf_only"], capsys)
+    assert code == 2
+    code, _, err = run(["audit", str(path), "-e", "exudyn"], capsys)
+    assert (code, "no reader of robot files of its own" in err) == (2, True)
+
+
+def test_a_version_that_was_not_tried_is_told() -> None:
+    class Module:
+        PACKAGE, TRIED = "numpy", ("0.1", "0.2")
+
+    assert "was tried with 0.1 to 0.2" in tried(Module)
+    Module.TRIED = ("0.1", "99.0")
+    assert tried(Module) == ""
+
+
+def test_a_file_with_a_strange_name_is_told_in_print(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / ("arm " + "long" * 30 + "\x1b[31m.xml")
+    path.write_text(ARM)
+    code, out, _ = run(["audit", str(path), "-e", "mujoco"], capsys)
+    assert (code, "\x1b" in out, max(map(len, out.splitlines())) <= 80) == (0, False, True)
+    [(_, _, found)] = audited(path, ["mujoco"])
+    off = [row for row in found if row.quantity == "M"]
+    uri = json.loads(sarif(path, [type(off[0])(engine="e", quantity="M", verdict=WRONG)]))
+    place = uri["runs"][0]["results"][0]["locations"][0]["physicalLocation"]
+    assert "arm%20long" in place["artifactLocation"]["uri"]
+    assert "%1B" in place["artifactLocation"]["uri"]
+
+
+def test_a_cause_is_one_without_which_the_reader_agrees(tmp_path: Path) -> None:
+    """Two things that Pinocchio reads wrongly: each quantity has its own, on its line."""
+    path = tmp_path / "arm.xml"
+    text = ARM.replace("<worldbody>", '<option gravity="0 0 -3"/>\n<worldbody>\n<body name="base" pos="1 0 0">')
+    path.write_text(text.replace("</worldbody>", "</body></worldbody>"))
+    found = [row for _, _, own in audited(path, ["pinocchio"], seconds=60.0) for row in own]
+    told = {row.quantity: row for row in explained(path, urdf=False, rows=found, seconds=60.0) if row.verdict == WRONG}
+    assert {key: (row.cause, row.doubt, row.line) for key, row in told.items()} == {
+        **dict.fromkeys(("gravity", "bias", "energy"), ("gravity", "", 1)),
+        "frames": ("fixed body with a pose under the world", "", 3),
+    }
+
+
+def test_a_feature_stands_in_the_file_that_is_included(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.replace("<worldbody>", '<include file="part.xml"/>\n<worldbody>'))
+    (tmp_path / "part.xml").write_text('<mujocoinclude>\n\n<option gravity="0 0 -3"/></mujocoinclude>')
+    told = {use.feature.name: [(file.name, line) for file, line in use.places] for use in uses(path, urdf=False)}
+    assert (told["gravity"], told["included file"]) == ([("part.xml", 3)], [("arm.xml", 1)])
+
+
+def test_words_of_a_warning_are_whole(tmp_path: Path) -> None:
+    assert not Said(["the inertiagrouprange is ignored"], {}, set()).excuse(WORDS["limits"], {"j"})
+
+
+def test_every_importer_says_what_it_was_tried_with() -> None:
+    assert all(len(importers.REGISTRY.load(name).TRIED) == 2 for name in importers.names())
+
+
+PLAIN = [
+    feature for feature in FEATURES
+    if feature.format == "mjcf" and not feature.files and {j.type for j in feature.scene.joints} <= {"hinge", "slide"}
+]  # fmt: skip
+
+
+def of_mujoco(path: Path) -> Any:
+    """What gives M and forces at a state by MuJoCo alone, and the names of its joints."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+
+    def at(q: Any, v: Any) -> tuple[Any, Any]:
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        M = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, M)
+        return M - np.diag(model.dof_armature), data.qfrc_bias - data.qfrc_gravcomp
+
+    return at, [model.joint(i).name for i in range(model.njnt)], model.qpos0
+
+
+def of_pinocchio(path: Path, names: list[str]) -> Any:
+    """The same by Pinocchio alone; nothing where it has other joints."""
+    import pinocchio
+
+    model = pinocchio.buildModelAndConstraintsFromMJCF(str(path))[0]
+    data = model.createData()
+    if list(model.names)[1:] != names or model.nv != len(names):
+        return None
+
+    def at(q: Any, v: Any) -> tuple[Any, Any]:
+        M = np.triu(pinocchio.crba(model, data, q))
+        return M + np.triu(M, 1).T - np.diag(model.armature), pinocchio.nonLinearEffects(model, data, q, v)
+
+    return at
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_verdicts_are_what_two_libraries_say_of_a_changed_file(seed: int, tmp_path: Path) -> None:
+    """A number of a feature's file is changed, 20 a seed: M, weight and bias differ by the audit where they do."""
+    draw, seen = np.random.default_rng(seed), 0
+    for k in range(20):
+        feature = PLAIN[draw.integers(len(PLAIN))]
+        found = list(re.finditer(r'(?<=[" ])-?\d*\.?\d+(?=[" ])', feature.text))
+        one, path = found[draw.integers(len(found))], tmp_path / f"{k}.xml"
+        new = float(one.group()) * draw.choice([1.0001, -1.0, 2.0, 0.0]) + draw.choice([0.0, 0.3])
+        path.write_text(feature.text[: one.start()] + repr(float(new)) + feature.text[one.end() :])
+        try:
+            truth, names, home = of_mujoco(path)
+            told = {engine: own for _, engine, own in audited(path, ["mujoco", "pinocchio"], seconds=60.0)}
+        except (ValueError, CrossbodyError):
+            continue
+        if "gravcomp" in feature.text and new < 0.0:  # MuJoCo 4.0 leaves it out where no body has a positive one
+            continue
+        assert {row.verdict for row in told["mujoco"]} <= {OK, NONE}, (feature.name, one.group(), new)
+        other = of_pinocchio(path, names) if told["pinocchio"][0].verdict == OK else None
+        if other is None:
+            continue
+        seen += 1
+        off = dict.fromkeys(("M", "gravity", "bias"), 0.0)
+        for _ in range(4):
+            q, v = home + draw.uniform(-1.0, 1.0, len(home)), draw.normal(size=len(home))
+            for quantity, i, rate in (("M", 0, v), ("gravity", 1, 0.0 * v), ("bias", 1, v)):
+                mine, theirs = truth(q, rate), other(q, rate)
+                size = np.abs(mine[i]).max() + np.abs(mine[0]).max()
+                off[quantity] = max(off[quantity], float(np.abs(mine[i] - theirs[i]).max() / size))
+        for row in told["pinocchio"]:
+            if row.quantity in off and not 1e-12 < off[row.quantity] < 1e-6:
+                assert (row.verdict == OK) == (off[row.quantity] < 1e-9), (feature.name, new, row, off)
+    assert seen >= 3
+
+
+def test_a_joint_that_mimics_in_dart_is_not_said_to_be_missing(tmp_path: Path) -> None:
+    """Its Python tells that there is one, and not of which joint."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(next(feature.text for feature in FEATURES if feature.name == "URDF: mimic"))
+    [(_, _, found)] = audited(path, ["dart"], seconds=60.0)
+    assert {row.quantity: row.verdict for row in found}["loops"] == UNSEEN
