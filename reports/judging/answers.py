@@ -63,8 +63,8 @@ def _places(known: Floats, times: Floats) -> NDArray[np.intp] | None:
     again = np.zeros(len(times), dtype=np.intp)
     again[1:] = times[1:] == times[:-1]
     places = np.searchsorted(known, times, side="left") + again
-    there = bool(len(times) and places[-1] < len(known) and (known[places] == times).all())
-    return places if there else None
+    inside = len(times) > 0 and places.max() < len(known)
+    return places if inside and (known[places] == times).all() else None
 
 
 def _taken(run: Trajectory, places: NDArray[np.intp]) -> Trajectory:

@@ -16,7 +16,18 @@ from random_scenes import random_scene, random_state
 from scenes import BALL
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Control, ControlError, Inputs, InvalidValue, Law, Outcome, SceneError, Trajectory
+from crossbody.cases import (
+    Case,
+    Control,
+    ControlError,
+    Inputs,
+    InvalidValue,
+    Law,
+    Outcome,
+    SceneError,
+    Tier,
+    Trajectory,
+)
 from crossbody.cases.scene import Actuator, Body, Joint, Push, Scene
 from crossbody.reference import ensemble, kernels, linear, simulate
 from crossbody.reference.systems import _none
@@ -25,6 +36,7 @@ from crossbody.reports.bench.ladder import Ladder
 from crossbody.reports.bench.measure import Effort, bench
 from crossbody.reports.cli import cli
 from crossbody.reports.measuring.modes import violated
+from crossbody.reports.measuring.truth import from_run
 from crossbody.reports.metrics import load as metric
 from crossbody.reports.runs.jobs import Pick
 
@@ -122,7 +134,7 @@ def test_steps_that_are_taken_back_ask_nothing_again(engine: str, profile: str) 
     assert run.outcome.ok, run.message
     assert len(run.events) > 3  # it hits the wall again and again
     assert calls == [k * 0.01 for k in range(80)]
-    law = metric("law_residual").measure(None, run, case)
+    law = metric("law_residual").measure(from_run(run, Tier.D, ""), run, case)
     assert law is not None
     assert law < 1e-6
     if engine == "reference":
