@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import Any
+from uuid import uuid4
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -132,7 +133,7 @@ class _Trials:
 
     def _form(self, key: tuple[str, ...], features: Sequence[Feature]) -> Any:
         if key not in self._opened:
-            out = self.folder / f"{len(self._opened)}-{self.path.name}"
+            out = self.folder / f"{uuid4().hex}{self.path.suffix}"  # links to the user's files stand there too
             self._opened[key] = None
             try:
                 left_out(self.path, features, out) if features else fixed(self.path, out, self.without)

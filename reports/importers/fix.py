@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 from xml.etree import ElementTree
 
 import numpy as np
@@ -50,6 +51,10 @@ KEPT = (
     "key_ctrl",
 )  # fmt: skip
 """Of the compiled model: what the rewriting must not touch."""
+STATES, LIKE = 3, 1e-7
+"""States at which places are compared, and how far they may be apart, m; sizes of meshes have single precision."""
+SPHERE, BOX, ROUND = 2, 6, (0, 3, 5)
+"""Types of shapes: those in ROUND (plane, capsule, cylinder) are the same however turned about their axis."""
 
 
 def fixed(path: Path, out: Path, without: str = "") -> None:
@@ -62,7 +67,9 @@ def fixed(path: Path, out: Path, without: str = "") -> None:
     root = _urdf(path) if is_urdf(path) else _mjcf(path, out)
     root.insert(0, ElementTree.Comment(f" {MARK} "))
     ElementTree.indent(root)
-    half = out.with_name(f".{out.stem}.half{out.suffix}")
+    if out.suffix not in (".xml", ".urdf"):
+        raise OutputError(f"{out} cannot be written: the name of a robot file ends in .xml or .urdf.")
+    half = out.with_name(f".{uuid4().hex}{out.suffix}")
     try:
         half.write_text(ElementTree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
         _check(before, opened(half, without), path)
@@ -94,6 +101,43 @@ def _check_model(path: Path, half: Path) -> None:
         old, new = np.asarray(getattr(before, name)), np.asarray(getattr(after, name))
         if old.shape != new.shape or not np.allclose(old, new, rtol=1e-9, atol=1e-12, equal_nan=True):
             raise SceneError(f"{path} cannot be rewritten: {name} of its compiled model would differ.")
+    for (what, old), (_, new) in zip(_placed(before), _placed(after), strict=True):
+        if not _same(old, new):
+            raise SceneError(f"{path} cannot be rewritten: {what} would differ.")
+
+
+def _placed(model: Any) -> Iterator[tuple[str, Floats]]:
+    """Yield where shapes, sites, cameras and lights are, and what sensors say, at states that are always the same."""
+    import mujoco
+
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    for _ in range(STATES):
+        mujoco.mj_resetData(model, data)
+        mujoco.mj_integratePos(model, data.qpos, rng.uniform(-1.0, 1.0, model.nv), 1.0)
+        data.qvel[:] = rng.uniform(-1.0, 1.0, model.nv)
+        mujoco.mj_forward(model, data)
+        for what, kinds, p, R in (
+            ("where shapes are", model.geom_type, data.geom_xpos, data.geom_xmat),
+            ("where sites are", model.site_type, data.site_xpos, data.site_xmat),
+            ("where cameras are", np.full(model.ncam, BOX), data.cam_xpos, data.cam_xmat),
+        ):
+            turns = R.reshape(-1, 3, 3).copy()
+            turns[kinds == SPHERE] = 0.0
+            turns[np.isin(kinds, ROUND), :, :2] = 0.0  # however they are turned about their axis
+            yield what, np.column_stack([kinds, p, turns.reshape(-1, 9)])
+        yield "where lights are", np.column_stack([data.light_xpos, data.light_xdir])
+        yield "what sensors say", np.column_stack([np.arange(model.nsensordata), data.sensordata])
+        yield "how many contacts there are", np.array([[data.ncon]], dtype=float)
+
+
+def _same(old: Floats, new: Floats) -> bool:
+    """Return whether every row has its like: the order may be another."""
+    if old.shape != new.shape:
+        return False
+    if not old.size:
+        return True
+    off = np.abs(old[:, None] - new[None]).max(axis=2) / (1.0 + np.abs(old).max())
+    return bool((off.min(axis=0) < LIKE).all() and (off.min(axis=1) < LIKE).all())
 
 
 def _at(after: Audit, before: Audit) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from crossbody.cases.files.urdf import PLANAR
 
 FLOOR = 1e-4
 """Part of the largest force that is the scale of the smallest ones: rounding is that of the sums they stand in."""
+STANDARD = 9.81
+"""Gravity, m/s^2."""
 SINGLE = 1e-6
 """Part of the reach within which corners of meshes are the same: files and engines have them in single precision."""
 NUMBERS = {
@@ -129,9 +131,12 @@ def _matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str], f
 
 
 def _moved(wanted: Mapping[str, Any], M: Floats | None) -> float:
-    """Return the size of forces at the velocities of the states, where there are no larger ones."""
+    """Return the size of the sums that forces are, where these cancel: weights far out, and what velocities make."""
     v = np.array([state["v"] for state in wanted["states"]])
-    return 0.0 if M is None else float(np.abs(M).max(initial=0.0) * (v**2).max(initial=0.0))
+    weights: float = (
+        STANDARD * sum(abs(inertia[0]) for inertia in wanted["inertias"].values()) * _reach(wanted["states"])
+    )
+    return weights if M is None else max(weights, float(np.abs(M).max(initial=0.0) * (v**2).max(initial=0.0)))
 
 
 def _forces(

@@ -342,3 +342,18 @@ def test_a_joint_that_mimics_in_dart_is_not_said_to_be_missing(tmp_path: Path) -
     path.write_text(next(feature.text for feature in FEATURES if feature.name == "URDF: mimic"))
     [(_, _, found)] = audited(path, ["dart"], seconds=60.0)
     assert {row.quantity: row.verdict for row in found}["loops"] == UNSEEN
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rounding_of_weights_far_out_is_no_difference(seed: int, tmp_path: Path) -> None:
+    """A balanced wheel on a post with mass: its gravity is 0, of sums that are not."""
+    rng = np.random.default_rng(seed)
+    place, turn = rng.uniform(-0.6, 0.6, 3), rng.uniform(-180.0, 180.0, 3)
+    path = tmp_path / "wheel.xml"
+    path.write_text(
+        f'''<mujoco><worldbody><body euler="{turn[0]} {turn[1]} {turn[2]}"><geom type="box" size=".1 .1 .3"/>
+        <body pos="{place[0]} {place[1]} {place[2]}"><joint name="s" axis="0 0 1"/>
+        <geom type="cylinder" size=".02 .01"/></body></body></worldbody></mujoco>'''
+    )
+    found = {row.quantity: row for _, _, rows in audited(path, ["mujoco", "pinocchio"]) for row in rows}
+    assert not [row for row in found.values() if row.verdict == WRONG and row.quantity in ("gravity", "bias")]

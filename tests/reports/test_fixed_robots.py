@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from places import ROBOTS
 
-from crossbody.cases import SceneError
+from crossbody.cases import OutputError, SceneError
 from crossbody.cases.files.conformance import FEATURES, Feature
 from crossbody.reports.cli import main
 from crossbody.reports.importers.audit import audited, of_scene, opened
@@ -80,3 +80,53 @@ def test_what_a_rewriting_would_lose_is_refused(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(SceneError, match="geom_friction of its compiled model would differ"):
         fixed(path, out)
     assert not out.exists()
+
+
+ARM = """<mujoco><compiler angle="degree"/><worldbody>
+<body name="stand" pos="0 0 1" euler="0 30 0">{on_stand}
+ <body name="arm" pos=".2 0 0"><joint axis="0 1 0"/><geom size=".1" pos="0 0 -.5"/>
+  <inertial mass="1" pos="0 .1 -.3" diaginertia=".1 .2 .15"/>{on_arm}</body></body>
+</worldbody>{sensor}</mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("parts", "differs"),
+    [
+        ({"on_stand": '<geom type="box" fromto="0 0 0 .1 .2 .6" size=".1"/>'}, "where shapes are"),
+        ({"on_stand": '<camera pos="1 1 1" mode="targetbody" target="stand"/>'}, "where cameras are"),
+        ({"sensor": '<sensor><framequat objtype="body" objname="arm"/></sensor>'}, "what sensors say"),
+    ],
+)
+def test_what_would_stand_or_be_felt_elsewhere_is_refused(
+    parts: dict[str, str], differs: str, tmp_path: Path
+) -> None:  # fmt: skip
+    """Where it stays, the file is written; a capsule may be turned about its axis."""
+    path, out = tmp_path / "arm.xml", tmp_path / "out.xml"
+    nothing = dict.fromkeys(("on_stand", "on_arm", "sensor"), "")
+    path.write_text(ARM.format(**nothing | {"on_stand": '<geom type="capsule" fromto="0 0 0 .1 .2 .6" size=".1"/>'}))
+    fixed(path, out)
+    out.unlink()
+    path.write_text(ARM.format(**nothing | parts))
+    with pytest.raises(SceneError, match=differs):
+        fixed(path, out)
+    assert [one.name for one in tmp_path.iterdir()] == ["arm.xml"]
+
+
+def test_files_of_the_user_with_names_of_trials_stay(tmp_path: Path) -> None:
+    """Causes are tried beside links to all files of the folder; a new form is written beside the user's."""
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.format(on_stand="", on_arm="", sensor="").replace("degree", 'degree" settotalmass="3'))
+    mine = {f"{i}-arm.xml": "mine" for i in range(4)} | {".out.half.xml": "mine"}
+    for name, text in mine.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(SystemExit):
+        main(["audit", str(path), "-e", "pinocchio", "--explain", "--fix", str(tmp_path / "out.xml"), "--quiet"])
+    assert {name: (tmp_path / name).read_text() for name in mine} == mine
+    assert {one.name for one in tmp_path.iterdir()} <= {*mine, "arm.xml", "out.xml"}
+
+
+def test_a_name_that_is_no_robot_files_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.format(on_stand="", on_arm="", sensor=""))
+    with pytest.raises(OutputError, match=r"ends in \.xml or \.urdf"):
+        fixed(path, tmp_path / "notes.txt")
