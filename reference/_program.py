@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
+from importlib import import_module
 from typing import Any
 
 import numba
@@ -45,34 +46,25 @@ _INSTANT = types.int64(types.int64, _KERNELS, _state().dtype, MODEL, WORK, BUFFE
 
 
 @cache
-def _friction() -> Any:
-    """What answers for contacts with friction, from the cache or compiled once a scene has some."""
-    from crossbody.reference.core import friction_answers
-
-    return compiled(friction_answers.answer, [_FRICTION])
+def _unit(module: str, signature: Any) -> Any:
+    """What `answer` of a module of the core is compiled to on its own, from the cache or anew."""
+    return compiled(import_module(f"crossbody.reference.core.{module}").answer, [signature])
 
 
-def friction_code() -> int:
+def _code(module: str, signature: Any) -> int:
     """Where that stands, callable by the convention of compiled functions."""
-    return _code(_friction(), _FRICTION)
-
-
-def _code(function: Any, signature: Any) -> int:
-    found = function.overloads[signature.args]
+    found = _unit(module, signature).overloads[signature.args]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
 
-@cache
-def _instant() -> Any:
-    """What settles modes, from the cache or compiled."""
-    from crossbody.reference.core import instant_answers
-
-    return compiled(instant_answers.answer, [_INSTANT])
+def friction_code() -> int:
+    """Return where the code stands that answers for contacts with friction, which other scenes do not compile."""
+    return _code("friction_answers", _FRICTION)
 
 
 def instant_code() -> int:
-    """Where that stands, callable by the convention of compiled functions."""
-    return _code(_instant(), _INSTANT)
+    """Return where the code stands that settles modes."""
+    return _code("instant_answers", _INSTANT)
 
 
 ADDRESSES = types.int64[::1]

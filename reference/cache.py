@@ -65,15 +65,16 @@ class Compiled(Lean):
         locals: types of its variables, for numba.
         targetoptions: of numba.
         declared: the only signatures that it may be compiled for; those of a call if none are given.
+        beside: called before it is compiled, not where it is read back.
     """
 
     def __init__(
         self, function: Callable[..., Any], locals: Any = None, targetoptions: Any = None,
-        *, declared: Sequence[Any] = (),
+        *, declared: Sequence[Any] = (), beside: Callable[[], None] | None = None,
     ) -> None:  # fmt: skip
         super().__init__(function, locals, {"nopython": True, **(targetoptions or {})}, pipeline_class=WholePasses)
         self._cache = _Overloads(self)
-        self.declared = {tuple(signature.args): signature for signature in declared}
+        self.declared, self.beside = {tuple(signature.args): signature for signature in declared}, beside
 
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, or read the code back."""
@@ -89,14 +90,10 @@ class Compiled(Lean):
             if store is None:
                 return super().compile(sig)
             key = self._cache.key(name, sig)
+            if self.beside is not None and not store.has(key):
+                self.beside()
             with store.alone(key):
                 return super().compile(sig)
-
-    def is_kept(self, sig: Any) -> bool:
-        """Return whether the code for a signature can be read back."""
-        with self._marked() as name:
-            store = code_store.current() if name else None
-            return store is not None and store.has(self._cache.key(name, sig))
 
     @contextmanager
     def _marked(self) -> Iterator[str]:
@@ -263,9 +260,7 @@ def compiled(
     options = {"error_model": "numpy", "nogil": nogil} | ({"boundscheck": True} if debugging() else {})
     if not signatures and not lazy:
         return Part(function, options)
-    found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy))
-    if beside is not None and not all(map(found.is_kept, signatures)):
-        beside()
+    found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy), beside=beside)
     for signature in signatures:
         found.compile(signature)
     if signatures and not lazy:

@@ -26,10 +26,11 @@ from crossbody.reference.kinds import Floats
 from crossbody.reference.options import Options
 from crossbody.reference.sundials import roots
 from crossbody.reference.sundials.compiled import evaluation
+from crossbody.reference.sundials.dense import DenseStep
 from crossbody.reference.sundials.discrete import Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.evaluator import ENDS, Evaluator
-from crossbody.reference.sundials.level_machine import LevelMachine, View, Watch
+from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachine, View, Watch
 
 SHARE = 0.1  # of the tolerance asked for: a multistep method's error grows well beyond that of one step
 CHUNK = 500  # internal steps between two looks at the clock
@@ -40,7 +41,6 @@ UNWATCHED = 1e6  # N: in no error control
 LOOSE = 1e-2  # of the size of a multiplier: it follows from the state
 CAUTIOUS = 0.1  # part of the step at which a formula of order one is as good as the tolerance
 FAR = 1e30  # beyond this a motion has diverged
-SAME_INSTANT = 8.0 * ULP
 MANY = 100  # rows: from there on those that are off have no unknowns; they would be most of a norm, and of a Jacobian
 NOISY = 64.0  # rounding of a multiplier along a step, in units of its bound at the start
 MOST_TERMS = 5  # of the guards of one row
@@ -103,7 +103,7 @@ def _damped_pole(equations: Equations) -> float:
     return float(poles[half > DAMPED * frequency].max(initial=0.0))
 
 
-class Arc:
+class Arc(DenseStep):
     """The part that both solvers share.
 
     Args:
@@ -135,8 +135,7 @@ class Arc:
             self.events.terminal, self.events.direction = (True,), (0,)
             self.common |= {"eventsfn": self.events, "num_events": 1}
         self.solver, y = self._begin(start, view)
-        self.t0, self.t1, self.y0, self.y1 = start.t, start.t, y, y
-        self._defect: Floats | None = None
+        self._stand(start.t, y)
         self.ask(evaluation.BEGIN, start.t, y)
 
     def _begin(self, start: State, view: View) -> tuple[Any, Floats]:
@@ -260,18 +259,6 @@ class Arc:
         now = [guard for t, guard in found if t - end <= SAME_INSTANT * abs(end)]
         rows = [(guard.row, guard.watch) for guard in now if guard.watch is not None]
         return end, Fired(rows, [guard.row for guard in now if guard.watch is None])
-
-    def _between(self, t: float) -> Floats:
-        """The solver's dense output, joined to where the step began: its own polynomial misses that by its error."""
-        if t >= self.t1:
-            return self.y1
-        if t <= self.t0:
-            return self.y0
-        if self._defect is None:
-            self._defect = self.y0 - self.solver.step(self.t0, "normal").y
-        part = (t - self.t0) / (self.t1 - self.t0)
-        y: Floats = self.solver.step(t, "normal").y + ((1.0 - part) ** 2 * (1.0 + 2.0 * part)) * self._defect
-        return y
 
     def at(self, t: float) -> State:
         """The state at an instant of the last step."""

@@ -11,20 +11,18 @@ from sksundae.cvode import CVODE
 from crossbody.cases import Outcome
 from crossbody.reference.kinds import Floats, Floats2
 from crossbody.reference.sundials import roots
-from crossbody.reference.sundials.arcs import FAR, ORDER_IN_CONTACT, SHARE, Fired, State
+from crossbody.reference.sundials.arcs import CHUNK, FAR, ORDER, ORDER_IN_CONTACT, SHARE, Fired, State
+from crossbody.reference.sundials.dense import DenseStep
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.friction_machine import Alarm, FrictionMachine
-from crossbody.reference.sundials.level_machine import LevelMachine, View
+from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachine, View
 from crossbody.reference.sundials.run import CAUTION, SundialsRun
 
-CHUNK = 500
-SAME_INSTANT = 8.0 * ULP
-ORDER = 12
 APART, APART_PART = 1e-7, 0.1  # of positions, and part of a slip without a direction: steps of differences
 STIFF = 10.0  # times the fastest pole of the rows
 
 
-class SlidingArc:
+class SlidingArc(DenseStep):
     """One smooth arc: CVODE on the reduced equations, step by step, by Adams' formulas or backward differentiation.
 
     Friction turns a slip at a rate that goes as 1/|v_t|. CVODE keeps the matrix of Newton's method for twenty steps;
@@ -53,8 +51,7 @@ class SlidingArc:
             jacfn=self._jacobian if self.turning else None,
         )  # fmt: skip
         self.solver.init_step(start.t, y)
-        self.t0, self.t1, self.y0, self.y1 = start.t, start.t, y, y
-        self._defect: Floats | None = None
+        self._stand(start.t, y)
 
     def _slopes(self, t: float, y: Floats, yp: Floats) -> None:
         run, q, v = self.run, np.array(y[: self.nq]), np.array(y[self.nq : self.ny])
@@ -149,18 +146,6 @@ class SlidingArc:
             return float(terms(t)[alarm.terms][0]) - over
 
         return float(brentq(ahead, self.t0, t, xtol=1e-300, rtol=4.0 * ULP)) if ahead(self.t0) > 0.0 else t
-
-    def _between(self, t: float) -> Floats:
-        """The solver's dense output, joined to where the step began."""
-        if t >= self.t1:
-            return self.y1
-        if t <= self.t0:
-            return self.y0
-        if self._defect is None:
-            self._defect = self.y0 - self.solver.step(self.t0, "normal").y
-        part = (t - self.t0) / (self.t1 - self.t0)
-        y: Floats = self.solver.step(t, "normal").y + ((1.0 - part) ** 2 * (1.0 + 2.0 * part)) * self._defect
-        return y
 
     def at(self, t: float) -> State:
         """The state at an instant of the last step."""

@@ -107,6 +107,8 @@ def explained(
         without: as of the audit.
     """
     off = [row for row in rows if row.verdict in (WRONG, FAILED)]
+    if not off:
+        return list(rows)
     used = [use for use in uses(path, urdf) if use.feature.name not in PLAIN]
     with TemporaryDirectory(prefix="crossbody-causes-") as folder, ThreadPoolExecutor(jobs) as pool:
         for one in path.resolve().parent.iterdir():

@@ -277,13 +277,17 @@ class Positions:
     def expect(self, runs: Sequence[Trajectory]) -> None:
         """Have the truth found at once for all runs that will be laid on it."""
         if self.whole.size:
-            self.truth.expect(self._needed(run, clock(self.truth, run))[1] for run in runs if len(run.t))
+            clocks = (clock(self.truth, run) for run in runs if len(run.t))
+            self.truth.expect(self._asked(t, np.unique(self._around(t))) for t in clocks)
 
-    def _needed(self, run: Trajectory, t: Floats) -> tuple[NDArray[np.intp], Floats]:
-        """Return the samples of a run, on the truth's clock t, between which those of the judged one lie; and when."""
+    def _around(self, t: Floats) -> NDArray[np.intp]:
+        """Return the samples at t (n,) before and behind those of the judged run (2, m)."""
         behind = np.clip(np.searchsorted(t, self.t), 0, len(t) - 1)
-        needed = np.unique(np.concatenate([np.maximum(behind - 1, 0), behind]))
-        return needed, np.minimum(t[needed], float(self.truth.trajectory.t[-1]))
+        return np.stack([np.maximum(behind - 1, 0), behind])
+
+    def _asked(self, t: Floats, samples: NDArray[np.intp]) -> Floats:
+        """Return when the truth is asked for at samples: it ends where it ends."""
+        return np.minimum(t[samples], float(self.truth.trajectory.t[-1]))
 
     def _lay(self, run: Trajectory) -> Floats:
         """Return the error of a run.
@@ -294,10 +298,9 @@ class Positions:
         t = clock(self.truth, run)
         if not len(t) or t[-1] < self.t[-1] - REACHED * self.case.t_end:
             raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
-        behind = np.clip(np.searchsorted(t, self.t), 0, len(t) - 1)
-        before = np.maximum(behind - 1, 0)
-        needed, times = self._needed(run, t)
-        exact = self.truth.at(times)
+        before, behind = around = self._around(t)
+        needed = np.unique(around)
+        exact = self.truth.at(self._asked(t, needed))
         error = self._error(run.q[needed], exact.q)
         a, b = (np.searchsorted(needed, side) for side in (before, behind))
         width = (t[behind] - t[before])[:, None]

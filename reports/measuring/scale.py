@@ -31,7 +31,7 @@ def energy(run: Trajectory) -> float:
     by what rounding leaves of the largest energy.
     """
     known = KNOWN * float(np.max(np.abs(run.energy)))
-    moved = float(np.ptp(run.q, axis=0).max(initial=0.0))
+    moved = _moved(run)
     rests = max(1.0, RESTS / moved) if moved > 0.0 else 1.0
     return max(rests * float(run.energy[:, 0].max()), rests * float(np.ptp(run.energy[:, 1])), known)
 
@@ -54,5 +54,8 @@ def idle(run: Trajectory) -> float:
     The force is the energy over the way that it moves things: of what falls, its weight. A robot whose couplings have
     nothing to hold in free fall has multipliers of 1e-13 N, and an error of as much is none.
     """
-    moved = float(np.ptp(run.q, axis=0).max(initial=0.0)) if len(run.q) else 0.0
-    return IDLE * energy(run) / max(moved, RESTS)
+    return IDLE * energy(run) / max(_moved(run), RESTS)
+
+
+def _moved(run: Trajectory) -> float:
+    return float(np.ptp(run.q, axis=0).max(initial=0.0))

@@ -8,7 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from friction_oracle import STICK, Body
-from friction_scenes import EDGED, HEAVIEST, G, account, box_on_floor, linear, point, rod_on_floor, run, tossed
+from friction_scenes import (
+    EDGED,
+    HEAVIEST,
+    G,
+    account,
+    box_on_floor,
+    linear,
+    point,
+    random_problem,
+    rod_on_floor,
+    run,
+    tossed,
+)
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, Trajectory
@@ -113,10 +125,8 @@ def consistent(H: np.ndarray, force: np.ndarray, mu: float, k: int) -> list[np.n
 def test_modes_are_a_set_that_agrees_with_its_forces(seed: int) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(10):
-        k = int(rng.integers(1, 5))
-        n, mu = 2 * k + int(rng.integers(0, 3)), float(rng.uniform(0.05, 1.5))
-        H = rng.normal(size=(2 * k, n)) * 0.6 + np.eye(2 * k, n)
-        force = rng.normal(size=n) * 2.0 - H[:k].T @ np.abs(rng.normal(size=k)) * 2.0
+        H, force, mu, k = random_problem(rng, most=4, rough=1.5)
+        n = len(force)
         sets = consistent(H, force, mu, k)
         run_ = simulate(linear(H, force, mu, k), np.zeros(n), np.zeros(n), 1e-6, rtol=1e-6, max_steps=3)
         if run_.outcome is Outcome.PAINLEVE:

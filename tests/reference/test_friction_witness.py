@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from friction_scenes import account, linear, rod_on_floor, run, tossed
+from friction_scenes import account, linear, random_problem, rod_on_floor, run, tossed
 
 from crossbody import cases, engines
 from crossbody.cases import Mode, Outcome, Tier, Trajectory
@@ -72,11 +72,8 @@ def test_a_rod_that_is_pushed_jams_in_both(mu: float) -> None:
 def test_both_decide_alike_where_one_set_agrees(seed: int) -> None:
     rng, compared = np.random.default_rng(seed), 0
     for _ in range(6):
-        k = int(rng.integers(1, 3))
-        n, mu = 2 * k + int(rng.integers(0, 3)), float(rng.uniform(0.05, 1.0))
-        H = rng.normal(size=(2 * k, n)) * 0.6 + np.eye(2 * k, n)
-        force = rng.normal(size=n) * 2.0 - H[:k].T @ np.abs(rng.normal(size=k)) * 2.0
-        made = linear(H, force, mu, k)
+        made = linear(*random_problem(rng, most=2, rough=1.0))
+        n = made.n
         one, other = (
             simulate(made, np.zeros(n), np.zeros(n), 1e-3, rtol=1e-9, samples=[1e-3], solver=solver)
             for solver in ("compiled", "cvode")

@@ -164,6 +164,14 @@ def linear(H: Any, force: Any, mu: float, contacts: int, *, spring: Any = None, 
     )  # fmt: skip
 
 
+def random_problem(rng: np.random.Generator, most: int, rough: float) -> tuple[Any, Any, float, int]:
+    """Return rows H, forces and mu of 1 to `most` contacts in a plane, for `linear`, and their number."""
+    k = int(rng.integers(1, most + 1))
+    n, mu = 2 * k + int(rng.integers(0, 3)), float(rng.uniform(0.05, rough))
+    H = rng.normal(size=(2 * k, n)) * 0.6 + np.eye(2 * k, n)
+    return H, rng.normal(size=n) * 2.0 - H[:k].T @ np.abs(rng.normal(size=k)) * 2.0, mu, k
+
+
 def point(mu: float, alpha: float, *, space: bool = False, **given: Any) -> System:
     """Return a point of 1 kg on a slope that falls in x: (x, y downwards to the slope's normal, and across it)."""
     down, press = G * np.sin(alpha), -G * np.cos(alpha)
