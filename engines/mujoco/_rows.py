@@ -11,7 +11,7 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.scene import Joint, Scene
+from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.cases.scene_contacts import WAYS, Contact
 from crossbody.cases.scene_rows import rows_of
 from crossbody.engines._contacts import TOGETHER, Contacts, end_of
@@ -20,11 +20,10 @@ from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import corner_names
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._observe import numbers
-from crossbody.engines.mujoco._rubs import Rub, Rubs
+from crossbody.engines.mujoco._rubs import AT_BOUND, Rub, Rubs
 from crossbody.engines.nearest import corners
 
 DRY = (int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF), int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON))
-SLIDES = (int(mujoco.mjtConstraintState.mjCNSTRSTATE_LINEARNEG), int(mujoco.mjtConstraintState.mjCNSTRSTATE_LINEARPOS))
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 FRICTIONAL = (mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL,)
@@ -89,12 +88,12 @@ class Rows:
 
     def _rubbed(self) -> Iterator[tuple[int, int]]:
         """Return what MuJoCo calls the rows of dry friction: kind, and velocity or tendon."""
-        for part, width in self.scene.dry:
-            if isinstance(part, Joint):
-                first = int(self.model.joint(part.name).dofadr[0])
-                yield from ((DRY[0], first + k) for k in range(width))
-            else:
-                yield DRY[1], int(self.model.tendon(part.name).id)
+        dof = 0
+        for joint in self.scene.joints:  # in the model's order, likewise
+            width = WIDTHS[joint.type][1]
+            yield from ((DRY[0], dof + k) for k in range(width if joint.friction_loss > 0.0 else 0))
+            dof += width
+        yield from ((DRY[1], i) for i, tendon in enumerate(self.scene.tendons) if tendon.friction_loss > 0.0)
 
     def by_corners(self, contact: Contact) -> bool:
         """Return whether the model has a shape for each place of a contact, and a pair for each row."""
@@ -216,7 +215,8 @@ class Rows:
             modes[rub.row] = int(Mode.SLIP if rub.slides else Mode.STICK)
         modes += [modes[row] for row in self.rubs.tangents for _ in WAYS] + [int(Mode.STICK)] * len(self.dry)
         for j, row in self.present() if self.dry else ():
-            if row >= self.nc - len(self.dry) and int(self.data.efc_state[j]) in SLIDES:
+            bound = (1.0 - AT_BOUND) * self.data.efc_frictionloss[j]
+            if row >= self.nc - len(self.dry) and abs(self.data.efc_force[j]) >= bound:
                 modes[row] = int(Mode.SLIP)
         return tuple(modes)
 
