@@ -230,7 +230,7 @@ class _Judge:
         until = 1.0 if self.case.chaos is None else min(1.0, self.case.chaos.until / self.case.t_end)
         if compared < FLOOR * until and word in (Word.WITHIN, Word.EXPECTED):
             word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon alone: {against.source}"
-        most = band(stored, limit)
+        most = band(stored, limit, claim)
         kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST
         return self.row(
             metric, value, unit, word, why or (against.source if against is not self.truth else ""),
