@@ -40,7 +40,8 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
         laws += [_held_back(contact.pair.law)] * len(contact.tangents)
         unilateral += [True] * len(contact.tangents)
     for part, width in scene.dry:
-        names += [f"{part.name} friction"] if width == 1 else [f"{part.name} friction {way}" for way in COMPONENTS[-width:]]
+        ways = ("",) if width == 1 else COMPONENTS[-width:]
+        names += [f"{part.name} friction {way}".strip() for way in ways]
         laws += [_held_back(part.law)] * width
         unilateral += [True] * width
     return names, laws, unilateral

@@ -168,7 +168,7 @@ def case_of(
     file: str = "",
     findings: tuple[str, ...] = (),
 ) -> Case:
-    """Return a scene as a case: its rows are its loops, the bounds of its joints and tendons, its contacts, and dry friction.
+    """Return a scene as a case: its rows are loops, bounds of joints and tendons, contacts, dry friction.
 
     Args:
         scene: what moves.

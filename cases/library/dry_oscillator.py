@@ -1,4 +1,4 @@
-"""A mass on a spring whose guide has dry friction: every half swing is shorter by the same, and it stops off the middle.
+"""A mass on a spring whose guide has dry friction: each half swing is shorter by the same; it stops off the middle.
 
 How far off depends on where it began; within reach of the spring's rest friction holds it for good.
 """

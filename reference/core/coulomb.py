@@ -421,7 +421,7 @@ def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
 
 @compiled
 def respond(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
-    """Fill la of all rows in contact by how it changes with r: constant forces of rows that slide have no part in it."""
+    """Fill la of all rows in contact by how it changes with r: constant forces of rows that slide have no part."""
     total = s.unknowns
     for a in range(total):
         w.found[a] = r[w.unknown[a]] / w.size[a]
@@ -577,7 +577,7 @@ def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
 
 @compiled
 def _within_bound(m: Model, i: int, lam: Array, normal: int, first: int) -> float:
-    """By how much friction of contact i, whose rows stand at `normal` and from `first` on in lam, is below its bound."""
+    """By how much friction of contact i is below its bound; its rows stand at `normal` and from `first` on in lam."""
     square = 0.0
     for t in range(first, first + m.tangents[i]):
         square += lam[t] * lam[t]

@@ -42,7 +42,7 @@ def has_friction(m: Model, i: int) -> bool:
 
 @compiled
 def is_dry(m: Model, i: int) -> bool:
-    """Whether row i has dry friction of its own: it is its own tangential row, in contact throughout, bounded by a constant."""
+    """Whether row i has dry friction of its own: its own tangential row, always in contact, of a constant bound."""
     return bool(m.tangent[i] == i)
 
 

@@ -400,7 +400,7 @@ class FrictionMachine(LevelMachine):
                 found.append(lam[seen.at[i]])
             elif tells == "CONE":
                 force = np.linalg.norm(bare[[seen.at[w] for w in self.sliding.ways[i]]])
-                found.append(self.sliding.bound(seen, bare, i) - force)
+                found.append(self.sliding.bound(seen, bare, i) - float(force))
             elif tells == "STOP":
                 slip = self.sliding.slip(seen, i)
                 near = float(np.linalg.norm(slip)) - STILL * self.small if len(slip) > 1 else -1.0

@@ -1,4 +1,4 @@
-"""Contacts with Coulomb friction, and dry friction of rows by themselves, in whole matrices: forces of any set of modes, by singular values (spec 7.1, 7.3).
+"""Coulomb friction of contacts, dry friction of rows: forces of any set of modes, by singular values (spec 7.1, 7.3).
 
 With G = H M^-1 H^T of all rows in contact and b what their laws ask for, a set of modes has G lam = b in the rows that
 are solved for, and lam_t = -mu lam_n s in those that slide. Where these depend on each other the normal rows come

@@ -69,7 +69,7 @@ def rubbing(run: Trajectory, case: Case) -> Rubbing | None:
 
 
 def _pairs(case: Case, count: int) -> NDArray[np.intp]:
-    """Return which pair of shapes each place belongs to; of dry friction, and equations of one's own, each by itself."""
+    """Return which pair each place belongs to; each is one by itself in dry friction, and in equations of one's own."""
     met = contacts(case.scene) if case.general and case.scene is not None else ()
     found = [k for k, contact in enumerate(met) for _ in range(contact.places if contact.friction > 0.0 else 0)]
     dry = sum(width for _, width in case.scene.dry) if case.scene is not None else 0

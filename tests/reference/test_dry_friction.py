@@ -71,7 +71,8 @@ def oscillates(p: dict[str, float]) -> tuple[Scene, list[float], list[float]]:
     """Return a mass on a spring and its start."""
     guide = Joint(name="guide", body="mass", type="slide", axis=(1, 0, 0), stiffness=(p["stiffness"], 0, 0),
                   friction_loss=p["friction_loss"])  # fmt: skip
-    return Scene(bodies=(Body(name="mass", mass=p["mass"]),), joints=(guide,), gravity=(0, 0, 0)), [p["start"]], [p["speed"]]
+    scene = Scene(bodies=(Body(name="mass", mass=p["mass"]),), joints=(guide,), gravity=(0, 0, 0))
+    return scene, [p["start"]], [p["speed"]]
 
 
 @pytest.mark.parametrize("part", [0.999, 1.001])
@@ -165,13 +166,13 @@ def test_laws_over_random_trees(seed: int, floor: bool) -> None:
 
 @pytest.mark.parametrize(
     ("seed", "floor"),
-    [(1, False), (3, False), *(pytest.param(k, j, marks=pytest.mark.slow) for k in range(4, 14) for j in (False, True))],
+    [(3, False), (7, False), *(pytest.param(k, j, marks=pytest.mark.slow) for k in range(12) for j in (False, True))],
 )
 def test_both_machines_move_trees_alike(seed: int, floor: bool) -> None:
     scene, q0, v0 = rubbed_tree(seed, floor=floor)
-    at = np.linspace(0.0, 0.4, 41)
+    at = np.linspace(0.0, 0.2, 21)
     one, other = (
-        run(scene, q0, v0, 0.4, rtol=rtol, samples=at, solver=solver)
+        run(scene, q0, v0, 0.2, rtol=rtol, samples=at, solver=solver)
         for solver, rtol in (("compiled", 1e-11), ("cvode", 1e-9))
     )
     assert one.outcome is other.outcome is Outcome.FINISHED, other.message
@@ -192,7 +193,8 @@ FILE = """<mujoco><option gravity="0 0 -9.81" timestep="{dt}"/><worldbody>
       <inertial pos="0 0 -.3" mass="1" diaginertia=".05 .05 .01"/>
       <body name="b2" pos="0 0 -.6"><joint name="j2" type="ball" frictionloss=".05"/>
         <inertial pos="0 .02 -.1" mass=".3" diaginertia=".01 .01 .005"/></body></body></body></worldbody>
-  <tendon><fixed name="rope" frictionloss=".1"><joint joint="j0" coef="1"/><joint joint="j1" coef="-.5"/></fixed></tendon>
+  <tendon><fixed name="rope" frictionloss=".1"><joint joint="j0" coef="1"/><joint joint="j1" coef="-.5"/></fixed>
+  </tendon>
   <keyframe><key name="start" qpos="1 .2 1 0 0 0" qvel="0 1 .3 -.2 .5"/></keyframe></mujoco>"""
 
 
@@ -202,7 +204,7 @@ def test_a_file_moves_as_its_scene(tmp_path: Path) -> None:
     case = cases.from_file(str(path))
     link = {"mass": 1.0, "com": (0.0, 0.0, -0.3), "inertia": (0.05, 0.05, 0.01, 0.0, 0.0, 0.0)}
     assert case.scene is not None
-    hinge = {"type": "hinge", "axis": (0.0, 1.0, 0.0)}
+    hinge, laws = {"type": "hinge", "axis": (0.0, 1.0, 0.0)}, [joint.law for joint in case.scene.joints]
     scene = Scene(
         bodies=(
             Body(name="b0", **link), Body(name="b1", parent="b0", position=(0.0, 0.0, -0.6), **link),
@@ -210,9 +212,9 @@ def test_a_file_moves_as_its_scene(tmp_path: Path) -> None:
                  inertia=(0.01, 0.01, 0.005, 0.0, 0.0, 0.0)),
         ),
         joints=(
-            Joint(name="j0", body="b0", friction_loss=0.7, law=case.scene.joints[0].law, **hinge),
-            Joint(name="j1", body="b1", friction_loss=0.2, stiffness=(3.0, 0.0, 0.0), law=case.scene.joints[1].law, **hinge),
-            Joint(name="j2", body="b2", type="ball", friction_loss=0.05, law=case.scene.joints[2].law),
+            Joint(name="j0", body="b0", friction_loss=0.7, law=laws[0], **hinge),
+            Joint(name="j1", body="b1", friction_loss=0.2, stiffness=(3.0, 0.0, 0.0), law=laws[1], **hinge),
+            Joint(name="j2", body="b2", type="ball", friction_loss=0.05, law=laws[2]),
         ),
         tendons=(Tendon(name="rope", joints=("j0", "j1"), coefficients=(1.0, -0.5), friction_loss=0.1,
                         law=case.scene.tendons[0].law),),
@@ -235,7 +237,8 @@ def test_a_held_joint_creeps_in_mujoco_as_its_parameters_say(reader: str, soft: 
     """(1 - d)/d of the inverse inertia stands between the force and a damper b: v = (1 - d)/d tau/(I b)."""
     path, angle = tmp_path / "rod.xml", 0.3
     path.write_text(
-        f'<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint type="hinge" axis="0 1 0" frictionloss="9" {soft}/>'
+        '<mujoco><option gravity="0 0 -9.81"/><worldbody><body>'
+        f'<joint type="hinge" axis="0 1 0" frictionloss="9" {soft}/>'
         '<inertial pos="0 0 -.4" mass="1.5" diaginertia=".1 .1 .02"/></body></worldbody>'
         f'<keyframe><key qpos="{angle}"/></keyframe></mujoco>'
     )
@@ -251,7 +254,8 @@ def test_a_held_joint_creeps_in_mujoco_as_its_parameters_say(reader: str, soft: 
 def test_a_string_of_two_points_rubs() -> None:
     ball, rope = box_body("ball", (0.1, 0.1, 0.1)), {"bodies": ("", "ball"), "positions": ((0, 0, 0), (0, 0, 0))}
     scene = Scene(
-        bodies=(ball,), joints=tuple(Joint(name=n, body="ball", type="slide", axis=a) for n, a in (("x", (1, 0, 0)), ("y", (0, 1, 0)))),
+        bodies=(ball,),
+        joints=tuple(Joint(name=n, body="ball", type="slide", axis=a) for n, a in (("x", (1, 0, 0)), ("y", (0, 1, 0)))),
         tendons=(Tendon(name="rope", friction_loss=2.0, **rope),), gravity=(0.0, 0.0, 0.0),
     )  # fmt: skip
     run_ = run(scene, [1.0, 0.0], [-1.0, 0.0], 1.0)
