@@ -93,10 +93,7 @@ def _rule(row: Row) -> str:
 
 def _result(path: Path, row: Row) -> dict[str, Any]:
     uri = quote(row.file or path.as_posix())
-    place: dict[str, Any] = {
-        "artifactLocation": {"uri": uri},
-        "region": {"startLine": row.line or 1},
-    }
+    place: dict[str, Any] = {"artifactLocation": {"uri": uri}, "region": {"startLine": row.line or 1}}
     return {
         "ruleId": _rule(row), "level": LEVELS[row.verdict], "message": {"text": sentence(row)},
         "locations": [{"physicalLocation": place}],

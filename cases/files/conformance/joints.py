@@ -6,16 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import (
-    ELBOW,
-    LOWER,
-    LOWER_INERTIAL,
-    SHOULDER,
-    UPPER,
-    arm,
-    mjcf,
-    turned,
-)
+from crossbody.cases.files.conformance.arm import ELBOW, LOWER, LOWER_INERTIAL, SHOULDER, UPPER, arm, mjcf, turned
 from crossbody.cases.files.conformance.feature import MOTION, Feature, written
 from crossbody.cases.scene import Joint
 

@@ -7,14 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import (
-    LOWER,
-    LOWER_INERTIAL,
-    UPPER,
-    arm,
-    mjcf,
-    turned,
-)
+from crossbody.cases.files.conformance.arm import LOWER, LOWER_INERTIAL, UPPER, arm, mjcf, turned
 from crossbody.cases.files.conformance.feature import Feature, written
 from crossbody.cases.scene import Body
 

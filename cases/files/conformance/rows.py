@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.cases.files.conformance.arm import (
-    LOWER_INERTIAL,
-    arm,
-    mjcf,
-)
+from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, arm, mjcf
 from crossbody.cases.files.conformance.feature import Feature, written
 from crossbody.cases.scene import Actuator, Loop, Tendon
 

@@ -7,12 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import (
-    arm,
-    quaternion,
-    rotation,
-    weighing,
-)
+from crossbody.cases.files.conformance.arm import arm, quaternion, rotation, weighing
 from crossbody.cases.files.conformance.feature import MOTION, Feature, written
 from crossbody.cases.files.inertias import placed
 from crossbody.cases.rotations import matrices
