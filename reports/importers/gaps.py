@@ -7,7 +7,7 @@ from typing import Any
 
 from crossbody.cases.files.urdf import PLANAR
 from crossbody.reports.importers import motion, parts, solids
-from crossbody.reports.importers.gap import Gap
+from crossbody.reports.importers.gap import Gap, reach
 
 
 def gaps(
@@ -27,7 +27,7 @@ def gaps(
     if not off:
         names = [name for name, _, kind in joints for _ in range({"free": 6, "ball": 3}.get(kind, 1))]
         yield "bodies", motion.bodies(found["states"][0], wanted["states"][0])
-        yield "inertia", motion.inertia(found["inertias"], wanted["inertias"])
+        yield "inertia", motion.inertia(found["inertias"], wanted["inertias"], reach(wanted["states"]))
         floor = 1.0 if found["precision"] or wanted["precision"] else motion.FLOOR
         M = motion.states(wanted, "M", names)
         yield "M", motion.matrix(motion.states(found, "M", names), M, names, floor)

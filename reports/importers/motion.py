@@ -13,6 +13,8 @@ from crossbody.reports.importers.gap import Gap, lacks, reach
 
 FLOOR = 1e-4
 """Part of the largest force that is the scale of the smallest ones: rounding is that of the sums they stand in."""
+ROUNDED = 1e-6
+"""Part of the reach of a robot below which lengths have lost digits: what is far out is rounded as it is far."""
 STANDARD = 9.81
 """Gravity, m/s^2."""
 
@@ -110,13 +112,14 @@ def frames(found: Sequence[Any], wanted: Sequence[Any]) -> list[Gap]:
     return [next((worst[name] for name in named if worst[name].size > 1e-3 * size), Gap(0.0))]
 
 
-def inertia(found: Mapping[str, Sequence[float]], wanted: Mapping[str, Sequence[float]]) -> list[Gap]:
+def inertia(found: Mapping[str, Sequence[float]], wanted: Mapping[str, Sequence[float]], far: float) -> list[Gap]:
     """Return a gap for what every joint moves: mass, centre, moments."""
     told = []
     for name in wanted.keys() & found.keys():
         mine, theirs = np.array(found[name]), np.array(wanted[name])
         m, J = abs(theirs[0]), np.abs(theirs[4:]).max()
         length = float(np.sqrt(J / m) + np.abs(theirs[1:4]).max()) if m else 1.0
+        length = max(length, ROUNDED * far)
         scale = np.array([m or 1.0, *[length or 1.0] * 3, *[J + m * length**2 or 1.0] * 6])
         off = np.nan_to_num(np.abs(mine - theirs) / scale, nan=math.inf)
         k = int(np.argmax(off))

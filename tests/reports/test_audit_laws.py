@@ -454,3 +454,14 @@ def test_a_reader_that_had_no_luck_once_is_not_explained(tmp_path: Path, monkeyp
     found = [row for _, _, own in audited(path, ["slow"], seconds=60.0) for row in own]
     assert [row.verdict for row in found] == [FAILED]
     assert [row.cause for row in explained(path, urdf=False, rows=found, seconds=60.0)] == [""]
+
+
+@pytest.mark.parametrize("far", [1.0, 1e4, 1e9])
+def test_a_robot_far_away_is_no_other_robot(far: float, tmp_path: Path) -> None:
+    """Centres are rounded as the places they are measured at; one that is another is another as far as that."""
+    text = PARTS.replace('pos="0 0 1"', f'pos="{far!r} 0 1"', 1)
+    text = re.sub(r"<equality>.*?</equality>", "", text, flags=re.S)
+    told = rows_of(tmp_path / "far.xml", "mujoco", text, text)
+    assert told["inertia"] == OK
+    other = text.replace('size=".1 .2" mass="1"', 'size=".1 .2" mass="1.001"')
+    assert rows_of(tmp_path / "far.xml", "mujoco", text, other)["inertia"] == WRONG
