@@ -42,6 +42,8 @@ RESOLVED = 0.05
 """Largest product of the step whose logarithm is taken and the fastest pole."""
 ONE_WAY = (*(int(kind) for kind in LIMITS), TOUCH)
 """Rows whose force is bounded by 0."""
+HARDER = 0.1
+"""Part of the softness of bounds and loops that is left here: what it makes of slopes grows by their largest entry."""
 PRESS = 10.0
 """Times the force by which a row changes in the differences: how hard one is pressed that carries less."""
 
@@ -98,8 +100,10 @@ def _same_coordinates(mechanism: ModuleType, dt: float) -> Callable[[Case, Spot]
         scene = build(case, "matched", dt) if build else None
         if scene is None or scene.chart is not None:
             raise CaseUnsupported(f"MuJoCo's model of {case.mechanism!r} has other coordinates, without a chart here.")
+        for softness in (scene.model.dof_invweight0, scene.model.tendon_invweight0):
+            softness[:] *= HARDER
         scene.start()
-        scene.data.qpos[:], scene.data.qvel[:] = spot.q, spot.v
+        scene.data.qpos[:], scene.data.qvel[:], scene.data.time = spot.q, spot.v, spot.t
         if case.scene is not None:
             scene.change(spot.t)
         if scene.arm is not None:
