@@ -304,7 +304,8 @@ class Case:
         scene: bodies, joints and what acts between them, of which engines build their models; the reference takes the
             kernels of `mechanism` where there are some. `file` is where it was read from, `findings` what is strange.
         force: what acts on the scene beside its parts; the kernels of `mechanism` have it.
-        form: (case, whether servos act) -> the case on a scene, for engines, where its own coordinates are others.
+        form: (case, whether servos act, whether inputs stand for a sampled controller) -> the case on a scene, for
+            engines, where its own coordinates are others.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
             show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.

@@ -19,8 +19,8 @@ from crossbody.engines.linear import Chart, Spot, Tangent
 WIDER = "The engine's joints hold what rows of the case hold: its coordinates are fewer."
 
 
-def form_of(case: Case, powered: bool = True) -> Form | None:
-    """Return the form of a case, if it has one; without its servos where they are not powered.
+def form_of(case: Case, powered: bool = True, steady: bool = False) -> Form | None:
+    """Return the form of a case, if it has one; without servos that are not powered, or without a sampled controller.
 
     Raises:
         SceneError: for a start that the case's equations refuse.
@@ -30,7 +30,7 @@ def form_of(case: Case, powered: bool = True) -> Form | None:
     check = getattr(module(case.mechanism), "check_start", None)
     if check is not None:
         check(case.parameters, case.q0, case.v0)
-    found: Form = case.form(case, powered)
+    found: Form = case.form(case, powered, steady)
     return found
 
 
@@ -154,11 +154,10 @@ def linearised(
     if len(spot.u):
         names = tuple(f"u[{i}]" for i in range(len(spot.u))) if case.inputs is None else case.inputs.names
         case = replace(case, inputs=Inputs(names=names, times=np.zeros(1), values=spot.u[None]))
-    form = form_of(case, spot.powered)
+    form = form_of(case, spot.powered, steady=True)
     assert form is not None
     q, v = (part[0] for part in form.to_scene(spot.q[None], spot.v[None]))
     T = form.rate_matrix(q)
     chart = Chart(T=T, S=np.linalg.pinv(T))
-    inner = replace(form.case, control=None)
     rows = tuple(form.rows[i] for i in spot.rows)
-    return tuple(chart.tangent(way) for way in linearise(inner, replace(spot, q=q, v=v, rows=rows)))
+    return tuple(chart.tangent(way) for way in linearise(form.case, replace(spot, q=q, v=v, rows=rows)))

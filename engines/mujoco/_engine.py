@@ -57,7 +57,7 @@ class MujocoRun(Run):
         message = " ".join(w for w in (march.message, self.rounded, *heard) if w)
         counts = {"located": march.trials}
         with captured():  # gaps are looked at with the same model, and have no more to say
-            found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
+            found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts)
         return found if scene.acting is None else scene.acting.told(found)
 
     def native(self) -> float:

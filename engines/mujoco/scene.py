@@ -314,7 +314,8 @@ def _hook(case: Case, data: Any, rows: Switched | None, driver: Forces | None) -
     if driver is None and force is None:
         return own
     activated = list(driver.scene.activated) if driver is not None else []
-    act, q, v, out = force and acting_of(force), data.qpos, data.qvel, data.qfrc_applied
+    act = None if force is None else acting_of(force)
+    q, v, out = data.qpos, data.qvel, data.qfrc_applied
 
     def hook(model: Any, data: Any) -> None:
         if act is not None:

@@ -83,7 +83,7 @@ def scene(name: str, title: str, count: int, numbers: Numbers, segment: Segment)
     )  # fmt: skip
 
 
-def on_hinges(case: Case, powered: bool = True) -> Form:
+def on_hinges(case: Case, powered: bool = True, steady: bool = False) -> Form:
     """Return a chain of hinges, r_0 = pi - th_0 and r_i = th_(i-1) - th_i: its links hang straight at zero.
 
     Hinges turn clockwise, seen with x to the right and z up, so that what turns a link forward turns its hinge back.

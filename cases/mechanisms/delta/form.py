@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def numbers(p: Mapping[str, float], powered: bool) -> Floats:
     return np.array([*(own[name] for name in ROBOT), *ends])
 
 
-def _rod(mass: float, length: float) -> dict[str, object]:
+def _rod(mass: float, length: float) -> dict[str, Any]:
     """Return mass, centre and inertia of a slender uniform rod along y from the joint."""
     about = mass * length**2 / 12.0
     return {"mass": mass, "com": (0.0, 0.5 * length, 0.0), "inertia": (about, THIN, about, 0.0, 0.0, 0.0)}
@@ -86,10 +87,10 @@ def scene(p: Mapping[str, float]) -> Scene:
     bodies, joints, offset = [], [], p["r_base"] - p["r_flange"]
     for i, R in zip(ARMS, pose.rotations(p), strict=True):
         half = 0.5 * math.atan2(R[1, 0], R[0, 0])
-        at = {"position": tuple(offset * R[:, 1]), "orientation": (math.cos(half), 0.0, 0.0, math.sin(half))}
+        turned = (math.cos(half), 0.0, 0.0, math.sin(half))
         near, far, tip = f"proximal {i}", f"distal {i}", f"tip {i}"
         bodies += [
-            Body(name=near, **at, **_rod(p["m1"], p["l1"])),
+            Body(name=near, position=tuple(offset * R[:, 1]), orientation=turned, **_rod(p["m1"], p["l1"])),
             Body(name=far, parent=near, position=(0.0, p["l1"], 0.0), **_rod(p["m2"], p["l2"])),
             Body(name=tip, parent=far, position=(0.0, p["l2"], 0.0), mass=p["m3"] / 3.0),
         ]
@@ -113,7 +114,7 @@ def motion(r: Floats, rd: Floats) -> tuple[Floats, Floats]:
     return q, v
 
 
-def in_tree(case: Case, powered: bool = True) -> Form:
+def in_tree(case: Case, powered: bool = True, steady: bool = False) -> Form:
     """Return the arms under friction and servos, or a sampled controller."""
     p, given = of_numbers(case.parameters), case.inputs
     arms = scene(p)
@@ -121,7 +122,7 @@ def in_tree(case: Case, powered: bool = True) -> Form:
         names=arms.inputs, times=given.times,
         values=np.hstack([given.values[:, :3], np.tile(given.values[:, 3:] / 3.0, 3)]),
     )  # fmt: skip
-    sampled = "period" in p and given is None  # constant inputs stand for it at an equilibrium
+    sampled = "period" in p and not steady
     control = Control(function=Controller(case.parameters), tick=p["period"]) if sampled else None
     return Form(
         case=formed(

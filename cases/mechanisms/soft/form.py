@@ -124,7 +124,7 @@ def _scene(p: Numbers) -> Scene:
     )  # fmt: skip
 
 
-def on_axis(case: Case, powered: bool = True) -> Form:
+def on_axis(case: Case, powered: bool = True, steady: bool = False) -> Form:
     """Return the slides under their forces."""
     p = numbers(case.parameters)
     far, time, force = sizes(p)

@@ -128,7 +128,7 @@ def _scene(p: Mapping[str, float]) -> Scene:
     )  # fmt: skip
 
 
-def on_robot(case: Case, powered: bool = True) -> Form:
+def on_robot(case: Case, powered: bool = True, steady: bool = False) -> Form:
     """Return the arms, and what slides beside them, under their forces."""
     p = numbers(case.parameters)
     (far, time, force), order = sizes(p), np.argsort(ROWS)
