@@ -207,12 +207,16 @@ def _by_shapes(scene: Scene, part: Any, poses: Mapping[str, Pose], pairs: list[P
 
 
 def _ends(scene: Scene, part: Joint | Tendon) -> tuple[str, str]:
-    """Return the bodies between which a joint, a sum of two joints or a distance of points is; nobody's else."""
-    bodies = {body.name: body for body in scene.bodies}
+    """Return the bodies between which a joint, a sum of joints or a distance of points is; nobody's else.
+
+    A sum counts a body from another that hangs on a third, whose joints are among them.
+    """
+    parents = {body.name: body.parent for body in scene.bodies}
     if isinstance(part, Joint):
-        return (bodies[part.body].parent, part.body)
+        return (parents[part.body], part.body)
     own = {joint.name: joint.body for joint in scene.joints}
-    found = part.bodies or tuple(own[name] for name in part.joints)
+    moved = [own[name] for name in part.joints]
+    found = part.bodies or tuple(body for body in moved if body not in [parents[other] for other in moved])
     return (found[0], found[1]) if len(found) == 2 else ("\n", "\n")
 
 

@@ -222,10 +222,10 @@ class Rows:
 
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
-        data = mujoco.MjData(self.model)
+        data, spared = mujoco.MjData(self.model), self.model.body_gravcomp * self.model.body_mass
 
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
-            first = self.contacts.start
+            first, lighter = self.contacts.start, spared.any()
             gaps, energy = np.zeros((len(q), self.nc)), np.empty((len(q), 2))
             gaps[:, self.contacts], lengths = self._apart(q, data), np.empty((len(q), self.model.ntendon))
             for i in range(len(q)):
@@ -235,9 +235,11 @@ class Rows:
                 mujoco.mj_energyPos(self.model, data)
                 mujoco.mj_energyVel(self.model, data)
                 gaps[i, : self.always], lengths[i] = data.efc_pos[: self.always], data.ten_length
-                spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
-                energy[i] = data.energy[1], data.energy[0] + spared.sum()
-            gaps[:, self.always : first] = self.forces.bounds(q, lengths)
+                energy[i] = data.energy[1], data.energy[0]
+                if lighter:
+                    energy[i, 1] += spared @ (data.xipos @ self.model.opt.gravity)
+            if first > self.always:
+                gaps[:, self.always : first] = self.forces.bounds(q, lengths)
             return gaps, energy
 
         return observe

@@ -16,11 +16,21 @@ from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
+from crossbody.engines._force import acting as acting_of
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scale import depths
 from crossbody.engines.pinocchio._contacts import Points, contact_rows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
+from crossbody.engines.pinocchio._joined import (
+    DEPENDENT,
+    Joined,
+    Spans,
+    Strings,
+    by_least_norm,
+    loose_rows,
+    none_pulling,
+)
+from crossbody.engines.pinocchio._native import Native, apt
 from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
@@ -47,6 +57,8 @@ def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: bounds and loops follow the law alone."""
     if case.scene is not None and (found := frictional(case.scene)):
         return found
+    if profile != "law" and case.force is not None:
+        return "What acts here feels forces that are finite: impacts and time stepping have impulses instead."
     if profile != "law" and case.general:
         return "The rows of a scene follow the law: impacts in no time and time stepping have none."
     return None
@@ -75,16 +87,22 @@ def build(case: Case, algebra: str) -> Prepared:
     forces.spans = spans(scene, model, placed, to)
     centres = at_centres(scene, forces, model, model.createData(), placed)
     lifting = bool(scene.pushes) or any(body.weightless for body in scene.bodies)
+    act, beside = None if case.force is None else acting_of(case.force), np.zeros(scene.nv)
     bends = any(armature[first : first + 3].any() for _, first in to.frees)
 
     def apply(q: Floats, v: Floats, tau: Floats) -> None:
         # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
-        ours = forces(to.ours(q), to.velocities(q, v))
+        r, u = (q, v) if to.same else (to.ours(q), to.velocities(q, v))
+        ours = forces(r, u)
+        if act is not None:
+            act(forces.t, r, u, beside)
+            ours += beside
         if bends:
             ours -= armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + centres(q) if lifting else to.back(q, ours)
+        own = ours if to.same else to.back(q, ours)
+        tau[:] = own + centres(q) if lifting else own
 
-    acting = None if forces.none and to.same and not lifting else apply
+    acting = None if forces.none and to.same and not lifting and act is None else apply
     gaps = Gaps(scene, forces, (model, placed), to)
     pinned = PinRows(
         model, lambda q: gaps.gradients(q)[1], gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
@@ -99,16 +117,26 @@ def build(case: Case, algebra: str) -> Prepared:
         root = np.linalg.cholesky(mass_matrix(model, pinned.data, start[0]))
         A = np.linalg.solve(root, gaps.gradients(start[0])[1][: sum(widths)].T).T
         loose = loose_rows(A, widths, case.rank) if widths else ()
+        if widths and apt(scene, law, len(case.contacts)) and np.linalg.cond(A) * DEPENDENT < 1.0:
+            pinned.native = Native(model, placed, scene, law)
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
         rows=pinned, points=() if case.general else Points(scene, model, placed),
         observe=_observe(scene, model, placed, forces, gaps, to),
-        sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)) if case.general else _sizes(pinned, *start),
+        sizes=_given_sizes(case, to) or _sizes(pinned, *start),
         start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def _given_sizes(case: Case, to: Coordinates) -> tuple[Floats, Floats] | None:
+    """Return the sizes of coordinates (nq,) and velocities (nv,) that a force gives; those of robots are small."""
+    if case.general:
+        return np.full(to.nq, SMALL), np.full(to.nv, SMALL)
+    force = case.force
+    return (np.array(force.far), np.array(force.fast)) if force is not None and force.far else None
 
 
 def _sizes(rows: PinRows, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -340,7 +368,7 @@ def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed
 
     def force(q: Floats) -> Floats:
         total: Floats = np.zeros(model.nv)
-        acting = [*lifted.items(), *zip(pushed, forces.pushes, strict=True)]
+        acting = [*lifted.items(), *(zip(pushed, forces.pushes, strict=True) if forces.pushed else ())]
         if acting:
             pin.computeJointJacobians(model, data, q)
         for body, each in acting:
@@ -359,19 +387,23 @@ def _observe(
     data = model.createData()
     # Pinocchio leaves out what is fixed to the world.
     fixed = [(body, placed[body.name][1]) for body in scene.bodies if placed[body.name][0] == 0]
+    lighter, armed = [body for body in scene.bodies if body.weightless], bool(model.armature.any())
     held = -sum(body.mass * float(pose.act(np.array(body.com)) @ np.array(scene.gravity)) for body, pose in fixed)
 
     def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
         energy: Floats = np.empty((len(q), 2))
         for i in range(len(q)):
             # Pinocchio's own kinetic energy has the armature of some types of joints and not of others.
-            energy[i, 0] = 0.5 * v[i] @ mass_matrix(model, data, q[i]) @ v[i]
+            energy[i, 0] = (
+                0.5 * v[i] @ mass_matrix(model, data, q[i]) @ v[i]
+                if armed
+                else pin.computeKineticEnergy(model, data, q[i], v[i])
+            )
             energy[i, 1] = held + pin.computePotentialEnergy(model, data, q[i])
-            for body in scene.bodies:
-                if body.weightless:
-                    carrier, pose = placed[body.name]
-                    height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
-                    energy[i, 1] += body.weightless * body.mass * height
+            for body in lighter:
+                carrier, pose = placed[body.name]
+                height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
+                energy[i, 1] += body.weightless * body.mass * height
         energy[:, 1] += forces.energy(to.ours(q))
         return gaps.recorded(q), energy
 
@@ -395,7 +427,8 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
         forces.t = t
 
     return World(
-        instants=acting.instants, change=change, reset=reset, acting=acting, clock=clock if len(case.act0) else None
+        instants=acting.instants, change=change, reset=reset, acting=acting,
+        clock=clock if len(case.act0) or case.force is not None else None,
     )  # fmt: skip
 
 

@@ -1,37 +1,30 @@
-"""Motor torques for an acceleration of the delta robot's flange, for engines that must not borrow the reference's.
+"""Motor torques for an acceleration of the delta robot's flange, for runs on a scene, which must not borrow those.
 
-From the equations of the robot alone, as in `engines._delta.controller`: with y the motor angles, x the six others,
+From the equations of the robot alone, as in `controller`: with y the motor angles, x the six others,
 h(y, x) = 0 the closed loops and S = [I; -h_x^-1 h_y],
 
     u = My Jy^-1 a + tau_g     My = S^T M S     Jy = dz/dy along the loops     tau_g = S^T dV/dq
-
-Compiled, because engines call it in every stage of a step.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
-from numba import types
 
 from crossbody.cases.arrays import Floats
-from crossbody.engines._delta.forces import _COS, _SIN
-from crossbody.reference.cache import compiled
-from crossbody.reference.delta import Robot
 
-_V = types.float64[::1]
-
-
-def numbers(robot: Robot) -> Floats:
-    """What `motor_torque` reads of a robot: rods are thin and uniform, a third of the flange hangs at each tip."""
-    m1, m2, m3, l1, l2 = robot.m1, robot.m2, robot.m3, robot.l1, robot.l2
-    inertia = (m1 / 3 + m2 + m3 / 3) * l1**2 + robot.jm, (m2 / 2 + m3 / 3) * l1 * l2, (m2 + m3) / 3 * l2**2
-    weight = (m1 / 2 + m2 + m3 / 3) * l1 * robot.g, (m2 / 2 + m3 / 3) * l2 * robot.g
-    return np.array([l1, l2, robot.sign, *inertia, *weight], dtype=np.float64)
+COS = (1.0, -0.5, -0.5)
+SIN = (0.0, -(0.75**0.5), 0.75**0.5)
+"""Of what turns each arm's frame into the base's about z, the sine times the robot's sign."""
 
 
-def turns(robot: Robot) -> tuple[tuple[float, float], ...]:
-    """First row of what turns each arm's frame into the base's about z."""
-    return tuple((c, -robot.sign * s) for c, s in zip(_COS, _SIN, strict=True))
+def numbers(p: Mapping[str, float]) -> Floats:
+    """Return what `motor_torque` reads: rods are thin and uniform, a third of the flange hangs at each tip."""
+    m1, m2, m3, l1, l2 = (p[name] for name in ("m1", "m2", "m3", "l1", "l2"))
+    inertia = (m1 / 3 + m2 + m3 / 3) * l1**2 + p["jm"], (m2 / 2 + m3 / 3) * l1 * l2, (m2 + m3) / 3 * l2**2
+    weight = (m1 / 2 + m2 + m3 / 3) * l1 * p["gravity"], (m2 / 2 + m3 / 3) * l2 * p["gravity"]
+    return np.array([l1, l2, p["sign"], *inertia, *weight], dtype=np.float64)
 
 
 def motor_torque(y: Floats, x: Floats, asked: Floats, p: Floats, u: Floats) -> None:
@@ -52,7 +45,7 @@ def motor_torque(y: Floats, x: Floats, asked: Floats, p: Floats, u: Floats) -> N
         J[i, 0, 1], J[i, 0, 2] = l2 * c2 * s3, l2 * s2 * c3
         J[i, 1, 0], J[i, 1, 1] = -l1 * s1, -l2 * s2
         J[i, 2, 0], J[i, 2, 1], J[i, 2, 2] = l1 * c1, l2 * c2 * c3, -l2 * s2 * s3
-        cs, sn = _COS[i], sign * _SIN[i]
+        cs, sn = COS[i], sign * SIN[i]
         for j in range(3):
             along, across = J[i, 0, j], J[i, 1, j]
             J[i, 0, j], J[i, 1, j] = cs * along - sn * across, sn * along + cs * across
@@ -80,20 +73,3 @@ def motor_torque(y: Floats, x: Floats, asked: Floats, p: Floats, u: Floats) -> N
         return
     St = np.ascontiguousarray(S.T)
     u[:] = St @ (M @ (S @ np.linalg.solve(Jy, asked))) + St @ pull
-
-
-motor_torque = compiled(motor_torque, [types.void(_V, _V, _V, _V, _V)])
-
-
-def gaps_and_energy(robot: Robot, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Gaps (n, 6), m, of the loops and energies (n, 2), J, of absolute angles and rates (n, 9)."""
-    l1, l2, _, a, b, c, upper, lower = numbers(robot)
-    (c1, c2, c3), (s1, s2, s3) = (np.moveaxis(f(q).reshape(-1, 3, 3), -1, 0) for f in (np.cos, np.sin))
-    w1, w2, w3 = np.moveaxis(v.reshape(-1, 3, 3), -1, 0)
-    out, down = robot.r_base - robot.r_flange + l1 * c1 + l2 * c2, l1 * s1 + l2 * s2 * c3
-    cs, sn = np.array(_COS), robot.sign * np.array(_SIN)
-    tips = np.stack((cs * l2 * s2 * s3 - sn * out, sn * l2 * s2 * s3 + cs * out, down), axis=-1)
-    coupled, sideways = b * (s1 * s2 + c1 * c2 * c3), -b * c1 * s2 * s3
-    twice = a * w1 * w1 + c * (w2 * w2 + (s2 * w3) ** 2) + 2.0 * w1 * (coupled * w2 + sideways * w3)
-    energy = np.column_stack((0.5 * twice.sum(axis=1), -(upper * s1 + lower * s2 * c3).sum(axis=1)))
-    return np.hstack((tips[:, 0] - tips[:, 1], tips[:, 0] - tips[:, 2])), energy
