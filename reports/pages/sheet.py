@@ -117,7 +117,13 @@ class Sheet:
 def _level(axis: str, value: float, name: str) -> dict[str, Any]:
     """A line across a plot, and what it is."""
     ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
-    label = {"text": plain(name), "textposition": "end", "font": {"size": 10, "color": LEVEL}, "padding": 1}
+    label = {
+        "text": plain(name),
+        "textposition": "end",
+        "yanchor": "top",
+        "font": {"size": 10, "color": LEVEL},
+        "padding": 1,
+    }
     line = {"color": LEVEL, "width": 1, "dash": "dash"}
     return {"type": "line", "layer": "below", "line": line, "label": label} | ends
 
@@ -144,7 +150,9 @@ def plain(text: str) -> str:
 
 def coded(array: Floats) -> dict[str, str]:
     """An array as plotly reads it from base64 ("typed array specification")."""
-    return {"dtype": f"f{array.itemsize}", "bdata": base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()}
+    text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
+    shape = {"shape": ",".join(map(str, array.shape))} if array.ndim > 1 else {}
+    return {"dtype": f"f{array.itemsize}", "bdata": text} | shape
 
 
 def _times(t: Floats) -> Floats:
