@@ -128,7 +128,7 @@ def run_identify(
     Args:
         ask: log, map and model.
         free: names of the parameters; "delay" is that of the measured coordinates.
-        hold: every so manieth window is held out.
+        hold: every hold-th window is held out of the fit; 0 for none.
         starts: "auto", "measured" or "free".
         stride: of so many samples one is compared.
         budget: time that the search may take, s.

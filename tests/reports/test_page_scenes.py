@@ -279,6 +279,8 @@ def test_collisions_that_take_no_time_are_drawn_as_impulses() -> None:
     assert at == pytest.approx([0.05], abs=case.t_end / 49)
     i = int(np.searchsorted(trace.run.t, 0.05))
     wanted = scene.arrows(trace.run.q[i : i + 1], 3.0 * np.eye(len(case.contacts))[2:3], case.parameters)[0]
+    wanted = wanted[(wanted[:, 2:] != 0.0).any(axis=1)]  # a contact that never pushes has no arrow
+    assert len(wanted) == 1
     assert np.allclose(blows, wanted, atol=1e-6)
     step = with_collisions(struck.run, events)
     assert np.allclose(step[:, 2], np.where(struck.run.t >= 0.05, 3.0, 0.0))
