@@ -191,7 +191,8 @@ def _placed(solid: scenes.Shape, pose: Floats) -> Floats:
 def _outline(shape: scenes.Shape) -> Floats:
     if "circle" in shape:
         x, y, r = shape["circle"]
-        return np.array([x, y]) + r * ROUND
+        around: Floats = np.array([x, y]) + r * ROUND
+        return around
     points: Floats = np.asarray(shape["points"], dtype=np.float64)
     return points
 
@@ -205,7 +206,8 @@ def _moved(points: Floats, stand: Floats) -> Floats:
 
 def _hull(points: Floats) -> Floats:
     try:
-        return points[ConvexHull(points).vertices]
+        found: Floats = points[ConvexHull(points).vertices]
+        return found
     except QhullError:  # all on one line
         return points
 

@@ -11,7 +11,7 @@ import pandas as pd
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES
-from crossbody.reports.pages.sheet import coded, number, plain
+from crossbody.reports.figures.values import coded, number, plain
 
 GREY = "#888888"
 SIGMAS = 2.0

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from unpacked import text_of, value_of
 
+from crossbody.reports.figures.values import coded
 from crossbody.reports.pages.packing import packed_text, packed_value
-from crossbody.reports.pages.sheet import coded
 
 
 @given(st.text())
