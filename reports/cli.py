@@ -358,6 +358,29 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
 
 
 @cli.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("out", metavar="FILE", type=click.Path(path_type=Path))
+@click.option("--case", "case", metavar="CASE:V", default="", help="Which case; the first if not given.")
+@click.option("--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Whose motion.")
+@click.option("--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Instant, s.")
+@click.option("--fps", type=_Positive(0.0, min_open=True), default=25.0, show_default=True, help="Of a GIF.")
+@click.option(
+    "--speed", type=_Positive(0.0, min_open=True), default=1.0, show_default=True, help="Of a GIF, times real time."
+)
+@speaks
+def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps: float, speed: float) -> int:
+    """Draw a motion of an earlier run: one instant (FILE.svg, FILE.png) or all of it (FILE.gif)."""
+    from crossbody.reports.pages import picture as drawing
+    from crossbody.reports.pages.results import motion
+
+    trace, place = motion(folder, case, engine)
+    drawing.write(drawing.Film(trace, place), out, instant, fps, speed)
+    if not quiet():
+        click.echo(f"Picture: {out.absolute()}")
+    return 0
+
+
+@cli.command()
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
 @click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
 @click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")

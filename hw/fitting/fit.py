@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,7 @@ class Fit:
         outcome: "converged"; "unconverged" where the search ended before that, with intervals about where it ended; or
             "stopped" at the time limit: the best so far, without intervals and errors.
         message: of the search.
+        profile: parameter -> values about its estimate, and the cost at each over that at the estimate.
     """
 
     model: str
@@ -106,6 +107,7 @@ class Fit:
     evaluations: int
     outcome: str
     message: str
+    profile: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
     @property
     def success(self) -> bool:

@@ -72,9 +72,9 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 @click.command()
 @_replayed
 @click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter, or delay; repeatable.")
-@click.option("--hold", type=int, default=2, show_default=True, help="Every so manieth window is held out; 0: none.")
+@click.option("--hold", type=int, default=2, show_default=True, help="Hold every N-th window out of the fit; 0: none.")
 @click.option("--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True)
-@click.option("--stride", type=int, default=1, show_default=True, help="Of so many samples one is compared.")
+@click.option("--stride", type=int, default=1, show_default=True, help="Compare every N-th sample.")
 @click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time of the search, s.")
 @_time_limit("All is stopped by then, with the best so far; a run that does not come back is ended, s.")
 @speaks
