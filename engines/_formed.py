@@ -68,11 +68,13 @@ class FormedRun(Run):
         if rows == list(range(found.gap.shape[1])):
             return found
         n = len(found.t)
-        held = (np.zeros(n), np.full(n, np.nan), np.full(n, int(Mode.BILATERAL), np.int8))
+        parts: tuple[tuple[Any, Any], ...] = (
+            (found.gap, np.zeros(n)), (found.lam, np.full(n, np.nan)),
+            (found.mode, np.full(n, int(Mode.BILATERAL), np.int8)),
+        )  # fmt: skip
         gap, lam, mode = (
-            np.column_stack([given[:, k] if k >= 0 else none for k in rows])
-            for given, none in zip((found.gap, found.lam, found.mode), held, strict=True)
-        )
+            np.column_stack([given[:, k] if k >= 0 else none for k in rows]) for given, none in parts
+        )  # fmt: skip
         numbers = {k: i for i, k in enumerate(rows)}
         events = tuple(replace(event, contact=numbers[event.contact]) for event in found.events)
         return replace(found, gap=gap, lam=lam, mode=mode, events=events)
@@ -115,7 +117,8 @@ def _in_case(form: Form, found: Mapping[str, Any]) -> dict[str, Any]:
 
     def at(q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
         r, rd = (part[0] for part in form.to_scene(q[None], v[None]))
-        return r, rd, np.linalg.inv(form.rate_matrix(r))
+        S: Floats = np.linalg.inv(form.rate_matrix(r)).astype(np.float64)
+        return r, rd, S
 
     def M(q: Floats) -> Floats:
         r, _, S = at(q, np.zeros(len(q)))
@@ -158,6 +161,6 @@ def linearised(
     assert form is not None
     q, v = (part[0] for part in form.to_scene(spot.q[None], spot.v[None]))
     T = form.rate_matrix(q)
-    chart = Chart(T=T, S=np.linalg.pinv(T))
+    chart = Chart(T=T, S=np.linalg.pinv(T).astype(np.float64))
     rows = tuple(form.rows[i] for i in spot.rows)
     return tuple(chart.tangent(way) for way in linearise(form.case, replace(spot, q=q, v=v, rows=rows)))
