@@ -116,8 +116,9 @@ def frictional(scene: Scene) -> str | None:
     if first is None:
         return None
     return (
-        f"Pair {first.pair.name!r} has friction, which reference:compiled and reference:cvode have, and by MuJoCo's "
-        "own cones mujoco:as_is and mujoco:default; without=friction leaves that of a file out of every engine."
+        f"Pair {first.pair.name!r} has friction, which reference:compiled and reference:cvode have, and by laws of "
+        "their own mujoco:as_is and default, pinocchio:admm, drake:matched and default, dart:matched and default; "
+        "without=friction leaves that of a file out of every engine."
     )
 
 
