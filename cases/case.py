@@ -362,7 +362,7 @@ class Case:
 
     @property
     def rubs(self) -> bool:
-        """Whether contacts of its scene have friction."""
+        """Whether contacts, joints or tendons of its scene have friction."""
         from crossbody.cases.scene_contacts import frictional  # which needs scenes, and these this module's errors
 
         return self.general and self.scene is not None and frictional(self.scene) is not None

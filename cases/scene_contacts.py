@@ -110,14 +110,24 @@ def contacts(scene: Scene) -> tuple[Contact, ...]:
     return tuple(found for found in _all(scene) if isinstance(found, Contact))
 
 
+def rough(scene: Scene) -> Contact | None:
+    """Return the first contact with friction; None if there is none."""
+    return next((one for one in contacts(scene) if one.friction > 0.0), None)
+
+
 def frictional(scene: Scene) -> str | None:
     """Return why an engine that has no rows with friction cannot run a scene; None if it can."""
-    first = next((one for one in contacts(scene) if one.friction > 0.0), None)
-    if first is None:
+    first, dry = rough(scene), next((part for part, _ in scene.dry), None)
+    theirs = "mujoco:as_is and mujoco:default"
+    if first is not None:
+        what = f"Pair {first.pair.name!r} has friction"
+        theirs += ", pinocchio:admm, drake:matched and default, dart:matched and default"
+    elif dry is not None:
+        what = f"{type(dry).__name__} {dry.name!r} has dry friction (friction_loss)"
+    else:
         return None
     return (
-        f"Pair {first.pair.name!r} has friction, which reference:compiled and reference:cvode have, and by laws of "
-        "their own mujoco:as_is and default, pinocchio:admm, drake:matched and default, dart:matched and default; "
+        f"{what}, which reference:compiled and reference:cvode have, and by laws of their own {theirs}; "
         "without=friction leaves that of a file out of every engine."
     )
 

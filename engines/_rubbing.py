@@ -133,6 +133,8 @@ def why_no_steps(engine: str, scene: Scene, bounds: bool = False) -> str | None:
         scene: with friction.
         bounds: whether it has bounds of joints.
     """
+    if dry := next((part for part, _ in scene.dry), None):
+        return f"{engine} steps contacts alone, and {dry.name!r} has dry friction (friction_loss, without=friction)."
     if scene.loops:
         return f"{engine} steps contacts alone, and the loop {scene.loops[0].name!r} is always on."
     bounded = next((part for part in scene.bounded if np.isfinite(part.range).any()), None)

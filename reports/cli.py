@@ -372,7 +372,7 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
 )
 @click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
 @click.option("--fix", type=click.Path(path_type=Path), metavar="OUT", help="Write FILE so that more readers agree.")
-@click.option("--force", is_flag=True, help="Let --fix write over a file that it did not write itself.")
+@click.option("--force", is_flag=True, help="Let files be written over that were not written so.")
 @click.option("--sarif", type=click.Path(path_type=Path), metavar="F", help="Write the findings as SARIF too.")
 @click.option("--markdown", type=click.Path(path_type=Path), metavar="F", help="Write a summary in Markdown too.")
 @speaks

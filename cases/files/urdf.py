@@ -66,6 +66,7 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
             limit.attrib = {"lower": "0", "upper": "0"} | limit.attrib
     for own in root.findall("mujoco"):
         root.remove(own)
+    _float(root)
     setting = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
     files = supplied(root, path)
@@ -81,6 +82,23 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
 
     model, warned = compiled(path, compiler)
     return model, sentences(warned)
+
+
+def _float(root: ElementTree.Element) -> None:
+    """Call the root the world where a joint floats on it: the compiler lets nothing float but on that.
+
+    The root stands on the world anyway, and is no body of the scene then.
+    """
+    children = {child.get("link") for child in root.findall("joint/child")}
+    ground = next((link for link in root.findall("link") if link.get("name") not in children), None)
+    floating = [joint.find("parent") for joint in root.findall("joint") if joint.get("type") == "floating"]
+    if ground is None or ground.get("name") not in [one.get("link") for one in floating if one is not None]:
+        return
+    name = ground.get("name")
+    ground.set("name", "world")
+    for parent in root.findall("joint/parent"):
+        if parent.get("link") == name:
+            parent.set("link", "world")
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:

@@ -116,7 +116,7 @@ def _add_joint(body: Any, joint: Joint) -> None:
     added = body.add_joint(
         name=joint.name, type=getattr(mujoco.mjtJoint, f"mjJNT_{joint.type.upper()}"), axis=joint.axis,
         pos=joint.anchor, ref=joint.reference, margin=joint.margin, armature=joint.armature,
-        springref=joint.rest[0],
+        springref=joint.rest[0], frictionloss=joint.friction_loss,
     )  # fmt: skip
     added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
     added.limited, added.range = _bounds(joint.range)
@@ -127,7 +127,9 @@ def _add_joint(body: Any, joint: Joint) -> None:
 
 
 def _add_tendon(spec: Any, bodies: Mapping[str, Any], tendon: Tendon) -> None:
-    added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
+    added = spec.add_tendon(
+        name=tendon.name, springlength=tendon.rest, margin=tendon.margin, frictionloss=tendon.friction_loss
+    )
     added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
     added.limited, added.range = _bounds(tendon.range)
     added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE

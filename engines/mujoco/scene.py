@@ -18,7 +18,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
-from crossbody.cases.scene_contacts import frictional
+from crossbody.cases.scene_contacts import frictional, rough
 from crossbody.cases.scene_rows import rows_of, under_law
 from crossbody.engines._acting import Acting
 from crossbody.engines._real_time import followed as real_time
@@ -90,7 +90,7 @@ def settings(case: Case, profile: str) -> dict[str, Parameter]:
     """Return who reads the file, MuJoCo or the project, which builds its scene; and how contacts with friction act."""
     reader = {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
     found = reader if profile == "as_is" else {}
-    return found | CONES if case.scene is not None and frictional(case.scene) else found
+    return found | CONES if case.scene is not None and rough(case.scene) else found
 
 
 def default_step(case: Case, profile: str) -> float:

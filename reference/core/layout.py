@@ -35,6 +35,7 @@ OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
     "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight",
     "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
+    "pushed",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -69,6 +70,7 @@ STATE = np.dtype(
         ("has_control", "i8"),
         ("has_switch", "i8"),
         ("frictional", "i8"),  # some rows in contact have friction
+        ("dry", "i8"),  # and some have it by themselves, with a bound of their own
         ("friction_code", "i8"),  # where the code stands that answers for them
         ("instant_code", "i8"),  # and that which settles modes
         ("rtol", "f8"),
@@ -137,7 +139,8 @@ STATE = np.dtype(
         ("rank_first", "i8"),
         ("rank_second", "i8"),
         ("sets", "i8"),  # of modes that were tried
-        ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters
+        ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters,
+        ("determined_until", "f8"),  # s: from then on
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding
@@ -174,8 +177,8 @@ class Model:
     follows: Index  # the row whose activity this row shares; -1 for none
     span: Index2  # (nc, 2) first column, and one past the last, of each row of H
     above: Index  # nearest lower coordinate that M couples each one to; -1 for none
-    friction: Floats  # (nc,) coefficient of each normal row
-    tangent: Index  # (nc,) its first tangential row,
+    friction: Floats  # (nc,) coefficient of each normal row; of one with dry friction of its own the bound itself
+    tangent: Index  # (nc,) its first tangential row, of one with dry friction itself,
     tangents: Index  # and how many there are, one behind the other; 0 without friction
     drift: Floats  # (nc,) velocity of a surface along a tangential row
 
@@ -337,6 +340,7 @@ class Work:
     turn_by: Floats  # by how much each turns
     turning: Index  # their places
     turned: Index  # pivots
+    pushed: Floats  # (nc,) right-hand sides less what forces of rows do that slide with a bound of their own
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)

@@ -649,7 +649,6 @@ def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"shoulder": 'frictionloss=".1"'}, "shoulder.*friction.*without=friction"),
         ({"shoulder": 'actuatorgravcomp="true" actuatorfrclimited="true" actuatorfrcrange="-1 1"'}, "shoulder"),
         ({"integrator": 'RK4" wind="1 0 0'}, "wind.*without=medium"),
         ({"integrator": 'RK4" density="1'}, "density 1.*without=medium"),
