@@ -118,14 +118,16 @@ def rough(scene: Scene) -> Contact | None:
 def frictional(scene: Scene) -> str | None:
     """Return why an engine that has no rows with friction cannot run a scene; None if it can."""
     first, dry = rough(scene), next((part for part, _ in scene.dry), None)
+    theirs = "mujoco:as_is and mujoco:default"
     if first is not None:
-        what, own = f"Pair {first.pair.name!r} has friction", "by MuJoCo's own cones"
+        what = f"Pair {first.pair.name!r} has friction"
+        theirs += ", pinocchio:admm, drake:matched and default, dart:matched and default"
     elif dry is not None:
-        what, own = f"{type(dry).__name__} {dry.name!r} has dry friction (friction_loss)", "softly"
+        what = f"{type(dry).__name__} {dry.name!r} has dry friction (friction_loss)"
     else:
         return None
     return (
-        f"{what}, which reference:compiled and reference:cvode have, and {own} mujoco:as_is and mujoco:default; "
+        f"{what}, which reference:compiled and reference:cvode have, and by laws of their own {theirs}; "
         "without=friction leaves that of a file out of every engine."
     )
 

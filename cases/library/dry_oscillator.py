@@ -48,4 +48,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     made = case_of(scene, name="dry_oscillator", variant=variant, q0=[p["start"]], v0=[p["speed"]], t_end=p["t_end"],
                    parameters=parameters)  # fmt: skip
     holds = p["speed"] == 0.0 and 0.0 < abs(p["stiffness"] * p["start"]) < p["friction_loss"]
-    return limits(made, _TITLES[variant], PARAMETERS, oscillator(p), p, creep(p, Soft()) if holds else 0.0)
+    return limits(
+        made, _TITLES[variant], PARAMETERS, oscillator(p), p, {("mujoco", "default"): creep(p, Soft())} if holds else {}
+    )

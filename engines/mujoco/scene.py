@@ -62,6 +62,7 @@ CONES = {
     "cone": Parameter(default="own", choices=("own", *CONE), doc="cone of friction; own: the model's"),
     "impratio": Parameter(default=0.0, doc="friction's stiffness over that of normals; 0: the model's", low=0.0),
     "noslip": Parameter(default=-1, doc="iterations that take slip out; -1: the model's", low=-1, high=1e6),
+    "timeconst": Parameter(default=0.0, unit="s", doc="time constant of contacts (solref); 0: the model's", low=0.0),
 }
 """Of models with friction."""
 OF_FORCE = 1.5
@@ -179,7 +180,7 @@ def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
 
 def build(
     case: Case, profile: str, dt: float, reader: str = "file", cone: str = "own", impratio: float = 0.0,
-    noslip: int = -1,
+    noslip: int = -1, timeconst: float = 0.0,
 ) -> Prepared:  # fmt: skip
     """Compile the model of one profile.
 
@@ -196,6 +197,8 @@ def build(
     else:
         model = matched(scene)
     _set_cone(model.opt, cone, impratio, noslip)
+    if timeconst > 0.0:
+        model.geom_solref[:, 0] = model.pair_solref[:, 0] = timeconst
     data = mujoco.MjData(model)
     switched = Switched(scene, model, data) if profile == "matched" else None
     rows, acting = switched or (Obvious if profile == "default" else Rows)(scene, model, data), Acting(case)

@@ -14,16 +14,19 @@ import sksundae
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.registry import Registry
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
 from crossbody.engines._formed import FormedRun, form_of, linearised, on_scene
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
+from crossbody.engines._rubbing import RubbingRun
 from crossbody.engines._scene import module_of
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.pinocchio._admm import TimeStepper
 from crossbody.engines.pinocchio._audit import audit
+from crossbody.engines.pinocchio._cones import Cones
 from crossbody.engines.pinocchio._flow import Flow
 from crossbody.engines.pinocchio._impulse import RULES, Impact, ImpulseMachine, constants, restitution
 from crossbody.engines.pinocchio._rows import ALGEBRA
@@ -146,6 +149,11 @@ class Pinocchio(Engine):
         if (form := form_of(case)) is not None:
             return FormedRun(form=form, inner=self.prepare(form.case, profile, **settings))
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
+        if case.scene is not None and frictional(case.scene):
+            stepper = Cones(case, used, _bounces(case, settings))
+            return RubbingRun(
+                case=case, engine=self.name, profile=profile, settings=used, stepper=stepper, physics=stepper.physics()
+            )
         mechanism = MECHANISMS.load(module_of(case))
         if hasattr(mechanism, "prepare"):
             run: Run = mechanism.prepare(case, used)

@@ -20,7 +20,8 @@ from crossbody.reports.judging.verdict import Word, judge
 from crossbody.reports.measuring.truth import from_run, sample_times
 
 NAMES = (
-    "sliding_block", "rolling_sphere", "rocking_block", "block_on_belt", "stacked_blocks", "dry_oscillator"
+    "sliding_block", "rolling_sphere", "rocking_block", "block_on_belt", "stacked_blocks", "held_weight",
+    "dry_oscillator",
 )  # fmt: skip
 ALL = [(name, variant) for name in NAMES for variant in cases.variants(name)]
 BENT = [
