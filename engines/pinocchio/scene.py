@@ -373,7 +373,10 @@ def _joint(joint: Joint) -> Any:
 
 def _inertia(body: Body) -> Any:
     xx, yy, zz, xy, xz, yz = body.inertia
-    return pin.Inertia(body.mass, np.array(body.com), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    found = pin.Inertia.Zero()  # part by part: made at once, what no rigid body has would be refused
+    found.mass, found.lever = body.mass, np.array(body.com)
+    found.inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return found
 
 
 def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed: Placed) -> Callable[[Floats], Floats]:

@@ -313,7 +313,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
             s.have_jacobian = 0
             return np.inf
         watch_multipliers(s, m, w, stage)
-        if s.na < s.nc and 2 <= stage <= 4:
+        if s.switching and s.na < s.nc and 2 <= stage <= 4:
             watch_gaps(K, s, m, w, s.t + C[stage] * h, stage - 2)
         if s.ng > 0 and 2 <= stage <= 4:
             watch_guards(K, s, m, w, s.t + C[stage] * h, stage - 2)

@@ -104,6 +104,7 @@ STATE = np.dtype(
         ("stalled", "i8"),
         ("cautious", "i8"),  # accepted steps until the last one that was rejected is forgotten
         ("hold", "i8"),
+        ("promised", "f8"),  # an implicit step, by the last explicit one
         ("trial_steps", "i8"),
         ("trial_rhs", "i8"),
         ("trial_t", "f8"),
