@@ -19,7 +19,7 @@ PARAMETERS = {
     **NUMBERS,
     "t_end": Parameter(default=0.2, unit="s", doc="horizon", low=0.0, open_low=True),
     "press": Parameter(default=12.0, unit="N", doc="force of each finger", low=0.0, open_low=True),
-    "radius": Parameter(default=0.02, unit="m", doc="of the fingers' tips", low=0.0, open_low=True),
+    "radius": Parameter(default=0.03125, unit="m", doc="of the fingers' tips", low=0.0, open_low=True),
 }
 
 VARIANTS: dict[str, dict[str, Value]] = {"hangs": {}, "slips": {"press": 8.0}}

@@ -10,7 +10,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.mechanisms.friction.blocks import CORNERS
 from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage, shares
-from crossbody.cases.mechanisms.friction.scene import HIGH, LOW, MASS
+from crossbody.cases.mechanisms.friction.scene import FINGER, HIGH, LIFTED, LOW, MASS
 from crossbody.cases.trajectory import Mode
 
 BASE = np.flatnonzero(CORNERS[:, 2] < 0.0)
@@ -124,10 +124,10 @@ def held(p: Mapping[str, float]) -> Motion:
     def at(s: Floats) -> Rows:
         q, v, lam = np.zeros((len(s), 4)), np.zeros((len(s), 4)), np.zeros((len(s), 6))
         q[:, 1], v[:, 1] = -0.5 * falls * s**2, -falls * s
-        lam[:, :2], lam[:, 2], lam[:, 4] = press, -force, force
+        lam[:, :2], lam[:, [3, 5]] = press, -force
         return q, v, np.zeros((len(s), 6)), lam
 
     def energy(q: Floats, v: Floats) -> Floats:
-        return np.stack([0.5 * MASS * v[:, 1] ** 2, MASS * g * q[:, 1]], axis=1)
+        return np.stack([0.5 * MASS * v[:, 1] ** 2, MASS * g * q[:, 1] + (MASS + 2.0 * FINGER) * g * LIFTED], axis=1)
 
     return Motion([Stage(0.0, (int(Mode.SLIP if slips else Mode.STICK),) * 6, at)], 2, energy, p["t_end"])

@@ -22,8 +22,8 @@ SLIDES = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0))
 PLANAR = (("x", (1.0, 0.0, 0.0), "slide"), ("z", (0.0, 0.0, 1.0), "slide"), ("turn", (0.0, 1.0, 0.0), "hinge"))
 LOW, HIGH = (0.4, 0.3, 0.125), (0.1, 0.1, 0.125)
 """Half sides of two blocks, m, whose heights add up without rounding: a gap of 1e-17 m would be one to fall through."""
-GRIP = 0.05
-"""Half of the width of what fingers hold, m."""
+GRIP, LIFTED, FINGER = 0.0625, 0.25, 0.125
+"""Of fingers: half of the width of what they hold, m, to which a radius adds up without rounding; height, m; kg."""
 FLOOR = Shape(name="floor", type="plane")
 
 
@@ -139,17 +139,16 @@ def tossed_cube(p: Mapping[str, float]) -> Scene:
 
 
 def gripper(p: Mapping[str, float]) -> Scene:
-    """Return a weight between two fingers that are pushed along x; its sides are planes with their x vertical."""
-    r, quarter = p["radius"], math.sqrt(0.5)
-    sides = (("left", -1.0), ("right", 1.0))
-    fingers = [Body(name=name, mass=0.1 * MASS, position=(way * (GRIP + r), 0.0, 0.0)) for name, way in sides]
+    """Return a weight between two fingers that are pushed along x; its sides are planes with their y vertical."""
+    r, sides = p["radius"], (("left", -1.0), ("right", 1.0))
+    fingers = [Body(name=name, mass=FINGER, position=(way * (GRIP + r), 0.0, LIFTED)) for name, way in sides]
     planes = [
         Shape(name=f"side {name}", body="weight", type="plane", position=(way * GRIP, 0.0, 0.0),
-              orientation=(quarter, 0.0, way * quarter, 0.0))
+              orientation=(0.5, 0.5, 0.5 * way, 0.5 * way))
         for name, way in sides
     ]  # fmt: skip
     return Scene(
-        bodies=(Body(name="weight", mass=MASS), *fingers),
+        bodies=(Body(name="weight", mass=MASS, position=(0.0, 0.0, LIFTED)), *fingers),
         joints=(
             *(Joint(name=name, body="weight", type="slide", axis=axis) for name, axis in SLIDES[::2]),
             *(Joint(name=name, body=name, type="slide", axis=(1.0, 0.0, 0.0)) for name, _ in sides),
