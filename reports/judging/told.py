@@ -35,6 +35,12 @@ class EngineRun:
         return sorted((row for row in self.rows if row["verdict"] in WRONG), key=share, reverse=True)
 
     @property
+    def judged(self) -> bool:
+        """Whether any number of it has a verdict, beside that it finished."""
+        said = (Word.WITHIN, Word.EXPECTED, *WRONG)
+        return any(row["verdict"] in said and (row["metric"] != "finished" or row in self.wrong) for row in self.rows)
+
+    @property
     def deviates(self) -> bool:
         """Whether a number is beyond its limit within bounds that are known of the engine."""
         return any(row["verdict"] == Word.EXPECTED for row in self.rows)
@@ -71,13 +77,18 @@ def share(row: Row) -> float:
 
 def sentence(runs: Sequence[EngineRun]) -> str:
     """Say how many runs are within all limits, which have known deviations, and which are off and why."""
-    ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
+    all_ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
+    ran = [run for run in all_ran if run.judged]
+    if all_ran and not ran:
+        return "Nothing is judged here: no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
     right = [run for run in ran if not run.wrong]
     known = [run.who for run in right if run.deviates]
     beyond = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
     text = f"{len(right) - len(known) - len(beyond)} of {len(ran)} runs are within all limits"
     text += f", {len(known)} deviate as is known of them ({', '.join(dict.fromkeys(known))})." if known else "."
+    if len(ran) < len(all_ran):
+        text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     if off:
         text += f" Off: {_named([_off(run, run.wrong[0]) for run in off])}."
     if beyond:

@@ -45,12 +45,8 @@ def index_pages(found: Results) -> list[Page]:
 
 
 def _lead(found: Results) -> str:
-    """Who is within and who is off; a run without a limit is neither."""
-    if not found.verdicts:
-        return ""
-    if all(row["verdict"] not in grid.WORST for row in found.verdicts):
-        return "Nothing is judged here: no number has a limit."
-    return sentence(runs_of(found.verdicts))
+    """Who is within and who is off."""
+    return sentence(runs_of(found.verdicts)) if found.verdicts else ""
 
 
 def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> list[Section]:

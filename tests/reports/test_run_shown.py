@@ -46,6 +46,18 @@ def test_the_table_fits_and_loses_no_digit(given_: list[tuple[float, float, floa
                 assert shown[name] == f"{value:.1e}"
 
 
+def test_a_run_that_nothing_judges_is_not_counted_as_within() -> None:
+    rows = [
+        row("a", "position", 1e-9, Word.WITHIN, 1e-6),
+        row("b", "finished", 1.0, Word.WITHIN, 0.0),
+        row("b", "position", 1.0, Word.INFO),
+    ]
+    text = sentence(runs_of(rows))
+    assert text.startswith("1 of 1 runs are within all limits.")
+    assert "Without a limit: b:matched on ball:v." in text
+    assert sentence(runs_of(rows[1:])) == "Nothing is judged here: no number has a limit."
+
+
 def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_as_within() -> None:
     rows = [
         row("a", "position", 1e-9, Word.WITHIN, 1e-6),
