@@ -36,9 +36,10 @@ class EngineRun:
 
     @property
     def judged(self) -> bool:
-        """Whether any number of it has a verdict, beside that it finished."""
-        said = (Word.WITHIN, Word.EXPECTED, *WRONG)
-        return any(row["verdict"] in said and (row["metric"] != "finished" or row in self.wrong) for row in self.rows)
+        """Whether any number of it was held to a limit, beside that it finished."""
+        said = (Word.WITHIN, Word.EXPECTED)
+        held = any(row["verdict"] in said and row["metric"] != "finished" for row in self.rows)
+        return held or bool(self.wrong) or self.unbounded is not None
 
     @property
     def deviates(self) -> bool:

@@ -67,7 +67,7 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
         row("c", "penetration", 1e-3, Word.INFO),  # without a limit
     ]
     text = sentence(runs_of(rows))
-    assert text.startswith("2 of 3 runs are within all limits.")
+    assert text.startswith("1 of 2 runs are within all limits. Without a limit: c:matched on ball:v.")
     assert text.endswith("no bound on how far: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
     step = row("b", part_of("position", "step"), 2.0e-5, Word.INFO)
     assert "24 times its limit, mostly its step" in sentence(runs_of([*rows, step]))
