@@ -117,8 +117,9 @@ class Pinocchio(Engine):
         if profile == "admm" and not hasattr(MECHANISMS.load(name), "build"):
             return "The profile admm steps contacts in time: the loops of this mechanism never open."
         opens = case.law.unilateral
-        if profile == "admm" and not (case.contacts and (case.scene is None or not case.scene.loops)):
-            return "The profile admm steps contacts in time: this case has none."
+        closed = case.scene is not None and any(loop.in_space for loop in case.scene.loops)
+        if profile == "admm" and (closed or not case.contacts):
+            return "The profile admm steps contacts in time: this case has loops in space, or no contact."
         if profile in RULES and not (opens.any() and opens.all()):
             return "An impact needs a contact that opens: a row that is always on has none."
         if profile == "impulse_simultaneous" and int(case.law.unilateral.sum()) < 2:
