@@ -46,8 +46,9 @@ class _Robot:
             bounds = m.jnt_range[i] if m.jnt_limited[i] else (-np.inf, np.inf)
             stiff, here = [m.jnt_stiffness[i], *m.jnt_stiffnesspoly[i]], slice(at, at + 1 if single else at)
             values = {
-                "armature": m.dof_armature[dofs], "friction": m.dof_frictionloss[dofs],
-                "damping": m.dof_damping[dofs] + self._damped(i), "damping v|v|": m.dof_dampingpoly[dofs, 0],
+                "armature": m.dof_armature[dofs] + self._of_motors(i, m.actuator_armature),
+                "friction": m.dof_frictionloss[dofs],
+                "damping": m.dof_damping[dofs] + self._of_motors(i, m.actuator_damping), "damping v|v|": m.dof_dampingpoly[dofs, 0],
                 "damping v^3": m.dof_dampingpoly[dofs, 1], "stiffness": stiff[0], "stiffness x^2": stiff[1],
                 "stiffness x^3": stiff[2], "rest": m.qpos_spring[here if kind != "ball" else slice(at, at + 4)]
                 if any(stiff) else (), "lower": bounds[0] if single else -np.inf, "upper": bounds[1],
@@ -65,11 +66,11 @@ class _Robot:
             ]
         return [self.joints[to][0]] if kind == self._lib.mjtTrn.mjTRN_JOINT else []
 
-    def _damped(self, joint: int) -> float:
-        """Return what actuators add to the damping of a joint."""
+    def _of_motors(self, joint: int, values: Any) -> float:
+        """Return what actuators add to a number of a joint: their own (nu,), by the squares of their gears."""
         m = self._m
         own = (m.actuator_trntype == int(self._lib.mjtTrn.mjTRN_JOINT)) & (m.actuator_trnid[:, 0] == joint)
-        return float((m.actuator_gear[own, 0] ** 2 * m.actuator_damping[own]).sum())
+        return float((m.actuator_gear[own, 0] ** 2 * values[own]).sum())
 
     def _loop(self, i: int) -> tuple[str, list[str], list[float]]:
         m, kind = self._m, self._lib.mjtEq(self._m.eq_type[i]).name.removeprefix("mjEQ_").lower()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, arm, mjcf
@@ -12,10 +13,10 @@ from crossbody.cases.scene import Actuator, Loop, Tendon
 def features() -> list[Feature]:
     """Return the features of equalities and actuators."""
 
-    def row(name: str, equality: str, loop: Loop, finds: str, before: str = "") -> Feature:
+    def row(name: str, equality: str, loop: Loop, finds: str, before: str = "", inside: str = "") -> Feature:
         return written(
             name,
-            mjcf(tail=f"<equality>{equality}</equality>", lower_inertial=LOWER_INERTIAL + before),
+            mjcf(tail=f"<equality>{equality}</equality>", lower_inertial=LOWER_INERTIAL + before, inside=inside),
             arm(loops=(loop,)),
             finds,
             about=("loops",),
@@ -44,6 +45,9 @@ def features() -> list[Feature]:
             first="lower", first_position=(0.0, 0.0, -0.3), second_position=(0.1, 0.25, 0.3)), ".//connect[@body1]"),
         row("two frames", '<weld name="c" body1="lower" body2="upper"/>', Loop(name="c", type="weld", first="lower",
             second="upper", first_position=(0.0, -0.05, 0.4)), ".//weld[@body1]"),
+        row("sites of two bodies", '<connect name="c" site1="s" site2="t"/>', Loop(name="c", type="connect",
+            first="lower", second="upper", first_position=(0.0, 0.0, -0.3), second_position=(0.0, 0.05, -0.6)),
+            ".//connect[@site1]", before='<site name="s" pos="0 0 -.3"/>', inside='<site name="t" pos="0 .05 -.6"/>'),
         row("coupled joints", '<joint name="c" joint1="elbow" joint2="shoulder" polycoef="0 2 0 0 0"/>', Loop(name="c",
             type="joint", first="elbow", second="shoulder", polynomial=(0.0, 2.0, 0.0, 0.0, 0.0)), "equality/joint"),
         row("fixed joint by an equality", '<joint name="c" joint1="elbow"/>', Loop(name="c", type="joint",
@@ -55,6 +59,16 @@ def features() -> list[Feature]:
             bias=(0.0, 0.0, -2.0)),
         driven("general actuator", '<general name="m" joint="elbow" gainprm="10"/>', ".//general",
             gain=(10.0, 0.0, 0.0)),
+        *(written(f"{what} of a tendon", mjcf(tail=both.replace('"t"', f'"t" {attributes}')),
+            arm(tendons=(replace(tendon, **change),)), f".//fixed[@{finds}]", about=("tendons",),
+            rule="A fixed tendon is a sum of joints.", rewrite="Apply its force at the joints in the engine.")
+            for what, attributes, finds, change in (
+                ("spring", 'stiffness="5" springlength=".2"', "stiffness", {"stiffness": (5.0, 0.0, 0.0),
+                 "rest": (0.2, 0.2)}),
+                ("dead band", 'stiffness="5" springlength="-.1 .2"', "springlength", {"stiffness": (5.0, 0.0, 0.0),
+                 "rest": (-0.1, 0.2)}),
+                ("damping", 'damping=".7"', "damping", {"damping": (0.7, 0.0, 0.0)}),
+                ("bound", 'range="-.5 1" limited="true"', "range", {"range": (-0.5, 1.0)}))),
         written("actuator on a tendon", mjcf(tail=both + '<actuator><motor name="m" tendon="t"/></actuator>'),
             arm(tendons=(tendon,), actuators=(Actuator(name="m", tendon="t", gear=(1.0,)),)),
             ".//motor[@tendon] | .//general[@tendon]", about=("actuators",), rule="A fixed tendon is a sum of joints.",
