@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from crossbody.cases import Case, Coordinate, Law, Parameter, Trajectory
-from crossbody.hw.models._contract import Floats, Model, Numbers, Segment
+from crossbody.cases.arrays import Floats
+from crossbody.hw.models._contract import Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
 
 PLACE = ("px", "py", "pz")
