@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -112,6 +113,8 @@ class Trajectory:
         inputs: what acted on it, where a controller of the user's own gave some of it; None where the case says it.
         sol: sol(t) gives q (..., nq) and v (..., nv) at instants t (...), s, between the samples too, and
             sol(t, side="left") what they are before an event there; None where not asked for, by `dense=True`.
+        determined_until: until when the law determines the motion, s; finite where contacts that slide share a load as
+            no law says (the message names it `indeterminate`).
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 
@@ -132,6 +135,7 @@ class Trajectory:
     ledger: Ledger | None = None
     inputs: Inputs | None = None
     control_s: float = 0.0
+    determined_until: float = math.inf
     sol: Callable[..., tuple[Floats, Floats]] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -150,6 +154,18 @@ class Trajectory:
         """Kinetic plus potential energy (n,), J."""
         total: Floats = self.energy.sum(axis=1)
         return total
+
+    def before(self, t: float) -> Trajectory:
+        """Return the motion up to an instant t, s, with its events, switches and account until then."""
+        kept = self.t <= t
+        booked = self.ledger and Ledger(
+            contact=self.ledger.contact[kept], input=self.ledger.input[kept], dissipated=self.ledger.dissipated[kept]
+        )
+        return replace(
+            self, **{name: getattr(self, name)[kept] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")},
+            events=tuple(e for e in self.events if not e.t > t),
+            switches=tuple(s for s in self.switches if not s.t > t), ledger=booked,
+        )  # fmt: skip
 
     @checked_arguments
     def transitions(self, contact: int | None = None) -> tuple[Event, ...]:

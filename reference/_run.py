@@ -268,6 +268,7 @@ class CompiledRun:
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
             if self.nz
             else None,
+            determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
         )  # fmt: skip
         if self.callback is not None:
             controller = self.callback.controller

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 from crossbody.cases import installed
 from crossbody.reference import code_store
@@ -14,6 +15,10 @@ from crossbody.reference import code_store
 # Interrupts are tested by sending them. A shell without job control starts what it puts in the background with SIGINT
 # ignored, and children inherit that; a handler is not inherited.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Other work may share the machine: no example fails by how long it takes.
+settings.register_profile("unhurried", settings(), deadline=None)
+settings.load_profile("unhurried")
 
 
 @pytest.fixture(autouse=True, scope="session")

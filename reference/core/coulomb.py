@@ -110,8 +110,8 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
                 s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
     if s.na > 0 and s.dependent_rows > 0:
         s.redundant = max(s.redundant, s.dependent_rows)
-        if not s.indeterminate:
-            s.indeterminate = undetermined(s, m, w)
+        if not s.indeterminate and undetermined(s, m, w):
+            s.indeterminate, s.determined_until = 1, s.t
 
 
 @compiled

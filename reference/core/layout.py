@@ -137,7 +137,8 @@ STATE = np.dtype(
         ("rank_first", "i8"),
         ("rank_second", "i8"),
         ("sets", "i8"),  # of modes that were tried
-        ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters
+        ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters,
+        ("determined_until", "f8"),  # s: from then on
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 from collections import Counter
@@ -99,7 +100,8 @@ def _wrong(run: EngineRun, row: Row) -> str:
 
 
 def _lost(run: EngineRun, row: Row) -> str:
-    value = f"{row['value']:.4g}{_unit(row)}, band {row['band']:.3g}"
+    expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
+    value = f"{abs(row['value'] - expected):.4g}{_unit(row)} from what is claimed, band {row['band']:.3g}"
     return f"more than a stored run gave: {run.label} {run.who} {row['metric']} {value}"
 
 

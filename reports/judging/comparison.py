@@ -31,7 +31,7 @@ from crossbody.reports.judging.verdict import (
     limit_for,
 )  # fmt: skip
 from crossbody.reports.measuring.alignment import instants
-from crossbody.reports.measuring.truth import TRUTH, Truth
+from crossbody.reports.measuring.truth import TRUTH, Truth, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,8 +50,6 @@ FLOOR = 0.5
 """A number is judged where at least this part of the time for which the truth must be trusted was compared."""
 REACHED = 1e-9
 """Part of the horizon by which the end of a record may miss it: steps that do not add up to it exactly."""
-BY_EVENTS = ("event_times", "mode_times", "restitution_error")
-"""Metrics that match events with the truth's, as far as that is trusted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +124,8 @@ def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> 
     """Every row of one case: those of every run, the truth's own, and a word on claims that judged nothing."""
     check_names(case)
     truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
-    rows = [row for entry in entries for row in verdicts(case, entry, truth, command)]
+    trusted = shortened(truth)
+    rows = [row for entry in entries for row in verdicts(case, entry, trusted, command)]
     return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command)]
 
 
@@ -170,10 +169,12 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     """Whether the sources of a truth agree as far as they must; none for a truth that has one source and was given."""
     if math.isnan(truth.allowed):
         return []
-    until = case.t_end if case.chaos is None else min(case.chaos.until, case.t_end)
+    known = case.chaos or truth.horizon
+    until = case.t_end if known is None else min(known.until, case.t_end)
     value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
     short = truth.trusted < until
-    told = [f"{truth.source}."] if case.chaos is None else [f"Chaos: {case.chaos.why}.", f"{truth.source}."]
+    told = [] if known is None else [f"Known up to {until:.4g} s: {known.why}."]
+    told.append(f"{truth.source}.")
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
     return [Verdict(
@@ -227,10 +228,11 @@ class _Judge:
         """One number: its word by physics and method, and by the stored run."""
         claim, limit, stored = self.claims.get(metric), self.limit(metric), self.stored.get(metric)
         word, why = judge(value, limit, claim, stored)
-        until = 1.0 if self.case.chaos is None else min(1.0, self.case.chaos.until / self.case.t_end)
+        known = self.case.chaos or self.truth.horizon
+        until = 1.0 if known is None else min(1.0, known.until / self.case.t_end)
         if compared < FLOOR * until and word in (Word.WITHIN, Word.EXPECTED):
             word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon alone: {against.source}"
-        most = band(stored, limit)
+        most = band(stored, limit, claim)
         kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST
         return self.row(
             metric, value, unit, word, why or (against.source if against is not self.truth else ""),
@@ -259,7 +261,8 @@ class _Judge:
 
 
 def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdict]:
-    """Every row of one run."""
+    """Every row of one run, which is compared as far as the truth is trusted."""
+    truth = shortened(truth)
     judge_ = _Judge(case, entry, truth, command)
     if entry.crashed:
         return [judge_.row("run", math.nan, "", Word.CRASHED, entry.crashed)]
@@ -272,7 +275,8 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
             return rows
     if not len(entry.run.t):
         return rows
-    return [*rows, *_measured(judge_, entry.run, truth), *_split(judge_)]
+    run = entry.run.before(truth.trusted) if truth.trusted < entry.run.t[-1] else entry.run
+    return [*rows, *_measured(judge_, run, truth), *_split(judge_)]
 
 
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
@@ -386,16 +390,14 @@ def _shown(metric: metrics.Metric, truth: Truth, case: Case) -> bool:
 
 
 def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, case: Case) -> tuple[float | None, float]:
-    """The number, and the part of the horizon over which the truth was asked for it (1 if it was not)."""
-    until = [math.inf]
+    """The number, and the part of the horizon over which the truth was asked for it, or is trusted if it was not."""
+    until = [truth.trusted]
 
     def at(times: Floats) -> Trajectory:
         until.append(float(times[-1]) if len(times) else 0.0)
         return truth.at(times)
 
     value = metric.measure(replace(truth, at=at), run, case)
-    if name in BY_EVENTS:
-        until.append(truth.trusted)
     return value, min(min(until) / case.t_end, 1.0)
 
 

@@ -83,7 +83,14 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     if beyond:
         beyond.sort(key=lambda one: -share(one[1]))
         text += f" Off by a known cause, with no bound on how far: {_named([_off(*one) for one in beyond])}."
+    short = [(run.label, row) for run in runs for row in run.rows if row["metric"] == TRUTH and row["compared"] < 1.0]
+    if short:
+        text += f" Compared as far as the truth is known: {_named([f'{at}, {_part(row)}' for at, row in short])}."
     return text
+
+
+def _part(row: Row) -> str:
+    return f"{row['compared']:.2g} of the horizon"
 
 
 def _named(texts: Sequence[str]) -> str:

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Outcome, Tier, Trajectory, arguments
+from crossbody.cases import Case, CaseUnsupported, Chaos, EngineUnavailable, Outcome, Tier, Trajectory, arguments
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reports.judging.answers import Answers
+from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
-from crossbody.reports.measuring.truth import Truth, sample_times
+from crossbody.reports.measuring.truth import Truth, sample_times, shortened
 
 if TYPE_CHECKING:
     from crossbody.engines import Run
@@ -42,6 +43,9 @@ STEPS, GROWTH = 1e4, 10.0
 """Most steps of a run, whose errors add up at worst, and how much they grow where a motion is not declared chaotic."""
 AGREES = STEPS * GROWTH
 """Largest disagreement of the two, in units of the looser tolerance; it is never more than `PARTED`."""
+MULTIPLIED = 1e3
+"""How many times as large an error of the start may have become where a run with the default tolerance is still judged:
+its limits, 1e-6 of a motion, grow no further than to 1e-3."""
 GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
 
@@ -158,15 +162,16 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "") -> Tru
         if isinstance(found, str):
             return _integrated(case, first, "compiled", f" ({found})")
         second = found
-    truth = _held_against(
-        Truth(
-            tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
-            grows=_growing(case, dense, at), joined=case.general,
-        ),
-        second,
-        case,
-        loose,
+    t, grown = _growing(case, dense, at)
+    truth = Truth(
+        tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
+        grows=float(grown[-1]), joined=case.general,
     )  # fmt: skip
+    truth = _held_against(truth, second, case, loose)
+    horizon = _horizon(case, truth, second, t, grown)
+    if horizon is not None:
+        known = replace(truth, horizon=horizon, grows=float(np.interp(horizon.until, t, grown)))
+        truth = _held_against(known, second, replace(case, chaos=horizon), loose)
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
     source = f"compiled reference at rtol {case.tight:g}, {who} at {loose:g} agrees: {said}; they share {shared}{why}"
     if truth.parted < case.t_end:
@@ -232,16 +237,59 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
     return replace(truth, source=truth.source + told, trusted=min(truth.trusted, first.t))
 
 
-def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) -> float:
-    """By how much more than in free flight errors of a scene's start grow: its velocities are put off, on its rows."""
+def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Floats) -> Chaos | None:
+    """Up to when the motion of a scene can be known, and why no further; None if to the end.
+
+    Sources that part where neighbouring motions do not are no reason.
+
+    Args:
+        case: the scene.
+        truth: held against the second source.
+        second: that source.
+        t (n,): instants, s.
+        grown (n,): by how much errors of the start have grown until then.
+    """
+    if not case.general or case.chaos is not None:
+        return None
+    reasons = [
+        (truth.trajectory.determined_until, "the law does not say how contacts that slide share their load"),
+        (_arbitrary(truth, second, case), "the law does not say which of rows that depend on each other lets go first"),
+    ]
+    if truth.parted < case.t_end and grown[-1] > MULTIPLIED:
+        why = f"until then neighbouring motions part by {MULTIPLIED:g} times what they started with"
+        reasons.append((float(t[np.argmax(grown > MULTIPLIED) - 1]), why))
+    until, why = min(reasons)
+    return Chaos(until=until, why=why) if 0.0 < until < min(case.t_end, truth.parted) else None
+
+
+def _arbitrary(truth: Truth, second: Trajectory, case: Case) -> float:
+    """The first instant at which rows that depend on each other switch otherwise in the two sources; infinite if none.
+
+    They move alike all the same: the sources have not parted.
+    """
+    if not truth.trajectory.counts.get("redundant", 0):
+        return math.inf
+    for a, b in matched(truth, second):
+        if abs(a.touch - b.touch) > PARTED * case.t_end:
+            return min(a.touch, b.touch)
+        if not abs(a.release - b.release) <= PARTED * case.t_end and a.release != b.release:
+            return min(a.release, b.release)
+    return math.inf
+
+
+def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) -> tuple[Floats, Floats]:
+    """Instants (n,), s, and by how much more than in free flight errors of a scene's start have grown until then (n,).
+
+    Its velocities are put off, on its rows.
+    """
     fastest = float(np.max(np.abs(truth.v), initial=0.0))
     if not case.general or not truth.outcome.ok or not RESTS < fastest < math.inf:
-        return 1.0
+        return np.array([0.0, case.t_end]), np.ones(2)
     from crossbody.engines import load
     from crossbody.engines.equations import system_of
 
     rng, system, t = np.random.default_rng(0), system_of(case), np.linspace(0.0, case.t_end, INSTANTS)
-    held, exact, most = system.constraint(case.q0, case.v0)[0][~case.law.unilateral], at(t).q, 1.0
+    held, exact, most = system.constraint(case.q0, case.v0)[0][~case.law.unilateral], at(t).q, np.ones(len(t))
     for _ in range(DIRECTIONS):
         way = rng.choice([-1.0, 1.0], size=len(case.v0))
         way -= np.linalg.lstsq(held, held @ way, rcond=None)[0] if len(held) else 0.0
@@ -249,8 +297,9 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) 
         nudged = replace(case, v0=case.v0 + off * way)
         run = _motion(load("reference").prepare(nudged, "compiled", rtol=case.tight, samples=t))
         if run.outcome.ok:
-            most = max(most, float(np.max(differences(run.q, exact, case.quaternions))) / (off * case.t_end))
-    return most
+            apart = np.max(differences(run.q, exact, case.quaternions), axis=1)
+            most = np.maximum(most, np.maximum.accumulate(apart) / (off * case.t_end))
+    return t, most
 
 
 def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
@@ -321,5 +370,8 @@ def _booked(run: Ledger, natural: Ledger, at: NDArray[np.intp], after: NDArray[n
 def _agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
     from crossbody.reports import metrics
 
+    truth = shortened(truth)
+    if len(second.t) and truth.trusted < second.t[-1]:
+        second = second.before(truth.trusted)
     found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
     return {name: value for name, value in found.items() if value is not None}

@@ -15,7 +15,7 @@ FACTOR = 2.0
 BAND = 10.0
 """A number that was right may become so many times what a stored run gave before it counts as lost."""
 ROUNDING = 1e-12
-"""Below this, in the unit of a metric, numbers differ from one machine to the next."""
+"""Below this part of what is claimed, or of one unit of the metric, numbers differ from one machine to the next."""
 
 IDENTITIES = frozenset(
     {"start_error", "mode_residual", "event_gap", "largest position (importer)", "largest event_times (importer)"}
@@ -160,12 +160,13 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     return Word.OUTSIDE, f"{said}A known property explains {least:.3g} to {most:.3g}: {limit.known}"
 
 
-def band(stored: float | None, limit: Limit | None) -> float:
+def band(stored: float | None, limit: Limit | None, claim: Claim | None = None) -> float:
     """Largest deviation that is no regression; NaN without a stored run, 0 for what must come out exactly."""
     if stored is None or not math.isfinite(stored):
         return math.nan
     exact = limit is None or limit.value == 0.0
-    return BAND * stored if exact else max(BAND * stored, ROUNDING)
+    size = 1.0 if claim is None else max(1.0, abs(claim.expected))
+    return BAND * stored if exact else max(BAND * stored, ROUNDING * size)
 
 
 def exit_code(words: Iterable[str], regressions: Iterable[str] = ()) -> int:

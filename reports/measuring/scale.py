@@ -27,13 +27,14 @@ def energy(run: Trajectory) -> float:
     """Return what energies are measured by, J: the largest kinetic energy, or the swing of the potential.
 
     A robot that stands sags by its servos at hardly any speed: its energy turns over in springs and weights. Where
-    every coordinate rests, by what it would turn over if they moved by as much as they are measured by themselves, and
-    by what rounding leaves of the largest energy.
+    every coordinate rests, by what it, and what its rows carry, would turn over if they moved by as much as they are
+    measured by themselves, and by what rounding leaves of the largest energy.
     """
     known = KNOWN * float(np.max(np.abs(run.energy)))
     moved = _moved(run)
     rests = max(1.0, RESTS / moved) if moved > 0.0 else 1.0
-    return max(rests * float(run.energy[:, 0].max()), rests * float(np.ptp(run.energy[:, 1])), known)
+    carried = RESTS * float(np.nanmax(np.abs(run.lam), initial=0.0)) if moved < RESTS else 0.0
+    return max(rests * float(run.energy[:, 0].max()), rests * float(np.ptp(run.energy[:, 1])), carried, known)
 
 
 def of_like(largest: Floats, named: Sequence[Coordinate]) -> Floats:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from crossbody.cases import Tier, Trajectory
+from crossbody.cases import Chaos, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
 
 TRUTH = "truth"
 """Name of the truth where engines have theirs, and of the row that judges it."""
+LAST = 0.9
+"""Part of the time for which a truth is trusted behind which it may end, so that this is between two events."""
 MOST, FEWEST = 4000, 21
 """Samples inside all short intervals between events together, unless each has but the fewest."""
 
@@ -36,6 +38,7 @@ class Truth:
         growth: rate at which the two part, 1/s; NaN unless they do.
         grows: how many times more than in free flight an error of the start grows; 1 where it was not measured.
         tight: tolerance of the compiled run; NaN of another source.
+        horizon: up to when a scene's motion can be known, and why no further, as measured; None if to the end.
         joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
             each other and rest unloaded.
     """
@@ -52,6 +55,7 @@ class Truth:
     growth: float = math.nan
     tight: float = math.nan
     grows: float = 1.0
+    horizon: Chaos | None = None
     joined: bool = False
 
 
@@ -72,6 +76,18 @@ def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 
     parts += [np.linspace(a, b, each)[1:-1] for a, b in short]
     times: Floats = np.sort(np.concatenate([np.unique(np.concatenate([*parts, events])), events]))
     return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
+
+
+def shortened(truth: Truth) -> Truth:
+    """Return a truth that ends where it is no longer trusted, between two events: there numbers of events can agree."""
+    end = truth.trusted
+    if not end < truth.trajectory.t[-1]:
+        return truth
+    near = [e.t for e in truth.trajectory.events if LAST * end < e.t < end / LAST]
+    if near:
+        edges = [LAST * end, *(t for t in near if t < end), end]
+        end = max((b - a, 0.5 * (a + b)) for a, b in pairwise(edges))[1]
+    return replace(truth, trajectory=truth.trajectory.before(end), trusted=end)
 
 
 def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:

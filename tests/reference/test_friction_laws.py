@@ -147,6 +147,8 @@ def test_a_spinning_box_that_slides_is_told_to_be_indeterminate() -> None:
     run_ = run(box_on_floor(0.3), [0, 0, 0.1, 1, 0, 0, 0], [1.0, 0.3, 0, 0, 0, 2.0], 0.2, rtol=1e-9)
     assert run_.counts["indeterminate"]
     assert run_.message.startswith("indeterminate")
+    assert 0.0 <= run_.determined_until < 0.2
+    assert run(box_on_floor(0.3), [0, 0, 0.1, 1, 0, 0, 0], [1.0, 0.3, 0, 0, 0, 0], 0.2).determined_until == np.inf
 
 
 def test_a_file_slides_as_its_scene_does(tmp_path: Path) -> None:

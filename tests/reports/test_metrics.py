@@ -102,9 +102,11 @@ def test_energy_of_what_rests_is_measured_as_its_positions_are(truth: Truth) -> 
     depth = np.linspace(0.0, 1.0, len(run.t))
     for moved in (1e-9, 1e-6, RESTS):
         energy = np.column_stack([0.0 * depth, -3.0 * moved * depth])
-        sunk = replace(run, q=1.0 - moved * depth[:, None], energy=energy)
+        sunk = replace(run, q=1.0 - moved * depth[:, None], energy=energy, lam=np.full_like(run.lam, 3.0))
         assert scale.energy(sunk) == pytest.approx(3.0 * RESTS, rel=1e-6)
     assert scale.energy(replace(sunk, q=run.q + depth[:, None])) == pytest.approx(3.0 * RESTS, rel=1e-6)
+    still = replace(sunk, q=np.ones_like(run.q), energy=np.zeros_like(run.energy))
+    assert scale.energy(still) == pytest.approx(3.0 * RESTS), "what rows carry, where not even rounding moves anything"
 
 
 def test_unexplained_energy_belongs_to_the_integrator(truth: Truth, case: Case) -> None:

@@ -9,12 +9,12 @@ import pytest
 from four_bars import four_bar
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Outcome, Tier
+from crossbody.cases import Case, Outcome, Tier, Trajectory
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
-from crossbody.reports.judging.comparison import Entry, verdicts
+from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
 from crossbody.reports.judging.truth import LEAST, MANY, tightened, truth_of
-from crossbody.reports.measuring.truth import from_run
+from crossbody.reports.measuring.truth import Truth, from_run, shortened
 
 INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
 
@@ -41,6 +41,59 @@ def test_errors_grow_as_the_closed_form_of_an_upright_pendulum_has_it(seed: int)
     truth = truth_of(pendulum(length, True, 1e-5, t_end))
     assert truth.grows == pytest.approx(np.sinh(k * t_end) / (k * t_end), rel=1e-3)
     assert truth_of(pendulum(length, False, 1e-5, t_end)).grows == 1.0
+
+
+def double_pendulum(angle: float, t_end: float) -> Case:
+    """Two equal rods that start at rest, both turned by an angle from hanging, rad."""
+    bodies = tuple(
+        Body(name=name, parent=parent, position=(0, 0, -1.0 if parent else 0.0), mass=1.0, com=(0, 0, -1.0),
+             inertia=(0.01, 0.01, 0.01, 0, 0, 0))
+        for name, parent in (("upper", ""), ("lower", "upper"))
+    )  # fmt: skip
+    joints = tuple(Joint(name=name, body=name, type="hinge", axis=(0, 1, 0)) for name in ("upper", "lower"))
+    return cases.from_scene(Scene(bodies=bodies, joints=joints), q0=[angle, 0.0], t_end=t_end)
+
+
+def test_a_chaotic_motion_is_trusted_as_far_as_neighbouring_motions_say() -> None:
+    case = double_pendulum(2.5, 30.0)
+    truth = truth_of(case)
+    assert truth.horizon is not None
+    assert 1.0 < truth.horizon.until < 30.0
+    row = truth_row(case, truth, "")[0]
+    assert (row.verdict, row.compared) == ("within", truth.horizon.until / 30.0)
+    rows = {row.metric: row for row in verdicts(case, Entry(
+        engine="reference", profile="compiled", run=engines.load("reference").prepare(case, "compiled").run(),
+    ), truth, "")}  # fmt: skip
+    assert rows["position"].verdict == "within"
+    assert rows["position"].compared == pytest.approx(row.compared, rel=1e-2)
+
+
+def test_sources_that_part_where_neighbouring_motions_do_not_are_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fault in one of them grows as no motion does."""
+    from crossbody.reports.judging import truth as module
+
+    right = module._held_against
+
+    def wrong(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
+        return right(truth, replace(second, q=second.q * (1.0 + 1e-2 * second.t[:, None])), case, rtol)
+
+    monkeypatch.setattr(module, "_held_against", wrong)
+    for case in (double_pendulum(0.5, 2.0), double_pendulum(2.5, 30.0)):
+        found = truth_of(case)
+        assert found.horizon is None
+        assert truth_row(case, found, "")[0].verdict == "outside"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_numbers_of_events_agree_up_to_where_a_truth_ends(seed: int) -> None:
+    """The end lies between two events: one that comes a little later in a run counts in both or in neither."""
+    case = cases.load("bouncing_ball", "elastic")
+    truth, rng = truth_of(case), np.random.default_rng(seed)
+    for event in truth.trajectory.events:
+        short = shortened(replace(truth, trusted=event.t + rng.choice([-1e-7, 0.0, 1e-7])))
+        assert 0.9 * event.t - 1e-6 <= short.trusted <= event.t + 1e-6
+        gaps = [abs(short.trusted - e.t) for e in truth.trajectory.events]
+        assert min(gaps) > 1e-6
 
 
 def test_a_limit_is_as_wide_as_the_motion_makes_errors_large() -> None:

@@ -211,6 +211,11 @@ def test_a_band_is_ten_times_what_was_stored() -> None:
     assert math.isnan(band(None, LIMIT))
 
 
+def test_rounding_grows_with_what_is_claimed() -> None:
+    claim = Claim(metric=LIMIT.metric, expected=-9810.0, tier=Tier.A, source="weight")
+    assert band(0.0, LIMIT, claim) == pytest.approx(9.81e-9)
+
+
 @pytest.mark.parametrize("word", [Word.OUTSIDE, Word.CRASHED])
 def test_what_is_wrong_is_the_exit_code(word: Word) -> None:
     assert exit_code([Word.WITHIN, word]) == 1
