@@ -20,6 +20,7 @@ from crossbody.cases.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from crossbody.cases.control import Control
+    from crossbody.cases.form import Form
     from crossbody.cases.metric import CaseMetric
     from crossbody.cases.scene import Scene
 
@@ -187,6 +188,30 @@ class Inputs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Force:
+    """What acts on a scene beside its parts, as a function of time and state that engines compile once.
+
+    Attributes:
+        function: (t, q (nq,), v (nv,), numbers, out (nv,)) in the scene's coordinates: writes the generalised forces.
+            It keeps nothing, is written in the Python that numba compiles, and so is every function that it calls.
+        numbers: that it reads.
+        breaks: instants between which it is smooth, s, increasing: no step crosses one.
+        rate: fastest with which bodies answer to it, 1/s; 0 where nothing but rows is fast.
+        states: bodies on slides that carry states of a controller or a sensor: their mass is 1, and no energy counts.
+        far, fast (nv,): how far and how fast the joints move, in their units, for absolute tolerances; empty where what
+            drives the start tells.
+    """
+
+    function: Callable[[float, Floats, Floats, Floats, Floats], None]
+    numbers: Floats = field(default_factory=lambda: np.zeros(0))
+    breaks: tuple[float, ...] = ()
+    rate: float = 0.0
+    states: tuple[str, ...] = ()
+    far: tuple[float, ...] = ()
+    fast: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
     """How large one metric may be for one engine and profile, and why.
 
@@ -278,6 +303,9 @@ class Case:
         rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
         scene: bodies, joints and what acts between them, of which engines build their models; the reference takes the
             kernels of `mechanism` where there are some. `file` is where it was read from, `findings` what is strange.
+        force: what acts on the scene beside its parts; the kernels of `mechanism` have it.
+        form: (case, whether servos act, whether inputs stand for a sampled controller) -> the case on a scene, for
+            engines, where its own coordinates are others.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
             show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
@@ -311,6 +339,8 @@ class Case:
     chaos: Chaos | None = None
     consistent: bool = True
     scene: Scene | None = None
+    force: Force | None = None
+    form: Callable[..., Form] | None = None
     rank: int = -1
     act0: Floats = field(default_factory=lambda: np.zeros(0))
     velocities: tuple[Coordinate, ...] = ()
@@ -335,6 +365,9 @@ class Case:
             )
         if not (math.isfinite(self.t_end) and self.t_end > 0):
             raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
+        if self.force is not None and (self.general or self.scene is None):
+            what = "is no scene" if self.scene is None else "has no kernels of its own, in which the reference has it"
+            raise SceneError(f"Case {self.name} has a force but {what}.")
         self._put_control()
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
@@ -362,7 +395,7 @@ class Case:
 
     @property
     def rubs(self) -> bool:
-        """Whether contacts of its scene have friction."""
+        """Whether contacts, joints or tendons of its scene have friction."""
         from crossbody.cases.scene_contacts import frictional  # which needs scenes, and these this module's errors
 
         return self.general and self.scene is not None and frictional(self.scene) is not None

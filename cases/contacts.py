@@ -111,8 +111,6 @@ class _Rests:
 
     def _stays(self, row: int, start: float, end: float) -> bool:
         """Whether a row is at its surface at all samples from one instant to another."""
-        if not np.isfinite(start):
-            return False
         first, last = np.searchsorted(self.t, start, side="left"), np.searchsorted(self.t, end, side="right")
         return bool((self.gap[first:last, row] <= self.near).all())
 

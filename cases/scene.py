@@ -123,9 +123,10 @@ class Joint(_Named):
         damping: b0, b1, b2 of the force -(b0 v + b1 v |v| + b2 v^3).
         stiffness: k0, k1, k2 of the force -(k0 x + k1 x^2 + k2 x^3), x = q - rest.
         rest: where the spring is at rest: one number, or four of a quaternion.
-        friction_loss: dry friction, N m or N.
+        friction_loss: bound of dry friction along each of its velocities, N m or N: it holds up to that, and takes so
+            much against them where it slides.
         force_range: bounds of the sum of the actuators' forces on it.
-        law: of the rows of its bounds.
+        law: of the rows of its bounds; a slip that friction holds decays by it.
     """
 
     body: str
@@ -151,6 +152,7 @@ class Joint(_Named):
         _Named.__post_init__(self)
         if self.type not in WIDTHS:
             raise SceneError(f"Joint {self.name!r}: type is {shown(self.type)}; valid: {', '.join(WIDTHS)}.")
+        _check_loss(self)
         length = math.hypot(*self.axis)
         if not length > 0.0:
             raise SceneError(f"Joint {self.name!r}: axis is {list(self.axis)}; it must not be zero.")
@@ -343,6 +345,7 @@ class Tendon(_Named):
         """Check that every joint has its coefficient, and that there are two points or none."""
         _Named.__post_init__(self)
         what = f"Tendon {self.name!r}"
+        _check_loss(self)
         object.__setattr__(self, "coefficients", _vector(f"{what}: coefficients", self.coefficients, len(self.joints)))
         if bool(self.joints) == bool(self.bodies) or len(self.bodies) not in (0, 2):
             raise SceneError(f"{what} has joints {list(self.joints)} and bodies {list(self.bodies)}; it needs either, "
@@ -351,6 +354,15 @@ class Tendon(_Named):
             raise SceneError(f"{what}: positions is {shown(self.positions)}; it must be a point of each body.")
         points = tuple(_vector(f"{what}: positions", point, 3) for point in self.positions)
         object.__setattr__(self, "positions", points)
+
+
+def _check_loss(part: Joint | Tendon) -> None:
+    """Check the bound of a part's dry friction."""
+    if not 0.0 <= part.friction_loss < math.inf:
+        raise SceneError(
+            f"{type(part).__name__} {part.name!r}: friction_loss is {part.friction_loss}; it must be at least 0 and "
+            "finite."
+        )
 
 
 ACTIVATIONS = ("integrator", "filter")
@@ -508,6 +520,12 @@ class Scene:
     def bounded(self) -> tuple[Joint | Tendon, ...]:
         """What may have bounds, in the order of their rows."""
         return (*self.joints, *self.tendons)
+
+    @property
+    def dry(self) -> tuple[tuple[Joint | Tendon, int], ...]:
+        """What has dry friction of its own, and along how many velocities each, in the order of their rows."""
+        found = [(joint, WIDTHS[joint.type][1]) for joint in self.joints if joint.friction_loss > 0.0]
+        return (*found, *((tendon, 1) for tendon in self.tendons if tendon.friction_loss > 0.0))
 
     def rest_length(self, tendon: Tendon) -> float:
         """Return the length of a tendon at the reference pose."""

@@ -110,14 +110,25 @@ def contacts(scene: Scene) -> tuple[Contact, ...]:
     return tuple(found for found in _all(scene) if isinstance(found, Contact))
 
 
+def rough(scene: Scene) -> Contact | None:
+    """Return the first contact with friction; None if there is none."""
+    return next((one for one in contacts(scene) if one.friction > 0.0), None)
+
+
 def frictional(scene: Scene) -> str | None:
     """Return why an engine that has no rows with friction cannot run a scene; None if it can."""
-    first = next((one for one in contacts(scene) if one.friction > 0.0), None)
-    if first is None:
+    first, dry = rough(scene), next((part for part, _ in scene.dry), None)
+    theirs = "mujoco:as_is and mujoco:default"
+    if first is not None:
+        what = f"Pair {first.pair.name!r} has friction"
+        theirs += ", pinocchio:admm, drake:matched and default, dart:matched and default"
+    elif dry is not None:
+        what = f"{type(dry).__name__} {dry.name!r} has dry friction (friction_loss)"
+    else:
         return None
     return (
-        f"Pair {first.pair.name!r} has friction, which reference:compiled and reference:cvode have, and by MuJoCo's "
-        "own cones mujoco:as_is and mujoco:default; without=friction leaves that of a file out of every engine."
+        f"{what}, which reference:compiled and reference:cvode have, and by laws of their own {theirs}; "
+        "without=friction leaves that of a file out of every engine."
     )
 
 
@@ -198,12 +209,16 @@ def _by_shapes(scene: Scene, part: Any, poses: Mapping[str, Pose], pairs: list[P
 
 
 def _ends(scene: Scene, part: Joint | Tendon) -> tuple[str, str]:
-    """Return the bodies between which a joint, a sum of two joints or a distance of points is; nobody's else."""
-    bodies = {body.name: body for body in scene.bodies}
+    """Return the bodies between which a joint, a sum of joints or a distance of points is; nobody's else.
+
+    A sum counts a body from another that hangs on a third, whose joints are among them.
+    """
+    parents = {body.name: body.parent for body in scene.bodies}
     if isinstance(part, Joint):
-        return (bodies[part.body].parent, part.body)
+        return (parents[part.body], part.body)
     own = {joint.name: joint.body for joint in scene.joints}
-    found = part.bodies or tuple(own[name] for name in part.joints)
+    moved = [own[name] for name in part.joints]
+    found = part.bodies or tuple(body for body in moved if body not in [parents[other] for other in moved])
     return (found[0], found[1]) if len(found) == 2 else ("\n", "\n")
 
 

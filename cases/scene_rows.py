@@ -1,4 +1,4 @@
-"""The rows of a scene in the order of all engines: loops, bounds, contacts."""
+"""The rows of a scene in the order of all engines: loops, bounds, contacts, dry friction of joints and tendons."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import contacts
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-"""Of a loop in space: its points, then its axes."""
+"""Of a loop in space: its points, then its axes; of a joint its velocities."""
 
 
 def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
@@ -39,11 +39,16 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
         names += contact.tangents
         laws += [_held_back(contact.pair.law)] * len(contact.tangents)
         unilateral += [True] * len(contact.tangents)
+    for part, width in scene.dry:
+        ways = ("",) if width == 1 else COMPONENTS[-width:]
+        names += [f"{part.name} friction {way}".strip() for way in ways]
+        laws += [_held_back(part.law)] * width
+        unilateral += [True] * width
     return names, laws, unilateral
 
 
 def _held_back(law: RowLaw) -> RowLaw:
-    """Return the law of a contact's tangential rows: a slip velocity decays as fast as a gap does."""
+    """Return the law of rows that friction holds, by that of their contact or joint: a slip decays as fast as a gap."""
     return RowLaw(a0=0.0, a1=law.a1 or math.sqrt(law.a0))
 
 

@@ -19,7 +19,7 @@ class Acting:
     Attributes:
         case: a scene.
         times (m,), values (m, nu): recorded.
-        instants: when any input changes, s, increasing.
+        instants: when any input changes or a force is not smooth, s, increasing.
         controller: of the present run; None where there is none.
     """
 
@@ -41,6 +41,8 @@ class Acting:
             ticks = control.instants(self.case.t_end)
             self.ticks = frozenset(ticks.tolist())
             self.instants = np.union1d(self.times, ticks).tolist()
+        if self.case.force is not None and self.case.force.breaks:
+            self.instants = np.union1d(self.instants, self.case.force.breaks).tolist()
 
     def reset(self) -> None:
         """Begin a run, with a controller of its own."""

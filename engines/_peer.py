@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 
 from crossbody.cases import Case, Event, Mode, Outcome, Trajectory
 from crossbody.cases.arrays import Bytes, Floats
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines._line import FREE, Line, why_no_line
 from crossbody.engines.contract import Run
 
@@ -58,7 +59,9 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
 
 
 def why_not(engine: str, case: Case) -> str | None:
-    """The sentence for a case that is not of bodies on a line."""
+    """The sentence for a case that is not of bodies on a line, or has friction."""
+    if case.scene is not None and (found := frictional(case.scene)):
+        return found
     reason = why_no_line(case)
     return None if reason is None else f"{engine} is given bodies on one line alone, and {case.label} {reason}"
 

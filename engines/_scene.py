@@ -115,12 +115,13 @@ class Forces:
         at: joint -> its first position.
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
-        u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N.
+        u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N. pushed: whether any is not 0.
         t: now, s; it counts where there are activations. since: when the controls were put in force, s.
         act (nu,): activations then, of the actuators that have one.
         T (nt, nv): dl/dx of the tendons, 0 of those between points.
         A (nu, nv): dl/dx of the actuators on joints, gear included.
         straight: whether all joints are slides and hinges: then x is q.
+        steady: whether what actuators do changes with the controls alone; held (nv,): that.
         none: whether nothing but pushes ever acts.
         spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics; None without them.
     """
@@ -166,9 +167,11 @@ class Forces:
         self.straight = len(single) == len(scene.joints)
         own = any(any(joint.stiffness) or any(joint.damping) for joint in scene.joints)
         self.none = not (own or self.along or scene.actuators)
+        self.springs, self.bent = self.stiffness.any(), self.damping[1:].any()
         self.spanning = [i for i, tendon in enumerate(scene.tendons) if tendon.bodies]
         self._lay_out_actuators()
         self._lay_out_bounds()
+        self.still()
 
     def _lay_out_bounds(self) -> None:
         """Write the gap of every bound as sign x + offset, x one of the joints' coordinates and tendons' lengths."""
@@ -202,6 +205,8 @@ class Forces:
             np.array([getattr(one, k) for one in parts]).reshape(-1, 2).T
             for k in ("force_range", "control_range", "activation_range")
         )
+        moving = self.gain[1:].any() or self.bias[1:].any() or self.dragged.any() or len(self.pulling)
+        self.steady = not (moving or self.scene.activated)
 
     def x(self, q: Floats) -> Floats:
         """Return x (..., nv) of positions (..., nq); it may only be read."""
@@ -261,26 +266,34 @@ class Forces:
         self.act, self.since = self.driven(), t
         count = len(self.u)
         self.u[:], self.pushes[:] = values[:count], values[count:].reshape(-1, 3)
+        self._hold()
+
+    def _hold(self) -> None:
+        """Keep what motors do that feel neither state nor time, and whether anything pushes."""
+        none, self.pushed = np.zeros(self.nv), bool(self.pushes.any())
+        self.held = self.actuated(none, none) if self.steady and self.scene.actuators else none
 
     def still(self) -> None:
         """Put no input in force, and no activation."""
         self.u[:], self.pushes[:], self.act[:], self.t, self.since = 0.0, 0.0, 0.0, 0.0, 0.0
+        self._hold()
 
     def __call__(self, q: Floats, v: Floats) -> Floats:
         """Return the generalised forces (nv,) at a state."""
         x = self.x(q)
-        total: Floats = -drag(self.damping, v)
-        total[self.single[1]] -= polynomial(self.stiffness, x[self.single[1]] - self.rest)
+        total: Floats = self.held - drag(self.damping, v) if self.bent else self.held - self.damping[0] * v
+        if self.springs:
+            total[self.single[1]] -= polynomial(self.stiffness, x[self.single[1]] - self.rest)
         for joint in self.turning:
             moved, turn = self.moved(joint), self.turned(joint, q)
             angle = float(np.linalg.norm(turn)) or 1.0
             total[moved.stop - 3 : moved.stop] -= polynomial(joint.stiffness, angle) / angle * turn
         if not self.along:
-            return total + self.actuated(x, v) if self.scene.actuators else total
+            return total if self.steady else total + self.actuated(x, v)
         lengths, rates, rows = self.stretch(q, v)
         spring = polynomial(self.tendon_stiffness, self.outside(lengths))
         total -= (spring + drag(self.tendon_damping, rates)) @ rows
-        return total + self.actuated(x, v, (lengths, rates, rows)) if self.scene.actuators else total
+        return total if self.steady else total + self.actuated(x, v, (lengths, rates, rows))
 
     def stretch(self, q: Floats, v: Floats) -> Stretch:
         """Return lengths of all tendons, their rates and derivatives."""

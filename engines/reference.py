@@ -166,7 +166,7 @@ def _no_friction(case: Case, solver: str) -> str | None:
         return found
     if case.scene is not None and case.scene.loops:
         return (
-            f"The scene has the loop {case.scene.loops[0].name!r} beside contacts with friction: that is not done. "
+            f"The scene has the loop {case.scene.loops[0].name!r} beside friction: that is not done. "
             "without=loops, or without=friction, leaves either out of every engine."
         )
     return None

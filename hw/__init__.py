@@ -4,7 +4,7 @@
     log.time, log.matrix("coordinates"), log.channel("sensors", "touch1").values
 
 A log that `store` wrote needs no map. A log too large for the memory is gone through by `scan`; `check` tells
-everything that is doubtful about one, `survey` what is in a file that nobody has described yet.
+everything that is doubtful about one, `survey` what is in a file without a description.
 """
 
 from __future__ import annotations

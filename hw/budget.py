@@ -2,7 +2,7 @@
 
 Readers refuse by the sizes that a file declares (`Budget.hold`) and by those that they meet (`Budget.spend`). Behind
 both stands a last resort: while a library parses, the process may not grow beyond the budget (`Budget.guard`), so that
-a declaration that nobody checked ends in the library's own failure to allocate, not in the machine's.
+an unchecked declaration ends in the library's own failure to allocate, not in the machine's.
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ class CompiledRun:
         self.template = self._state_template(natural)
         self.state = self.template.copy()
         self._bytes, self._blank = (array.view(np.uint8) for array in (self.state, self.template))
-        self._modes = initial_modes(system)
+        self._modes = initial_modes(system, q0, v0)
         self.callback: Any = None
         self.marks: Marks | None = None
         self.call = entry(tuple(system.kernels.values()))
@@ -115,7 +115,8 @@ class CompiledRun:
             "affine": system.affine and options.shortcuts and not system.frictional,
             "implicit": options.implicit, "natural": natural,
             "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
-            "frictional": system.frictional, "friction_code": friction_code() if system.frictional else 0,
+            "frictional": system.frictional, "dry": np.count_nonzero(system.dry),
+            "friction_code": friction_code() if system.frictional else 0,
             "instant_code": instant_code(),
             "loops": system.solve is None and bool(np.any(system.held)),
             "keep_events": options.events, "has_energy": system.energy is not _none.energy,

@@ -98,7 +98,7 @@ def started(system: System, q: Floats, v: Floats, given: Floats | None = None) -
         v: velocities (n,).
         given: parameters before that; those of the system if not given.
     """
-    p, mode = np.array(system.p if given is None else given), initial_modes(system)
+    p, mode = np.array(system.p if given is None else given), initial_modes(system, q, v)
     if system.switch is not None:
         constants = len(p) - np.size(system.discrete) - system.latched
         system.switch(0.0, q, v, p, mode, int(kernel_types.START))

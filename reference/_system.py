@@ -55,6 +55,9 @@ class System:
             |lam_t| <= mu lam_n, and lam_t = -mu lam_n v_t/|v_t| where it slides. While it sticks it has its own law
             with a0 = 0: a1, or sqrt(a0) of the normal row, pulls a slip velocity back. Infinite, if not given, for a
             row that never slides.
+        friction_loss (nc,): bound of a row's own dry friction, N or N m; 0, if not given, without. It follows no other
+            and none follows it, has h = 0, and |lam| <= friction_loss, with equality against H v where it slides. Its
+            law while it sticks is that of a tangential row.
         drift (nc,): velocity of the surface along a tangential row, m/s: v_t = H v - drift.
         mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
         inputs: nu, length of u.
@@ -103,6 +106,7 @@ class System:
     findings: tuple[str, ...] = ()
     follows: ArrayLike = -1
     mu: ArrayLike = np.inf
+    friction_loss: ArrayLike = 0.0
     drift: ArrayLike = 0.0
     nq: int = 0
     quaternions: ArrayLike = ()
@@ -177,8 +181,14 @@ class System:
 
     @property
     def frictional(self) -> bool:
-        """Whether a contact has friction."""
+        """Whether a contact has friction, or a row of its own."""
         return bool(np.any(np.asarray(self.tangents) > 0))
+
+    @property
+    def dry(self) -> NDArray[np.bool_]:
+        """Which rows (nc,) have dry friction of their own."""
+        found: NDArray[np.bool_] = np.asarray(self.friction_loss) > 0.0
+        return found
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -211,8 +221,13 @@ class System:
             raise SceneError(
                 f"System.mu is {given.tolist()}; it must be at least 0, infinite where a row never slides."
             )
-        slides = np.isfinite(given) & (follows >= 0)
-        first, count, mu = np.full(nc, -1), np.zeros(nc, np.int64), np.zeros(nc)
+        loss = self._row_field("friction_loss", nc, np.float64)
+        if not np.all(np.isfinite(loss)) or np.any(loss < 0.0):
+            raise SceneError(f"System.friction_loss is {loss.tolist()}; it must be finite and at least 0.")
+        put(self, "friction_loss", loss)
+        dry, own = loss > 0.0, np.arange(nc)
+        slides = np.isfinite(given) & (follows >= 0) & ~dry
+        first, count, mu = np.where(dry, own, -1), dry.astype(np.int64), np.where(dry, loss, 0.0)
         for normal in np.unique(follows[slides]).tolist():
             rows = np.flatnonzero(slides & (follows == normal))
             if len(rows) > 2 or rows[-1] - rows[0] != len(rows) - 1 or len(set(given[rows].tolist())) > 1:
@@ -224,7 +239,16 @@ class System:
                 raise SceneError(f"Row {normal} has friction; it must be able to open and follow no other.")
             if given[rows[0]] > 0.0:
                 first[normal], count[normal], mu[normal] = rows[0], len(rows), given[rows[0]]
-        if not np.all(np.isfinite(drift)) or np.any(drift[~slides] != 0.0):
+        wrong = dry & ((np.asarray(self.unilateral) == 0) | ((follows >= 0) & (follows != own)))
+        wrong |= dry & np.isin(own, follows[(follows >= 0) & (follows != own)])
+        if np.any(wrong):
+            row = int(np.flatnonzero(wrong)[0])
+            raise SceneError(
+                f"Row {row} has dry friction of its own (System.friction_loss): it must be no row that is always on, "
+                "follow no other, and none may follow it."
+            )
+        put(self, "follows", np.where(dry, own, follows))  # it is its own tangential row
+        if not np.all(np.isfinite(drift)) or np.any(drift[~(slides | dry)] != 0.0):
             raise SceneError(f"System.drift is {drift.tolist()}; it must be finite, and 0 but of rows with friction.")
         put(self, "mu", frozen("System", "mu", given, (nc,)))
         put(self, "friction", frozen("System", "friction", mu, (nc,)))
@@ -344,7 +368,7 @@ class System:
                 letter = name[0]
                 raise SceneError(f"System.{letter}0, {letter}1, {letter}2 must be at least 0.")
         follows: Index = np.asarray(self.follows)
-        if np.any(follows >= self.nc) or np.any(follows[follows >= 0] == np.flatnonzero(follows >= 0)):
+        if np.any(follows >= self.nc) or np.any((follows == np.arange(self.nc)) & ~self.dry):
             raise SceneError(f"System.follows is {follows.tolist()}; it must name other rows, below {self.nc}.")
         if self.tick < 0.0 or (self.control is not None and self.tick == 0.0):
             raise SceneError(f"System.tick is {self.tick}; a system with a controller needs a period above 0 s.")
@@ -486,6 +510,12 @@ class System:
         return np.array(frozen("simulate", "u", np.zeros(self.inputs) if u is None else u, (self.inputs,)))
 
 
-def initial_modes(system: System) -> Bytes:
-    """BILATERAL for every row that holds the others, FREE for every other; settling does the rest."""
-    return np.where(system.held, 5, 0).astype(np.int8)
+def initial_modes(system: System, q: Floats | None = None, v: Floats | None = None) -> Bytes:
+    """BILATERAL for every row that holds the others, FREE for every other; settling does the rest.
+
+    One with dry friction slides, or sticks if it is known to stand.
+    """
+    found = np.where(system.held, 5, np.where(system.dry, 7, 0)).astype(np.int8)
+    if q is not None and np.any(system.dry):
+        found[system.dry & (system.gap(q, v)[1] == np.asarray(system.drift))] = 6
+    return found

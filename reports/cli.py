@@ -213,13 +213,34 @@ def report(folder: Path, **asked: Any) -> int:
 
 
 @cli.command()
+@click.argument("folder", metavar="DIR", type=options.PATH)
+@click.argument("out", metavar="FILE", type=options.PATH)
+@click.option("--case", "case", metavar="CASE:V", default="", help="Which case; the first if not given.")
+@click.option("--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Whose motion.")
+@click.option("--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Instant, s.")
+@click.option("--fps", type=options.ABOVE_0, default=25.0, show_default=True, help="Of a GIF.")
+@click.option("--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Of a GIF, times real time.")
+@speaks
+def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps: float, speed: float) -> int:
+    """Draw a motion of an earlier run: one instant (FILE.svg, FILE.png) or all of it (FILE.gif)."""
+    from crossbody.reports.pages import picture as drawing
+    from crossbody.reports.pages.results import motion
+
+    trace, place = motion(folder, case, engine)
+    drawing.write(drawing.Film(trace, place), out, instant, fps, speed)
+    if not quiet():
+        click.echo(f"Picture: {out.absolute()}")
+    return 0
+
+
+@cli.command()
 @click.argument("file", metavar="FILE", type=options.PATH)
 @options.readers
 @click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")
 @options.reader_limit
 @click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
 @click.option("--fix", type=options.PATH, metavar="OUT", help="Write FILE so that more readers agree.")
-@click.option("--force", is_flag=True, help="Let --fix write over a file that it did not write itself.")
+@click.option("--force", is_flag=True, help="Let files be written over that were not written so.")
 @click.option("--sarif", type=options.PATH, metavar="F", help="Write the findings as SARIF too.")
 @click.option("--markdown", type=options.PATH, metavar="F", help="Write a summary in Markdown too.")
 @speaks
@@ -258,9 +279,9 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 @cli.command()
 @options.replayed
 @click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter, or delay; repeatable.")
-@click.option("--hold", type=int, default=2, show_default=True, help="Every so manieth window is held out; 0: none.")
+@click.option("--hold", type=int, default=2, show_default=True, help="Hold every N-th window out of the fit; 0: none.")
 @click.option("--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True)
-@click.option("--stride", type=int, default=1, show_default=True, help="Of so many samples one is compared.")
+@click.option("--stride", type=int, default=1, show_default=True, help="Compare every N-th sample.")
 @click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time of the search, s.")
 @options.time_limit("All is stopped by then, with the best so far; a run that does not come back is ended, s.")
 @speaks

@@ -74,9 +74,7 @@ def test_only_the_reference_runs_the_kernels_of_the_reference() -> None:
             for name in ("reference.systems", "reference.core", "delta.kernels", "delta.kinematics")
             if name in text
         ]
-        # Pinocchio's model takes the placements of its arms, which are data.
-        allowed = path.name in own or (path.name == "_delta_model.py" and borrowed == ["delta.kinematics"])
-        assert not borrowed or allowed, f"{path.relative_to(ROOT)} takes {borrowed}"
+        assert not borrowed or path.name in own, f"{path.relative_to(ROOT)} takes {borrowed}"
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["list"], ["run", "--help"]])

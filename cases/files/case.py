@@ -21,7 +21,7 @@ from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
-from crossbody.cases.scene_contacts import check_pairs, frictional
+from crossbody.cases.scene_contacts import check_pairs, rough
 from crossbody.cases.scene_rows import law_of, rows_of
 
 REFERENCE_POSE, UNNAMED = "reference", "scene"
@@ -113,7 +113,7 @@ def rubbing(case: Case) -> Case | None:
     if case.scene is None or case.parameters.get("friction") != WHERE_MET:
         return None
     scene = case.scene.replace(friction=True)
-    if frictional(scene) is None:
+    if rough(scene) is None:
         return None
     return replace(
         case, scene=scene, contacts=tuple(rows_of(scene)[0]), law=law_of(scene),
@@ -168,7 +168,7 @@ def case_of(
     file: str = "",
     findings: tuple[str, ...] = (),
 ) -> Case:
-    """Return a scene as a case: its rows are its loops, then the bounds of its joints and tendons, then its contacts.
+    """Return a scene as a case: its rows are loops, bounds of joints and tendons, contacts, dry friction.
 
     Args:
         scene: what moves.
@@ -219,12 +219,6 @@ def check_runnable(scene: Scene) -> None:
     Raises:
         SceneError: naming the part.
     """
-    for part in scene.bounded:
-        if part.friction_loss:
-            raise SceneError(
-                f"{type(part).__name__} {part.name!r} has dry friction (frictionloss), which cannot be run; "
-                "without=friction leaves all friction out of every engine."
-            )
     spans = {tendon.name for tendon in scene.tendons if tendon.bodies}
     for loop in scene.loops:
         for name in {loop.first, loop.second} & spans if loop.type == "tendon" else ():

@@ -76,10 +76,14 @@ CHANGING = ("settotalmass", "boundmass", "boundinertia", "balanceinertia", "fuse
 """What a compiler may be told to do with inertias behind their computation."""
 
 
-def of_shapes(path: Path) -> dict[str, Inertia]:
+MESH = 7
+
+
+def of_shapes(path: Path) -> dict[str, Inertia | None]:
     """Return the inertias of the named bodies of an MJCF that are those of their shapes alone, in closed form.
 
-    Bodies with a shape that is none of `SOLIDS`, or a shell, are left to the compiler; so is a file of which meshes
+    Of one with a mesh, which a compiler has in single precision, there is None. Bodies with a shape that is none of
+    `SOLIDS`, or a shell, are left to the compiler; so is a file of which meshes
     that are only drawn are not there.
     """
     import mujoco
@@ -96,11 +100,13 @@ def of_shapes(path: Path) -> dict[str, Inertia]:
     always = int(compiler.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
     never = int(compiler.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE)
     first, last = compiler.inertiagrouprange
-    found: dict[str, Inertia] = {}
+    found: dict[str, Inertia | None] = {}
     for body in spec.bodies:
         geoms = [geom for geom in body.geoms if first <= geom.group <= last]
         if body.name and geoms and not never and (always or not body.explicitinertial):
             parts = [_of_geom(model, geom) for geom in geoms]
+            if any(model.geom_type[geom.id] == MESH for geom in geoms):
+                found[body.name] = None
             if None not in parts and any(part and part.mass > 0.0 for part in parts):
                 found[body.name] = together([part for part in parts if part])
     return found

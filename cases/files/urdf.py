@@ -48,12 +48,13 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     With it what MuJoCo warns of, which else goes to the terminal at every reading.
 
     Raises:
-        SceneError: with MuJoCo's own sentence, or for a mesh that cannot be read.
+        SceneError: with MuJoCo's own sentence, for a mesh that cannot be read, or a joint that mimics none.
         InvalidValue: for a pair of bodies that the file does not have.
     """
     import mujoco
 
     root = parsed(path)
+    _check_mimics(root)
     for link in root.findall("link"):
         for part in [*link.findall("inertial"), *link.findall("visual")]:
             link.remove(part)
@@ -66,6 +67,7 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
             limit.attrib = {"lower": "0", "upper": "0"} | limit.attrib
     for own in root.findall("mujoco"):
         root.remove(own)
+    _float(root)
     setting = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(setting, "compiler", {"fusestatic": "false", "inertiafromgeom": "false"})
     files = supplied(root, path)
@@ -81,6 +83,34 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
 
     model, warned = compiled(path, compiler)
     return model, sentences(warned)
+
+
+def _float(root: ElementTree.Element) -> None:
+    """Call the root the world where a joint floats on it: the compiler lets nothing float but on that.
+
+    The root stands on the world anyway, and is no body of the scene then.
+    """
+    children = {child.get("link") for child in root.findall("joint/child")}
+    ground = next((link for link in root.findall("link") if link.get("name") not in children), None)
+    floating = [joint.find("parent") for joint in root.findall("joint") if joint.get("type") == "floating"]
+    if ground is None or ground.get("name") not in [one.get("link") for one in floating if one is not None]:
+        return
+    name = ground.get("name")
+    ground.set("name", "world")
+    for parent in root.findall("joint/parent"):
+        if parent.get("link") == name:
+            parent.set("link", "world")
+
+
+def _check_mimics(root: ElementTree.Element) -> None:
+    """Raise SceneError for a joint that follows one that there is not, which the compiler takes for free."""
+    joints = {joint.get("name", ""): joint.find("mimic") for joint in root.findall("joint")}
+    for name, mimic in joints.items():
+        if mimic is not None and mimic.get("joint") not in joints:
+            raise SceneError(
+                f"Joint {name!r} mimics {mimic.get('joint', '')!r}, which does not exist; the file has: "
+                f"{', '.join(sorted(set(joints) - {name}))}."
+            )
 
 
 def with_inertias(path: Path, scene: Scene) -> Scene:

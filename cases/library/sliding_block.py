@@ -14,7 +14,7 @@ import numpy as np
 from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction import blocks
-from crossbody.cases.mechanisms.friction.creep import Soft, creep
+from crossbody.cases.mechanisms.friction.creep import Soft, creep, mixed, regularised
 from crossbody.cases.mechanisms.friction.limits import limits
 from crossbody.cases.mechanisms.friction.scene import NUMBERS, block_on_floor, field, point_on_floor
 
@@ -57,5 +57,8 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     )  # fmt: skip
     holds = p["speed"] == 0.0 and not flat and p["mu"] > p["slope"] > 0.0
     down, _, press = field(p, p["slope"])
-    creeps = creep(p["mu"], down / -press, -press, Soft(), elliptic=False) if holds else 0.0
+    creeps = {
+        ("mujoco", "default"): creep(p["mu"], down / -press, -press, Soft(), elliptic=False),
+        ("dart", "matched"): mixed(down), **regularised(down / -press / p["mu"]),
+    } if holds else {}  # fmt: skip
     return limits(made, _TITLES[variant], PARAMETERS, blocks.box(p, half) if flat else blocks.point(p), p, creeps)

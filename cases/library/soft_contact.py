@@ -16,7 +16,9 @@ from crossbody.cases.errors import InvalidValue
 from crossbody.cases.mechanisms.soft import robot
 from crossbody.cases.mechanisms.soft import scene as soft
 from crossbody.cases.mechanisms.soft.claims import claims, limits
+from crossbody.cases.mechanisms.soft.form import on_axis
 from crossbody.cases.mechanisms.soft.metrics import METRICS
+from crossbody.cases.mechanisms.soft.robot_form import on_robot
 
 PARAMETERS = {
     **soft.FINGERS,
@@ -56,6 +58,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         q0=q0,
         v0=np.zeros(len(q0)),
         t_end=p["t_end"],
+        form=on_robot if whole else on_axis,
         law=soft.contact_law(p, *((6, 3) if whole else ())),
         collisions="resolved",
         tight=1e-11 if whole else 1e-12,

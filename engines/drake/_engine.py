@@ -11,11 +11,14 @@ import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
+from crossbody.engines._rubbing import RIGID, RubbingRun
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.drake import _scene
+from crossbody.engines.drake._contacts import APPROXIMATIONS, HOLDS, STICTION, STIFF, Rubs
 from crossbody.engines.drake._plant import plant
 from crossbody.engines.drake._scene import SceneRun
 from crossbody.engines.drake._simulate import Sim
@@ -24,6 +27,7 @@ from crossbody.engines.drake._symbolic import system
 SCHEMES = ("runge_kutta5", "runge_kutta3", "bogacki_shampine3", "radau3")
 USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4
 """What a Simulator of 1.51.1 starts with."""
+RUBS = RIGID, "Contacts of a discrete plant are its own, and solved for within a step."
 
 
 def _runner(case: Case, scene: Line, sim: Sim, max_steps: int, dt: float) -> Callable[[], Trajectory]:
@@ -90,7 +94,7 @@ class Drake(Engine):
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         if case.general and case.scene is not None:
-            return _scene.why_not(case.scene)
+            return _scene.why_not(case.scene, profile)
         reason = why_not("Drake", case)
         if reason is None and profile != "matched" and not case.law.unilateral.all():
             return "A contact of a MultibodyPlant pushes only: a row that is always on is none."
@@ -113,6 +117,12 @@ class Drake(Engine):
         if reason is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
+        if case.scene is not None and frictional(case.scene):
+            stepper = Rubs(case, used, profile == "matched")
+            return RubbingRun(
+                case=case, engine=self.name, profile=profile, settings=used, stepper=stepper,
+                physics=_scene.physics(case, profile, stepper.observer) | {"hidden": dict.fromkeys(*RUBS)},
+            )  # fmt: skip
         if case.general:
             return SceneRun(case=case, profile=profile, settings=used)
         scene, dt, physics = line(case), float(used.get("dt", 0.0)), {}
@@ -142,6 +152,8 @@ def _read(scene: Line, made: Any) -> dict[str, Any]:
 
 
 def _known(case: Case, profile: str) -> dict[str, Parameter]:
+    if case.scene is not None and frictional(case.scene):
+        return _stepped(case, profile)
     steps = Parameter(default=1_000_000, doc="bound on the number of steps", low=1, high=1e9)
     if profile == "default":
         step = Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True)
@@ -150,3 +162,25 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
     accuracy = Parameter(default=default, doc="accuracy that is asked for", low=1e-14, high=1e-1)
     scheme = Parameter(default=SCHEMES[0], doc="integration scheme", choices=SCHEMES)
     return {"rtol": accuracy, "max_steps": steps} | ({"scheme": scheme} if profile == "matched" else {})
+
+
+def _stepped(case: Case, profile: str) -> dict[str, Parameter]:
+    """Return the settings of the discrete plant with friction."""
+    matched = profile == "matched"
+    return {
+        "dt": Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True),
+        "approximation": Parameter(
+            default="tamsi" if matched else "lagged", choices=tuple(APPROXIMATIONS), doc="of Coulomb's law"
+        ),
+        "stiction": Parameter(
+            default=HOLDS if matched else STICTION,
+            unit="m/s",
+            doc="slip that holds; not of sap",
+            low=0.0,
+            open_low=True,
+        ),
+        "stiffness": Parameter(
+            default=STIFF if matched else 0.0, unit="N/m", doc="of contacts; 0: Drake's own", low=0.0
+        ),
+        "max_steps": Parameter(default=1_000_000, doc="bound on the number of steps", low=1, high=1e9),
+    }

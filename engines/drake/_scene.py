@@ -22,6 +22,7 @@ from crossbody.cases.scene_contacts import frictional
 from crossbody.engines._acting import Acting
 from crossbody.engines._contacts import Contacts
 from crossbody.engines._log import Log
+from crossbody.engines._rubbing import why_no_steps
 from crossbody.engines._scene import Forces, Stretch, masses
 from crossbody.engines.contract import Run
 from crossbody.engines.drake._simulate import Sim
@@ -40,11 +41,14 @@ def hidden(profile: str) -> dict[str, str]:
     return dict.fromkeys(("constants", "H", "lam"), SOFT if profile == "default" else NO_ROWS.capitalize())
 
 
-def why_not(scene: Scene) -> str | None:
-    """Return why a scene has no motion in a plant without rows; None if it has one."""
-    if found := frictional(scene):
-        return found
-    if scene.loops:
+def why_not(scene: Scene, profile: str) -> str | None:
+    """Return why a scene has no motion in a plant; None if it has one."""
+    if frictional(scene):
+        if profile == "continuous":
+            return "Friction is in Drake's discrete plants here: the profiles matched and default."
+        if found := why_no_steps("Drake", scene, bounds=True):
+            return found
+    elif scene.loops:
         return f"The loop {scene.loops[0].name!r} is a row, and {NO_ROWS}"
     forces = Forces(scene)
     for joint in scene.joints:
@@ -237,24 +241,29 @@ class SceneRun(Run):
         return self.case.contacts[int(h.argmin())] if h.min() < 0.0 else ""
 
     def audit(self) -> Mapping[str, Any]:
-        """The physics read back from the plant, in the scene's coordinates."""
-        tree, context, forces = self.applied.tree, self.observer.context, self.applied.forces
+        """The physics read back from the plant."""
+        return physics(self.case, self.profile, self.observer)
 
-        def bias(q: Floats, v: Floats) -> Floats:
-            forces.still()
-            tree.put(context, q, v)
-            own = tree.plant.CalcBiasTerm(context) - tree.plant.CalcGravityGeneralizedForces(context)
-            total: Floats = tree.J(q) @ (own - self.applied.of(tree.theirs(q, v)))
-            return total
 
-        def M(q: Floats) -> Floats:
-            tree.put(context, q, np.zeros(len(self.case.v0)))
-            return tree.mass_matrix(context, q)
+def physics(case: Case, profile: str, observer: Observer) -> dict[str, Any]:
+    """Return what the audit is told, read back from the plant, in the scene's coordinates."""
+    tree, context, applied = observer.tree, observer.context, observer.applied
 
-        scene = self.observer.scene
-        own = {body.name: tree.plant.GetBodyByName(body.name).get_mass(context) for body in scene.bodies}
-        gravity = tree.plant.gravity_field().gravity_vector()
-        return {
-            "masses": masses(scene, own), "gravity": float(np.linalg.norm(gravity)), "q0": self.case.q0,
-            "v0": self.case.v0, "M": M, "bias": bias, "hidden": hidden(self.profile),
-        }  # fmt: skip
+    def bias(q: Floats, v: Floats) -> Floats:
+        applied.forces.still()
+        tree.put(context, q, v)
+        own = tree.plant.CalcBiasTerm(context) - tree.plant.CalcGravityGeneralizedForces(context)
+        total: Floats = tree.J(q) @ (own - applied.of(tree.theirs(q, v)))
+        return total
+
+    def M(q: Floats) -> Floats:
+        tree.put(context, q, np.zeros(len(case.v0)))
+        return tree.mass_matrix(context, q)
+
+    scene = observer.scene
+    own = {body.name: tree.plant.GetBodyByName(body.name).get_mass(context) for body in scene.bodies}
+    gravity = tree.plant.gravity_field().gravity_vector()
+    return {
+        "masses": masses(scene, own), "gravity": float(np.linalg.norm(gravity)), "q0": case.q0,
+        "v0": case.v0, "M": M, "bias": bias, "hidden": hidden(profile),
+    }  # fmt: skip

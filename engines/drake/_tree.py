@@ -8,6 +8,7 @@ With v = J v_d: tau_d = J^T tau and M = J M_d J^T, for J permutes and turns. J v
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -42,10 +43,15 @@ class Tree:
         scene: whose.
         armature: what joints and actuators add to M (nv,).
         dt: step of a plant in discrete time, s, which has bounds; 0 for continuous time.
+        plant: to which the bodies are added; a new one if not given.
+        register: adds what collides, before the plant is final.
     """
 
-    def __init__(self, scene: Scene, armature: Floats, dt: float = 0.0) -> None:
-        self.scene, self.plant = scene, MultibodyPlant(dt)
+    def __init__(
+        self, scene: Scene, armature: Floats, dt: float = 0.0, plant: Any = None,
+        register: Callable[[Any], None] = lambda _: None,
+    ) -> None:  # fmt: skip
+        self.scene, self.plant = scene, MultibodyPlant(dt) if plant is None else plant
         self.plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
         for body in scene.bodies:
             self._add(body)
@@ -57,6 +63,7 @@ class Tree:
             if joint.type in ("slide", "hinge") and armature[self.place[joint.name]]:
                 motor = self.plant.AddJointActuator(joint.name, self.plant.GetJointByName(joint.name))
                 motor.set_default_rotor_inertia(float(armature[self.place[joint.name]]))
+        register(self.plant)
         self.plant.Finalize()
         found = {joint.name: self.plant.GetJointByName(joint.name) for joint in scene.joints}
         self.q = {name: joint.position_start() for name, joint in found.items()}

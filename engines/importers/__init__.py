@@ -118,16 +118,17 @@ class Reading:
         path: of the file.
         urdf: whether it is a URDF.
         seconds: what it may take.
+        nice: how much it lets others go before it.
     """
 
-    def __init__(self, name: str, path: Path, urdf: bool, seconds: float = SECONDS) -> None:
+    def __init__(self, name: str, path: Path, urdf: bool, seconds: float = SECONDS, nice: int = 0) -> None:
         module = REGISTRY.load(name)
         self.name, self.package, self.seconds = name, str(module.PACKAGE), seconds
         self.python = os.environ.get(f"CROSSBODY_PYTHON_{name.upper()}", sys.executable)
         self.formats = tuple(module.FORMATS)
         self._files = tempfile.TemporaryDirectory(prefix="crossbody-reading-")
         self._out, self._told = (Path(self._files.name) / kind for kind in ("answers", "told.txt"))
-        kind, self._began = ("urdf" if urdf else "mjcf"), time.monotonic()
+        kind, self._began, self._nice = ("urdf" if urdf else "mjcf"), time.monotonic(), nice
         self._process = self._started(str(module.__file__), str(path.resolve()), kind)
         self._there = self.python != sys.executable or find_spec(module.MODULE) is not None
 
@@ -139,7 +140,8 @@ class Reading:
         with self._told.open("wb") as told:
             try:
                 return subprocess.Popen(
-                    [self.python, "-P", str(PROCESS), *words, str(self._out), str(BYTES)], stdin=subprocess.PIPE,
+                    [self.python, "-P", str(PROCESS), *words, str(self._out), str(BYTES), str(self._nice)],
+                    stdin=subprocess.PIPE,
                     stdout=told, stderr=told, start_new_session=True, cwd=self._files.name, env=os.environ | single,
                 )  # fmt: skip
             except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class _Robot:
         plant.RegisterAsSourceForSceneGraph(self._scene)
         Parser(plant).AddModels(path)
         if urdf:
-            moved = {plant.get_joint(i).child_body().name() for i in plant.GetJointIndices()}
+            moved = {plant.get_joint(i).child_body().name() for i in plant.GetJointIndices()} | _floating(path)
             for body in (plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())):
                 if body.name() not in moved:
                     plant.WeldFrames(plant.world_frame(), body.body_frame())
@@ -165,6 +166,12 @@ def _solid(shape: Any) -> tuple[str, list[float], Any]:
         return "plane", [], none
     hull = shape.GetConvexHull()
     return "mesh", [], np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+
+
+def _floating(path: str) -> set[str]:
+    """Return the links of a URDF that float: Drake makes no joints of theirs, and leaves them free."""
+    joints = [joint for joint in ElementTree.parse(path).getroot().findall("joint") if joint.get("type") == "floating"]
+    return {child.get("link", "") for joint in joints for child in joint.findall("child")}
 
 
 def _index(k: int) -> Any:

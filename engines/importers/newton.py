@@ -70,7 +70,8 @@ class _Robot:
             elif kinds[i] != FIXED:
                 self.joints.append((name, self._bodies[self._child[i]], kind, int(at[i]), int(first[i])))
             if kind == "free":
-                self._frees.append((int(first[i]), int(self._child[i])))
+                stands = _behind((np.zeros(3), np.eye(3)), m.joint_X_p.numpy()[i]) if urdf else (np.zeros(3), np.eye(3))
+                self._frees.append((int(at[i]), int(first[i]), int(self._child[i]), *stands))
         self.actuators: dict[str, list[str]] = {}
         self._motors(named)
         closing = [i for i, one in enumerate(loops) if one]
@@ -173,21 +174,28 @@ class _Robot:
             }  # fmt: skip
             for key, value in values.items():
                 every = np.atleast_1d(value).astype(float)
-                told.setdefault(key, {})[name] = np.where(np.abs(every) > 1e9, np.sign(every) * np.inf, every).tolist()
+                told.setdefault(key, {})[name] = np.where(
+                    np.abs(every) > 1e9, np.copysign(np.inf, every), every
+                ).tolist()
         return told
 
     def place(self, q: Any, v: Any) -> None:
         wp, m, s = self._wp, self._m, self._s
-        self._q, self._v = q, v
+        self._q, self._v = np.array(q), v
         self._shift = np.eye(self.nv)
         self._turn = np.zeros(self.nv)
-        s.joint_q.assign(q.astype(np.float32))
+        for at, _, _, p, R in self._frees:  # of a URDF one counts from where it stands, in the axes there
+            self._q[at : at + 3] = R.T @ (q[at : at + 3] - p)
+            self._q[at + 3 : at + 7] = _times(R.T, q[at + 3 : at + 7])
+        s.joint_q.assign(self._q.astype(np.float32))
         self._newton.eval_fk(m, s.joint_q, s.joint_qd, s)
-        for first, body in self._frees:  # its velocity is that of the centre of mass
+        for _, first, body, _, R in self._frees:  # its velocity is that of the centre of mass
             r = self.frames()[self._bodies[body]][1] @ m.body_com.numpy()[body]
-            w = v[first + 3 : first + 6]
+            w, here = v[first + 3 : first + 6], slice(first, first + 6)
             self._shift[first : first + 3, first + 3 : first + 6] = np.cross(np.eye(3), -r)
             self._turn[first : first + 3] = np.cross(w, np.cross(w, r))
+            axes = np.kron(np.eye(2), R.T)
+            self._shift[here], self._turn[here] = axes @ self._shift[here], axes @ self._turn[here]
         s.joint_qd.assign((self._shift @ v).astype(np.float32))
         self._newton.eval_fk(m, s.joint_q, s.joint_qd, s)
         count, width = m.articulation_count, m.max_dofs_per_articulation
@@ -248,6 +256,20 @@ def _behind(frame: Any, X: Any) -> Any:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ])  # fmt: skip
     return frame[0] + frame[1] @ X[:3], frame[1] @ R
+
+
+def _times(R: Any, xyzw: Any) -> Any:
+    """Return the quaternion of a rotation behind another, whose quaternion is given."""
+    trace = np.trace(R)
+    w = np.sqrt(max(1.0 + trace, 0.0)) / 2
+    if w > 1e-6:
+        u = (R[[2, 0, 1], [1, 2, 0]] - R[[1, 2, 0], [2, 0, 1]]) / (4 * w)
+    else:  # half a turn: R + 1 is twice the axis by itself
+        square = (R + np.eye(3)) / 2
+        u = square[int(np.argmax(np.diag(square)))]
+        u = u / np.linalg.norm(u)
+    x, s = xyzw[:3], xyzw[3]
+    return np.array([*(w * x + s * u + np.cross(u, x)), w * s - u @ x])
 
 
 def _named(path: str) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from typing import Any
 
@@ -38,7 +39,7 @@ class _Robot:
     def __init__(self, path: str, urdf: bool) -> None:
         import pinocchio as pin
 
-        self._pin = pin
+        self._pin, self._urdf = pin, urdf
         self.unseen = {"contacts": "Pinocchio's readers leave the choice of pairs to the user."}
         self.version = pin.__version__
         constraints: Any = []
@@ -54,8 +55,10 @@ class _Robot:
         kinds = {"PointAnchorConstraintModel": "connect", "FrameAnchorConstraintModel": "weld"}
         self.loops: Any = [(kinds.get(type(one).__name__, ""), [], []) for one in self._loops]
         try:
-            read = pin.buildGeomFromUrdf if urdf else pin.buildGeomFromMJCF
-            self._shapes = list(read(self._m, path, pin.GeometryType.COLLISION).geometryObjects)
+            of = pin.GeometryType.COLLISION
+            read = pin.buildGeomFromUrdf(self._m, path, of, package_dirs=[os.path.dirname(path)]) if urdf else (
+                pin.buildGeomFromMJCF(self._m, path, of))  # fmt: skip
+            self._shapes = list(read.geometryObjects)
         except Exception as error:  # shapes are read by a call of their own
             self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes: {error}"}
         self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
@@ -94,8 +97,13 @@ class _Robot:
         return told
 
     def place(self, q: Any, v: Any) -> None:
-        self._q, self._v = q, v
-        self._pin.framesForwardKinematics(self._m, self._d, q)
+        """Of a URDF a joint that floats counts from where it stands."""
+        self._q, self._v = np.array(q), v
+        for name, _, kind, at, _ in self.joints if self._urdf else ():
+            if kind == "free":
+                stands = self._m.jointPlacements[self._m.getJointId(name)]
+                self._q[at : at + 7] = self._pin.SE3ToXYZQUAT(stands.inverse() * self._pin.XYZQUATToSE3(q[at : at + 7]))
+        self._pin.framesForwardKinematics(self._m, self._d, self._q)
 
     def ends(self) -> Any:
         told = []

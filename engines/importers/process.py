@@ -2,7 +2,7 @@
 
 It is started by the path of this file, in an interpreter that has NumPy and the engine, and imports nothing of ours:
 
-    python -P process.py IMPORTER.py FILE mjcf|urdf ANSWERS BYTES < jobs
+    python -P process.py IMPORTER.py FILE mjcf|urdf ANSWERS BYTES NICE < jobs
 
 A job is a line of JSON; all but the first name their file, and each has its line in ANSWERS.
 Velocities of the scene are v = J v_e of the engine's, with v' = J v_e' + bend: M_e = J^T M J, b_e = J^T (b + M bend).
@@ -290,15 +290,20 @@ def measured(robot: Any, job: Any) -> dict[str, Any]:
     return told
 
 
-def tried(module: Any) -> str:
-    """Return a sentence on a version of the engine that no importer was tried with; empty for one that was."""
+def installed(module: Any) -> str:
+    """Return the version of the engine's package; empty where that is not known."""
     try:
-        found = version(module.PACKAGE)
+        return version(module.PACKAGE)
     except PackageNotFoundError:
         return ""
+
+
+def tried(module: Any) -> str:
+    """Return a sentence on a version of the engine that no importer was tried with; empty for one that was."""
+    found = installed(module)
     low, high = getattr(module, "TRIED", ("0", "999999"))
     number = [int(word) for word in re.findall(r"\d+", found)[:2]]
-    if [int(word) for word in low.split(".")] <= number <= [int(word) for word in high.split(".")]:
+    if not found or [int(word) for word in low.split(".")] <= number <= [int(word) for word in high.split(".")]:
         return ""
     return f"{module.PACKAGE} is of version {found}; its importer was tried with {low} to {high}."
 
@@ -328,22 +333,24 @@ def answered(module: Any, file: str, urdf: bool, job: Any, size: int) -> dict[st
         return {"status": "failed", "why": " ".join(f"{type(error).__name__}: {error}".split())}
 
 
-def main(importer: str, file: str, kind: str, answers: str, size: str) -> None:
+def main(importer: str, file: str, kind: str, answers: str, size: str, nice: str) -> None:
     """Read, measure, and leave a line for every job in a file; what engines print is the messages."""
+    os.nice(int(nice))
     limit(int(size))
     spec = spec_from_file_location("importer", importer)
     if spec is None or spec.loader is None:
         raise ImportError(f"{importer} is no Python file")
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
-    strange, said, line = tried(module), 0, list[str]()
+    strange, number, said, line = tried(module), installed(module), 0, list[str]()
 
     def job() -> Any:
         line[:] = line or [sys.stdin.readline()]
         return json.loads(line[0] or "{}")
 
     while file:
-        told = answered(module, file, kind == "urdf", job, int(size)) | {"strange": strange, "from": said}
+        told = {"version": number} | answered(module, file, kind == "urdf", job, int(size))
+        told |= {"strange": strange, "from": said}
         job()
         sys.stdout.flush()
         sys.stderr.flush()

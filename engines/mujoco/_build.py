@@ -22,6 +22,8 @@ FAR = 100.0
 
 LEAST = 2e-15
 """The smallest moment of inertia that MuJoCo admits, kg m^2 (twice mjMINVAL): it has no point masses."""
+THIN = 1e-14
+"""Moment of inertia, kg m^2, up to which a full tensor is at the rounding of what its eigenvalues must be."""
 
 
 def compiled(spec: Any, scene: Scene) -> Any:
@@ -88,7 +90,9 @@ def spec_of(scene: Scene, *, by_corners: bool = False, solids: Collection[str] =
 
 def _add_inertia(added: Any, body: Body) -> None:
     added.explicitinertial, added.mass, added.ipos = True, body.mass, body.com
-    if body.mass > 0.0 and any(body.inertia):
+    if body.mass > 0.0 and any(body.inertia[:3]) and min(body.inertia[:3]) <= THIN and not any(body.inertia[3:]):
+        added.inertia = np.maximum(body.inertia[:3], LEAST)
+    elif body.mass > 0.0 and any(body.inertia):
         added.fullinertia = body.inertia  # in the order xx yy zz xy xz yz
     else:
         added.inertia = (LEAST if body.mass > 0.0 else 0.0,) * 3
@@ -116,7 +120,7 @@ def _add_joint(body: Any, joint: Joint) -> None:
     added = body.add_joint(
         name=joint.name, type=getattr(mujoco.mjtJoint, f"mjJNT_{joint.type.upper()}"), axis=joint.axis,
         pos=joint.anchor, ref=joint.reference, margin=joint.margin, armature=joint.armature,
-        springref=joint.rest[0],
+        springref=joint.rest[0], frictionloss=joint.friction_loss,
     )  # fmt: skip
     added.damping[:], added.stiffness[:] = joint.damping, joint.stiffness
     added.limited, added.range = _bounds(joint.range)
@@ -127,7 +131,9 @@ def _add_joint(body: Any, joint: Joint) -> None:
 
 
 def _add_tendon(spec: Any, bodies: Mapping[str, Any], tendon: Tendon) -> None:
-    added = spec.add_tendon(name=tendon.name, springlength=tendon.rest, margin=tendon.margin)
+    added = spec.add_tendon(
+        name=tendon.name, springlength=tendon.rest, margin=tendon.margin, frictionloss=tendon.friction_loss
+    )
     added.damping[:], added.stiffness[:] = tendon.damping, tendon.stiffness
     added.limited, added.range = _bounds(tendon.range)
     added.solref_limit, added.solimp_limit = _solref(tendon.law), IMPEDANCE

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.cases import Law
-
 MAX_IMPEDANCE = 0.9999
 """MuJoCo clamps d there; it leaves R = (1 - d)/d diagA, a bias of 1e-4 in lam."""
 IMPEDANCE = (MAX_IMPEDANCE, MAX_IMPEDANCE, 1e-3, 0.5, 1.0)
@@ -20,16 +18,6 @@ REMAINING = 1e-7
 def solref_of(a0: float, a1: float) -> tuple[float, float]:
     """Return the solref that gives aref = -a1 h' - a0 h; both negative or zero, or MuJoCo replaces them."""
     return -MAX_IMPEDANCE * a0, -MAX_IMPEDANCE * a1
-
-
-def direct_solref(law: Law, row: int) -> tuple[float, float]:
-    """Return that of a row of a law."""
-    return solref_of(float(law.a0[row]), float(law.a1[row]))
-
-
-def law_of(solref: Any) -> tuple[float, float]:
-    """(a0, a1) back from a direct solref."""
-    return -float(solref[0]) / MAX_IMPEDANCE, -float(solref[1]) / MAX_IMPEDANCE
 
 
 def without_regularisation(model: Any) -> None:

@@ -15,6 +15,7 @@ from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Tr
 from crossbody.cases.files.warned import captured
 from crossbody.cases.registry import Registry
 from crossbody.engines import settings as _settings
+from crossbody.engines._formed import FormedRun, form_of, linearised, on_scene
 from crossbody.engines._scene import module_of
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
@@ -56,7 +57,7 @@ class MujocoRun(Run):
         message = " ".join(w for w in (march.message, self.rounded, *heard) if w)
         counts = {"located": march.trials}
         with captured():  # gaps are looked at with the same model, and have no more to say
-            found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts, scene.chart)
+            found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts)
         return found if scene.acting is None else scene.acting.told(found)
 
     def native(self) -> float:
@@ -109,6 +110,7 @@ class Mujoco(Engine):
         """Mechanisms without a model here cannot be run."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
+        case = on_scene(case)
         if profile == "as_is" and case.scene is None:
             return f"The profile as_is runs a robot file as it stands, and {case.name} is none; its own is default."
         if (name := module_of(case)) in MECHANISMS.names():
@@ -133,6 +135,8 @@ class Mujoco(Engine):
         reason = self.why_not(case, profile)
         if reason is not None:
             raise CaseUnsupported(reason)
+        if (form := form_of(case)) is not None:
+            return FormedRun(form=form, inner=self.prepare(form.case, profile, **settings))
         mechanism = MECHANISMS.load(module_of(case))
         with captured(), _refused(case):
             known = _known(case, mechanism.default_step(case, profile))
@@ -164,6 +168,8 @@ class Mujoco(Engine):
         reason = self.why_not(case, "matched")
         if reason is not None:
             raise CaseUnsupported(reason)
+        if case.form is not None:
+            return linearised(case, spot, self.linearise)
         return linearise(MECHANISMS.load(module_of(case)), case, spot)
 
 

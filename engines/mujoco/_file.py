@@ -12,7 +12,8 @@ from crossbody.cases.files.pairs import constants_of
 from crossbody.cases.scene import Scene
 from crossbody.engines.mujoco._build import compiled, spec_of
 
-RAISED = ("eq_solref", "jnt_solref", "tendon_solref_lim", "pair_solref", "geom_solref")
+DRY = ("dof_solref", "dof_solimp", "tendon_solref_fri", "tendon_solimp_fri")
+RAISED = ("eq_solref", "jnt_solref", "tendon_solref_lim", "pair_solref", "geom_solref", *DRY[::2])
 """Time constants that MuJoCo raises to two steps."""
 
 
@@ -56,7 +57,7 @@ def rebuilt(scene: Scene, model: Any) -> Any:
     made.actuator_dyntype[:] = model.actuator_dyntype  # filters alike, stepped by a formula or by the integrator
     on = model.eq_active0.astype(bool)
     made.eq_solref[:], made.eq_solimp[:] = model.eq_solref[on], model.eq_solimp[on]
-    for name in ("jnt_solref", "jnt_solimp", "tendon_solref_lim", "tendon_solimp_lim"):
+    for name in ("jnt_solref", "jnt_solimp", "tendon_solref_lim", "tendon_solimp_lim", *DRY):
         getattr(made, name)[:] = getattr(model, name)
     named = mjcf.names(model, "geom")
     for i in range(model.ngeom):

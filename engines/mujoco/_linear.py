@@ -29,7 +29,7 @@ from scipy.linalg import logm
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
-from crossbody.engines.linear import Chart, Spot, Tangent, in_contact, same
+from crossbody.engines.linear import Spot, Tangent, in_contact
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix
 from crossbody.engines.mujoco._rows import LIMITS, TOUCH
@@ -42,6 +42,8 @@ RESOLVED = 0.05
 """Largest product of the step whose logarithm is taken and the fastest pole."""
 ONE_WAY = (*(int(kind) for kind in LIMITS), TOUCH)
 """Rows whose force is bounded by 0."""
+HARDER = 0.1
+"""Part of the softness of bounds and loops that is left here: what it makes of slopes grows by their largest entry."""
 PRESS = 10.0
 """Times the force by which a row changes in the differences: how hard one is pressed that carries less."""
 
@@ -52,13 +54,11 @@ class Stand:
 
     Attributes:
         model, data: MjModel, MjData.
-        chart: its coordinates and the case's.
         hook: what MuJoCo calls in every evaluation; None if nothing.
     """
 
     model: Any
     data: Any
-    chart: Chart
     hook: Hook | None
 
 
@@ -66,47 +66,42 @@ def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, .
     """What mjd_transitionFD makes of an equilibrium.
 
     Args:
-        mechanism: its module here; one with coordinates of its own has `stand(case, spot) -> Stand`.
+        mechanism: its module here.
         case: the scene.
         spot: the equilibrium.
     """
     case = in_contact(case)
     dt = float(mechanism.default_step(case, "matched"))
-    own: Callable[..., Stand] = getattr(mechanism, "stand", None) or _same_coordinates(mechanism, dt)
     with captured():
-        stand = own(case, spot)
+        stand = _stand(mechanism, dt, case, spot)
     with _stepping(stand):
         exact = _pressed(stand, lambda: _extrapolated(stand))
         dt = min(dt, RESOLVED / max(_fastest(exact), RESOLVED / dt))
         stand.model.opt.timestep = dt
         plain = _pressed(stand, lambda: _logarithm(_discrete(stand, ONE_SIDED, centred=False), dt))
-    ways = (
+    return (
         Tangent(way="mjd_transitionFD, centred, its step undone", slope=exact),
         Tangent(
             way="mjd_transitionFD, one-sided, logarithm", slope=plain, explained=_logarithm(_step(exact, dt), dt),
             known=f"The logarithm of Euler's step over dt = {dt:.2g} s is off by O(dt).",
         ),
     )  # fmt: skip
-    return tuple(stand.chart.tangent(way) for way in ways)
 
 
-def _same_coordinates(mechanism: ModuleType, dt: float) -> Callable[[Case, Spot], Stand]:
-    """The matched scene of a mechanism whose coordinates are the case's."""
-
-    def stand(case: Case, spot: Spot) -> Stand:
-        build = getattr(mechanism, "build", None)
-        scene = build(case, "matched", dt) if build else None
-        if scene is None or scene.chart is not None:
-            raise CaseUnsupported(f"MuJoCo's model of {case.mechanism!r} has other coordinates, without a chart here.")
-        scene.start()
-        scene.data.qpos[:], scene.data.qvel[:] = spot.q, spot.v
-        if case.scene is not None:
-            scene.change(spot.t)
-        if scene.arm is not None:
-            scene.arm(spot.modes(case))
-        return Stand(model=scene.model, data=scene.data, chart=same(len(spot.v)), hook=scene.hook)
-
-    return stand
+def _stand(mechanism: ModuleType, dt: float, case: Case, spot: Spot) -> Stand:
+    """Return the matched scene of a mechanism at an equilibrium."""
+    build = getattr(mechanism, "build", None)
+    if build is None:
+        raise CaseUnsupported(f"MuJoCo's model of {case.mechanism!r} has other coordinates, without a chart here.")
+    scene = build(case, "matched", dt)
+    for softness in (scene.model.dof_invweight0, scene.model.tendon_invweight0):
+        softness[:] *= HARDER
+    scene.start()
+    scene.data.qpos[:], scene.data.qvel[:], scene.data.time = spot.q, spot.v, spot.t
+    scene.change(spot.t)
+    if scene.arm is not None:
+        scene.arm(spot.modes(case))
+    return Stand(model=scene.model, data=scene.data, hook=scene.hook)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Gaps and energies as MuJoCo computes them, of states that were recorded."""
+"""What is read of a model at the state that was looked at last."""
 
 from __future__ import annotations
 
@@ -11,29 +11,6 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.engines._contacts import Poses
-from crossbody.engines._log import Observe
-
-
-def of_equalities(model: Any) -> Observe:
-    """Read the residuals of the equality rows, m or rad, and kinetic and potential energy, J, from the model.
-
-    The states are put into an `MjData` of its own, so that a run can go on.
-    """
-    data = mujoco.MjData(model)
-
-    def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        gaps, energy = [], np.empty((len(q), 2))
-        for i in range(len(q)):
-            data.qpos[:], data.qvel[:] = q[i], v[i]
-            mujoco.mj_fwdPosition(model, data)
-            mujoco.mj_fwdVelocity(model, data)
-            mujoco.mj_energyPos(model, data)
-            mujoco.mj_energyVel(model, data)
-            gaps.append(data.efc_pos[: data.ne].copy())
-            energy[i] = data.energy[1], data.energy[0]
-        return np.array(gaps), energy
-
-    return observe
 
 
 def mass_matrix(model: Any, data: Any) -> Floats:

@@ -115,11 +115,11 @@ def _solids(scene: Scene) -> dict[str, float]:
 
 
 def _elastic(scene: Scene) -> dict[str, tuple[float, float]]:
-    """Return the solref of shapes of bodies that collide with each other, with the damping ratio of their law."""
+    """Return the solref of shapes of bodies that bounce off each other, with the damping ratio of their law."""
     bodies = {shape.name: shape.body for shape in scene.shapes}
     found: dict[str, tuple[float, float]] = {}
     for pair in scene.pairs:
-        if bodies[pair.first] and bodies[pair.second]:
+        if bodies[pair.first] and bodies[pair.second] and _ratio(pair.law) < 1.0:
             own = -USUAL, -2.0 * _ratio(pair.law) * USUAL**0.5
             found |= {pair.first: own, pair.second: own}
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.cases.scene_contacts import WAYS, Contact
 from crossbody.cases.scene_rows import rows_of
 from crossbody.engines._contacts import TOGETHER, Contacts, end_of
@@ -20,9 +20,10 @@ from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import corner_names
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
 from crossbody.engines.mujoco._observe import numbers
-from crossbody.engines.mujoco._rubs import Rub, Rubs
+from crossbody.engines.mujoco._rubs import AT_BOUND, Rub, Rubs
 from crossbody.engines.nearest import corners
 
+DRY = (int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF), int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON))
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 FRICTIONAL = (mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL,)
@@ -39,6 +40,7 @@ class Rows:
         frictional: whether edges of friction pyramids, whose sum is the normal force, are rows of contacts too.
         contacts: where the normal rows of contacts stand; behind them are the tangential ones of those with friction.
         rubs: contacts with friction; rubbing: whether there are any.
+        dry: rows of dry friction, which stand last, by what MuJoCo calls them.
     """
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
@@ -76,11 +78,22 @@ class Rows:
                 tangents[normal + k] = tangent + len(WAYS) * k
             normal, tangent = normal + contact.places, tangent + len(contact.tangents)
         self.contacts = slice(row - self.touching.count, row)
-        self.nc, self.rubs = tangent, Rubs(model, data, self.geoms, tangents)
-        rubs = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
+        self.rubs = Rubs(model, data, self.geoms, tangents)
         one_each = len(self.sole) == len(self.places) and all(len(rows) == 1 for _, rows in self.touches.values())
-        self.steady, self.only = one_each and not (rubs and self.nc == 1), ((0, 0),)
+        self.steady, self.only = one_each, ((0, 0),)
+        self.dry = dict(zip(self._rubbed(), range(tangent, tangent + model.nv + model.ntendon), strict=False))
+        self.sole |= self.dry
+        self.nc = tangent + len(self.dry)
         self._known: dict[tuple[bytes, ...], tuple[Present, ...]] = {}
+
+    def _rubbed(self) -> Iterator[tuple[int, int]]:
+        """Return what MuJoCo calls the rows of dry friction: kind, and velocity or tendon."""
+        dof = 0
+        for joint in self.scene.joints:  # in the model's order, likewise
+            width = WIDTHS[joint.type][1]
+            yield from ((DRY[0], dof + k) for k in range(width if joint.friction_loss > 0.0 else 0))
+            dof += width
+        yield from ((DRY[1], i) for i, tendon in enumerate(self.scene.tendons) if tendon.friction_loss > 0.0)
 
     def by_corners(self, contact: Contact) -> bool:
         """Return whether the model has a shape for each place of a contact, and a pair for each row."""
@@ -200,14 +213,19 @@ class Rows:
         modes = [int(Mode.BILATERAL)] * self.always + [int(Mode.CONTACT if x > 0.0 else Mode.FREE) for x in lam]
         for rub in (rub for rub in self._rubbing() if rub.row in self.rubs.tangents and rub.normal > 0.0):
             modes[rub.row] = int(Mode.SLIP if rub.slides else Mode.STICK)
-        return (*modes, *(modes[row] for row in self.rubs.tangents for _ in WAYS))
+        modes += [modes[row] for row in self.rubs.tangents for _ in WAYS] + [int(Mode.STICK)] * len(self.dry)
+        for j, row in self.present() if self.dry else ():
+            bound = (1.0 - AT_BOUND) * self.data.efc_frictionloss[j]
+            if row >= self.nc - len(self.dry) and abs(self.data.efc_force[j]) >= bound:
+                modes[row] = int(Mode.SLIP)
+        return tuple(modes)
 
     def observe(self) -> Observe:
         """Return what reads gaps and energies of recorded states."""
-        data = mujoco.MjData(self.model)
+        data, spared = mujoco.MjData(self.model), self.model.body_gravcomp * self.model.body_mass
 
         def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
-            first = self.contacts.start
+            first, lighter = self.contacts.start, spared.any()
             gaps, energy = np.zeros((len(q), self.nc)), np.empty((len(q), 2))
             gaps[:, self.contacts], lengths = self._apart(q, data), np.empty((len(q), self.model.ntendon))
             for i in range(len(q)):
@@ -217,9 +235,11 @@ class Rows:
                 mujoco.mj_energyPos(self.model, data)
                 mujoco.mj_energyVel(self.model, data)
                 gaps[i, : self.always], lengths[i] = data.efc_pos[: self.always], data.ten_length
-                spared = self.model.body_gravcomp * self.model.body_mass * (data.xipos @ self.model.opt.gravity)
-                energy[i] = data.energy[1], data.energy[0] + spared.sum()
-            gaps[:, self.always : first] = self.forces.bounds(q, lengths)
+                energy[i] = data.energy[1], data.energy[0]
+                if lighter:
+                    energy[i, 1] += spared @ (data.xipos @ self.model.opt.gravity)
+            if first > self.always:
+                gaps[:, self.always : first] = self.forces.bounds(q, lengths)
             return gaps, energy
 
         return observe

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from crossbody.engines._acting import Acting
-from crossbody.engines._log import Chart, Modes, Observe
+from crossbody.engines._log import Modes, Observe
 from crossbody.engines.mujoco._globals import Hook
 
 
@@ -29,7 +29,6 @@ class Scene:
         lam: -> multiplier of every row, N (one number for one row).
         safe: -> whether the state is finite and within what the scene can reach.
         observe: gaps and energies of many states of the model.
-        chart: positions and velocities of the model -> those of the case; None where they are the same.
         instants: when the inputs change, s, increasing.
         change: puts in force what acts from such an instant on.
         acting: what acts on a case's scene from outside, controllers included; None elsewhere.
@@ -52,7 +51,6 @@ class Scene:
     lam: Callable[[], Any]
     safe: Callable[[], bool]
     observe: Observe
-    chart: Chart | None = None
     instants: Sequence[float] = ()
     change: Callable[[float], None] = _nothing
     acting: Acting | None = None

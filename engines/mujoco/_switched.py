@@ -34,6 +34,8 @@ FAR = 1e9
 """Margin with which there is a row at any gap, m or rad."""
 OFF = -1e12
 """Reference acceleration of a row that is off, m/s^2."""
+FEW = 4
+"""Rows for which NumPy costs more than Python: of one ten times as much."""
 LAYOUTS = 256
 """Sets of rows and modes whose places are kept: a run has a few of them."""
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
@@ -234,7 +236,7 @@ class Switched(Rows):
         laid = lru_cache(LAYOUTS)(lambda present, armed: self._laid(present, armed, bent))
         loops, all_straight = slice(self.always), not self.cubic[self.always :].any()
         surface, cubic = self.surface.tolist(), self.cubic.tolist()
-        bends, alone = bool(curved.any()), self.nc == 1 and not bent and not self.touching.count
+        bends, few = bool(curved.any()), 0 if bent or self.touching.count else FEW
 
         def one(data: Any, j: int, row: int) -> None:
             pos, gains = float(data.efc_pos[j]) - surface[row], data.efc_KBIP[j].tolist()
@@ -253,8 +255,10 @@ class Switched(Rows):
             model.opt.tolerance = 0.0 if present else self.converged
             if not present:
                 return None
-            if alone:  # NumPy costs ten times as much
-                return one(data, *present[0])
+            if len(present) <= few:
+                for j, row in present:
+                    one(data, j, row)
+                return None
             at, rows, off, bending = laid(present, self.armed)
             gains = data.efc_KBIP[at]  # a0 is the first times the third
             lifted = gains[:, 0] * gains[:, 2] * (data.efc_margin[at] - self.surface[rows])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import nullcontext
 from copy import copy
@@ -18,9 +19,10 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
-from crossbody.cases.scene_contacts import frictional
+from crossbody.cases.scene_contacts import frictional, rough
 from crossbody.cases.scene_rows import rows_of, under_law
 from crossbody.engines._acting import Acting
+from crossbody.engines._force import acting as acting_of
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scale import depths, resolving_step
 from crossbody.engines._scene import Forces
@@ -60,8 +62,11 @@ CONES = {
     "cone": Parameter(default="own", choices=("own", *CONE), doc="cone of friction; own: the model's"),
     "impratio": Parameter(default=0.0, doc="friction's stiffness over that of normals; 0: the model's", low=0.0),
     "noslip": Parameter(default=-1, doc="iterations that take slip out; -1: the model's", low=-1, high=1e6),
+    "timeconst": Parameter(default=0.0, unit="s", doc="time constant of contacts (solref); 0: the model's", low=0.0),
 }
 """Of models with friction."""
+OF_FORCE = 1.5
+"""Time constants of what answers to a force that a step may be long: Runge-Kutta 4 is stable up to 2.8."""
 SOFT = "The file's rows are soft: their law varies with depth."
 HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
@@ -74,6 +79,8 @@ def why_not(case: Case, profile: str) -> str | None:
         )
     if profile == "matched" and case.scene is not None and (found := frictional(case.scene)):
         return found
+    if profile == "matched" and case.fsm != "level":
+        return f"Rows of a scene in MuJoCo switch by the machine 'level' and not by {case.fsm!r}."
     if profile != "as_is":
         return None
     if not case.file:
@@ -89,7 +96,7 @@ def settings(case: Case, profile: str) -> dict[str, Parameter]:
     """Return who reads the file, MuJoCo or the project, which builds its scene; and how contacts with friction act."""
     reader = {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
     found = reader if profile == "as_is" else {}
-    return found | CONES if case.scene is not None and frictional(case.scene) else found
+    return found | CONES if case.scene is not None and rough(case.scene) else found
 
 
 def default_step(case: Case, profile: str) -> float:
@@ -105,7 +112,8 @@ def default_step(case: Case, profile: str) -> float:
         model = matched(scene)
         deep = _reach(case, Switched(scene, model, mujoco.MjData(model)))[0]
     if not case.general:  # nothing but rows moves its bodies fast
-        return min(SLOWEST, resolving_step(law, deep))
+        rate = case.force.rate if case.force is not None else 0.0
+        return min(SLOWEST, resolving_step(law, deep), OF_FORCE / rate if rate else np.inf)
     stiffness = law.a0 + 3.0 * law.a2 * deep**2
     poles = [np.roots([1.0, a1, k]) for k, a1 in zip(stiffness[opening], law.a1[opening], strict=True)]
     rate = float(np.abs(np.concatenate([np.zeros(1), *poles])).max())
@@ -172,7 +180,7 @@ def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
 
 def build(
     case: Case, profile: str, dt: float, reader: str = "file", cone: str = "own", impratio: float = 0.0,
-    noslip: int = -1,
+    noslip: int = -1, timeconst: float = 0.0,
 ) -> Prepared:  # fmt: skip
     """Compile the model of one profile.
 
@@ -189,18 +197,20 @@ def build(
     else:
         model = matched(scene)
     _set_cone(model.opt, cone, impratio, noslip)
+    if timeconst > 0.0:
+        model.geom_solref[:, 0] = model.pair_solref[:, 0] = timeconst
     data = mujoco.MjData(model)
     switched = Switched(scene, model, data) if profile == "matched" else None
     rows, acting = switched or (Obvious if profile == "default" else Rows)(scene, model, data), Acting(case)
     driver = Forces(scene) if profile == "matched" and scene.activated else None
+    hook = _hook(integrated, data, switched, driver)
     prepared = Prepared(
         model=model, data=data, nc=len(case.contacts), start=_start(case, data, rows, acting, driver),
         modes=rows.modes, lam=rows.lam,
         safe=_guard(integrated, data, rows),
         observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
         acting=acting,
-        hook=_hook(scene, switched, driver) if switched else None,
-        always=driver is not None or (switched is not None and switched.wakeful),
+        hook=hook, always=driver is not None or case.force is not None or (switched is not None and switched.wakeful),
         machine="level" if switched else "memoryless",
     )  # fmt: skip
     if switched is not None and switched.nc > switched.always:
@@ -223,11 +233,12 @@ def _set_cone(option: Any, cone: str, impratio: float, noslip: int) -> None:
 def _guard(case: Case, data: Any, rows: Rows) -> Callable[[], bool]:
     """Return what tells whether a state is finite and not 100 times faster than what drives the start explains.
 
-    Of a robot nobody knows what its inputs will do.
+    Of a robot, and of what else is driven, nobody knows what its inputs will do.
     """
     rates: Floats = data.qvel
-    if case.general:
-        return lambda: bool(np.isfinite(data.qpos).all() and np.isfinite(rates).all())
+    if case.general or case.force is not None or case.inputs is not None or case.control is not None:
+        places: Floats = data.qpos
+        return lambda: math.isfinite(places.sum() + rates.sum())  # half the time of asking each
     speed = _reach(case, rows)[1] if isinstance(rows, Switched) else 0.0
     data.qpos[:], data.qvel[:] = case.q0, case.v0
     mujoco.mj_forward(rows.model, data)
@@ -300,16 +311,21 @@ def _start(case: Case, data: Any, rows: Rows, acting: Acting, driver: Forces | N
     return start
 
 
-def _hook(scene: Scene, rows: Switched, driver: Forces | None) -> Hook | None:
-    """Return what MuJoCo calls in every stage: terms of rows that it leaves out, and activations at that instant."""
-    own = rows.hook()
-    if driver is None:
+def _hook(case: Case, data: Any, rows: Switched | None, driver: Forces | None) -> Hook | None:
+    """Return what MuJoCo calls in every stage: its terms of rows that are left out, activations and forces then."""
+    own, force = rows.hook() if rows is not None else None, case.force
+    if driver is None and force is None:
         return own
-    activated = list(scene.activated)
+    activated = list(driver.scene.activated) if driver is not None else []
+    act = None if force is None else acting_of(force)
+    q, v, out = data.qpos, data.qvel, data.qfrc_applied
 
     def hook(model: Any, data: Any) -> None:
-        driver.t = data.time
-        data.ctrl[activated] = driver.driven()[activated]
+        if act is not None:
+            act(data.time, q, v, out)
+        if driver is not None:
+            driver.t = data.time
+            data.ctrl[activated] = driver.driven()[activated]
         if own is not None:
             own(model, data)
 
@@ -341,7 +357,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
     of_run, rows = rows, type(rows)(scene, model, data)
     if isinstance(rows, Switched) and isinstance(of_run, Switched):
         rows.surface[:] = of_run.surface
-    hook = rows.hook() if entered and isinstance(rows, Switched) else None
+    hook = _hook(case, data, rows if entered and isinstance(rows, Switched) else None, None)
 
     def look(q: Floats, v: Floats) -> None:
         if isinstance(rows, Switched) and entered:
@@ -359,7 +375,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
 
     def bias(q: Floats, v: Floats) -> Floats:
         look(q, v)
-        return np.array(data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)
+        return np.array(data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator - data.qfrc_applied)
 
     def H(q: Floats) -> Floats:
         look(q, np.zeros(model.nv))
@@ -373,7 +389,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
             return found
         pushes = found[rows.always :] > 0.0
         # MuJoCo's rows never pull: where one would, the others bear something else.
-        return rows.asked() if pushes.any() and not pushes.all() else found
+        return found if pushes.all() or len(pushes) == 1 else rows.asked()
 
     weightless = bool(model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
     found: dict[str, Any] = {

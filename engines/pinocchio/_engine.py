@@ -14,20 +14,23 @@ import sksundae
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.registry import Registry
+from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
+from crossbody.engines._formed import FormedRun, form_of, linearised, on_scene
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
+from crossbody.engines._rubbing import RubbingRun
 from crossbody.engines._scene import module_of
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
 from crossbody.engines.pinocchio._admm import TimeStepper
 from crossbody.engines.pinocchio._audit import audit
+from crossbody.engines.pinocchio._cones import Cones
 from crossbody.engines.pinocchio._flow import Flow
 from crossbody.engines.pinocchio._impulse import RULES, Impact, ImpulseMachine, constants, restitution
 from crossbody.engines.pinocchio._rows import ALGEBRA
 from crossbody.engines.pinocchio._scene import Scene
-from crossbody.engines.pinocchio._smooth import Smooth, SmoothFlow
 
 MECHANISMS = Registry("mechanism of Pinocchio", "crossbody.engines.pinocchio")
 STEPS = Parameter(default=200_000, doc="bound on the number of steps", low=1, high=1e9)
@@ -48,34 +51,6 @@ class Solver(Protocol):
     steps: int
     outcome: Outcome
     message: str
-
-
-@dataclass(slots=True, kw_only=True)
-class SmoothRun(Run):
-    """One prepared run of rows that are always on; see `crossbody.engines.Run`."""
-
-    case: Case
-    scene: Smooth
-    profile: str
-    settings: Mapping[str, Any]
-    engine: str = "pinocchio"
-
-    def run(self) -> Trajectory:
-        """Integrate from the start."""
-        used, log = self.settings, Log()
-        start = perf_counter()
-        flow = SmoothFlow(self.scene, log, float(used["rtol"]), str(used["method"]), int(used["max_steps"]))
-        flow.run(self.case.t_end)
-        wall = perf_counter() - start
-        counts = {"rhs": flow.rhs}
-        return log.trajectory(
-            self.scene.observe, flow.outcome, flow.message, flow.steps, wall, counts, self.scene.chart
-        )  # fmt: skip
-
-    def audit(self) -> Mapping[str, Any]:
-        """The physics read back from the model."""
-        found: Mapping[str, Any] = self.scene.audit
-        return found
 
 
 @dataclass(slots=True, kw_only=True)
@@ -110,8 +85,8 @@ class PinocchioRun(Run):
 class Pinocchio(Engine):
     """Pinocchio 4; see `crossbody.engines.Engine`.
 
-    A mechanism is a module here with `build(case, algebra) -> Scene`; or `smooth(case, model) -> Smooth`, where no row
-    ever opens; or, with a machine of its own, `SETTINGS`, `why_not(case, profile)` and `prepare(case, used) -> Run`.
+    A mechanism is a module here with `build(case, algebra) -> Scene`; or, with a machine of its own, `SETTINGS`,
+    `why_not(case, profile)` and `prepare(case, used) -> Run`.
     """
 
     name = "pinocchio"
@@ -133,7 +108,7 @@ class Pinocchio(Engine):
         """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""
         _settings.check_case(case)
         profile = _settings.profile_of(self.name, self.profiles, profile)
-        known = MECHANISMS.names()
+        known, case = MECHANISMS.names(), on_scene(case)
         if (name := module_of(case)) not in known:
             return f"Pinocchio has no model of the mechanism {name!r}; it has: {', '.join(known)}."
         own = getattr(MECHANISMS.load(name), "why_not", lambda *_: None)(case, profile)
@@ -141,7 +116,10 @@ class Pinocchio(Engine):
             return str(own) if own is not None else None
         if profile == "admm" and not hasattr(MECHANISMS.load(name), "build"):
             return "The profile admm steps contacts in time: the loops of this mechanism never open."
-        if profile in RULES and not case.law.unilateral.all():
+        opens = case.law.unilateral
+        if profile == "admm" and not (case.contacts and (case.scene is None or not case.scene.loops)):
+            return "The profile admm steps contacts in time: this case has none."
+        if profile in RULES and not (opens.any() and opens.all()):
             return "An impact needs a contact that opens: a row that is always on has none."
         if profile == "impulse_simultaneous" and int(case.law.unilateral.sum()) < 2:
             return "One contact collides with no other: the profile impulse is the same."
@@ -155,7 +133,7 @@ class Pinocchio(Engine):
         Args:
             case: the scene.
             profile: one of `profiles`; "matched" is law.
-            settings: law: rtol, method, max_steps, and algebra, or model where no row ever opens;
+            settings: law: rtol, method, max_steps and algebra;
                 impulse and impulse_simultaneous: rtol, restitution, max_steps;
                 admm: dt in s, tol in m/s and N s, restitution, max_steps.
 
@@ -168,14 +146,18 @@ class Pinocchio(Engine):
         reason = self.why_not(case, profile)
         if reason is not None:
             raise CaseUnsupported(reason)
+        if (form := form_of(case)) is not None:
+            return FormedRun(form=form, inner=self.prepare(form.case, profile, **settings))
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
+        if case.scene is not None and frictional(case.scene):
+            stepper = Cones(case, used, _bounces(case, settings))
+            return RubbingRun(
+                case=case, engine=self.name, profile=profile, settings=used, stepper=stepper, physics=stepper.physics()
+            )
         mechanism = MECHANISMS.load(module_of(case))
         if hasattr(mechanism, "prepare"):
             run: Run = mechanism.prepare(case, used)
             return run
-        if hasattr(mechanism, "smooth"):
-            smooth: Smooth = mechanism.smooth(case, str(used["model"]))
-            return SmoothRun(case=case, scene=smooth, profile=profile, settings=used)
         scene: Scene = mechanism.build(case, str(used.get("algebra", "forwardDynamics")))
         constants: dict[str, Any] = dict(zip(("a0", "a1", "a2"), scene.rows.entered, strict=True))
         if profile != "law":
@@ -197,6 +179,8 @@ class Pinocchio(Engine):
         reason = self.why_not(case, "law")
         if reason is not None:
             raise CaseUnsupported(reason)
+        if case.form is not None:
+            return linearised(case, spot, self.linearise)
         return linearise(MECHANISMS.load(module_of(case)), case, spot)
 
 
@@ -206,10 +190,6 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
     if hasattr(mechanism, "SETTINGS"):
         own: dict[str, Parameter] = mechanism.SETTINGS
         return own
-    models = getattr(mechanism, "MODELS", None)
-    if models is not None:
-        model = Parameter(default=next(iter(models)), doc="source of the model", choices=tuple(models))
-        return {"rtol": RTOL, "method": METHOD, "model": model, "max_steps": STEPS}
     if profile == "law":
         stiff = case.general and len(case.law.a0) > 0  # a file's rows bind the steps of Adams' formulas
         method = METHOD_OF_STIFF if stiff else METHOD

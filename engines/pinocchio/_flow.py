@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class Flow:
 
     Attributes:
         modes: modes of the rows now.
+        opens: whether any row can, so that something may switch.
         steps, rhs: steps and right-hand sides so far.
         outcome, message: how it ended.
     """
@@ -64,7 +66,8 @@ class Flow:
             self._watch(t, y, out)
             out[out == 0.0] = TINY
 
-        if watched:
+        self.opens = self.ways is not None or any(self.rows.unilateral)
+        if self.opens:
             options |= {"eventsfn": watch, "num_events": watched}
         self.solver = CVODE(self._rhs, **options)
 
@@ -160,7 +163,7 @@ class Flow:
             finite = bool(np.isfinite(self.vd).all())
             bad = Outcome.STEP_TOO_SMALL if finite else Outcome.NOT_FINITE
             self._end(bad, t, y, "CVODE gave up" if finite else f"the acceleration is {self.vd.tolist()}")
-        elif not np.isfinite(step.y).all():
+        elif not math.isfinite(step.y.sum()):
             self._end(Outcome.NOT_FINITE, t, y, "the next state is not finite")
         elif not self.world.safe(step.y[: self.n], step.y[self.n :]):
             self._end(Outcome.DIVERGED, t, y, "the state left what the scene can reach")
@@ -175,7 +178,10 @@ class Flow:
         lam = self.rows.accelerate(q, v, self.modes)[1]
         if not first:
             self.log.add(t, q, v, lam, self.modes)
-        if not first and not fired and not turned and not self._pulls(lam):
+        if not first and not fired and not turned and not (self.opens and self._pulls(lam)):
+            return y
+        if not self.opens and t > 0.0:
+            self.log.add(t, q, v, lam, self.modes)
             return y
         self._turn(t, q, turned)
         settled: Settled = self.machine.settle(q, v, self.modes, fired)
@@ -211,6 +217,8 @@ class Flow:
         It stands below its surface at the end, or it turned twice in between: up, down and up again has the same signs
         at both ends. What falls freely takes steps as long as that.
         """
+        if Mode.FREE not in self.modes:
+            return None
         (h, rate), (end, rate_end) = (self.rows.gaps(*self._state(y)) for y in (before, step.y))
         free = np.array([m == Mode.FREE for m in self.modes], dtype=bool)
         noise = ROUNDED * float(np.abs(step.y[: self.n]).max(initial=0.0))

@@ -12,7 +12,7 @@ the rows, is differenced centrally to fourth order.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -22,9 +22,14 @@ import pinocchio as pin
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.arrays import Floats
 from crossbody.engines.linear import Chart, Spot, Tangent, in_contact, same
+from crossbody.engines.pinocchio._native import Native
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 from crossbody.reference.linear.differences import differences
 
+TURNED = (
+    "Pinocchio 4.1.0 turns the force on the second body of a constraint nv times about the first joint's axis in "
+    "ddq_dq; ddq_dv and ddq_dtau are right."
+)
 STEP = 1e-3
 """Of the differences, as a part of the coordinates' sizes."""
 Force = Callable[[Floats, Floats], Floats]
@@ -90,9 +95,28 @@ def _same_coordinates(mechanism: ModuleType) -> Callable[[Case, Spot], Stand]:
         scene = build(case, "forwardDynamics") if build else None
         if scene is None or scene.chart is not None:
             raise CaseUnsupported(f"Pinocchio's model of {case.mechanism!r} has other coordinates, no chart here.")
-        return of_rows(scene.rows, spot)
+        scene.world.change(spot.t, spot.q, spot.v)
+        if scene.world.clock is not None:
+            scene.world.clock(spot.t)
+        found = of_rows(scene.rows, spot)
+        return found if scene.rows.native is None else replace(found, more=_constrained(scene.rows.native))
 
     return stand
+
+
+def _constrained(native: Native) -> Callable[[Stand, Floats], tuple[Tangent, ...]]:
+    """Return what gives Pinocchio's own derivatives of the constrained dynamics, and what is wrong with them."""
+
+    def ways(stand: Stand, right: Floats) -> tuple[Tangent, ...]:
+        q, v = stand.q, stand.v
+        by_q, by_v, by_tau = native.derivatives(q, v, stand.force(q, v))
+        found = np.hstack([by_q, by_v]) + by_tau @ stand.outside()
+        lam = native.data.lambda_c.copy()
+        explained = right + native.turned(q, lam, mass_matrix(stand.model, stand.data, q), stand.jacobian(q))
+        way = "computeConstraintDynamicsDerivatives"
+        return (Tangent(way=way, slope=found, known=TURNED, explained=explained),)
+
+    return ways
 
 
 def of_rows(rows: PinRows, spot: Spot, more: tuple[float, ...] = (), rates: tuple[float, ...] = ()) -> Stand:

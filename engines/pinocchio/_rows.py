@@ -15,6 +15,7 @@ from crossbody.engines._log import Modes
 from crossbody.engines._machines import active, elastic_part
 
 if TYPE_CHECKING:
+    from crossbody.engines.pinocchio._native import Native
     from crossbody.engines.pinocchio._ways import Ways
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
@@ -107,6 +108,7 @@ class PinRows:
         near: as of `crossbody.engines._machines.Rows`.
         follows: index of the row whose mode each one shares; -1 for none.
         ways: how pairs of shapes lie to each other that may in two ways; None where there is none.
+        native: the rows as Pinocchio's own constraints, where none ever opens; None elsewhere.
         shared: what makes multipliers of rows that depend on each other such that none pulls; None where rows do not.
     """
 
@@ -139,6 +141,7 @@ class PinRows:
         self._sets: dict[Modes, Any] = {}
         self.ways: Ways | None = None
         self.shared: Shared | None = None
+        self.native: Native | None = None
         self.solve = ALGEBRA[algebra](model, self.data, self.tau)
 
     def rigid(self) -> PinRows:
@@ -178,6 +181,8 @@ class PinRows:
         """Acceleration (nv,) and multipliers (nc,)."""
         if self.forces is not None:
             self.forces(q, v, self.tau)
+        if self.native is not None:
+            return self.native.accelerate(q, v, self.tau)
         rows, one_sided, a0, a1, a2 = self._chosen(modes)
         if rows is None:
             return pin.aba(self.model, self.data, q, v, self.tau), np.zeros(self.nc)

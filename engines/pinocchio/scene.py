@@ -12,16 +12,29 @@ import pinocchio as pin
 
 from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases.arrays import Floats
+from crossbody.cases.case import Force
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
+from crossbody.engines._force import acting as acting_of
+from crossbody.engines._log import Observe
 from crossbody.engines._real_time import followed as real_time
+from crossbody.engines._rubbing import why_no_steps
 from crossbody.engines._scale import depths
 from crossbody.engines.pinocchio._contacts import Points, contact_rows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
-from crossbody.engines.pinocchio._rows import Chosen, Forces, PinRows, mass_matrix, point_jacobian, pose
+from crossbody.engines.pinocchio._joined import (
+    DEPENDENT,
+    Joined,
+    Spans,
+    Strings,
+    by_least_norm,
+    loose_rows,
+    none_pulling,
+)
+from crossbody.engines.pinocchio._native import Native, apt
+from crossbody.engines.pinocchio._rows import Chosen, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared
 from crossbody.engines.pinocchio._scene import World
 from crossbody.engines.pinocchio._ways import Ways
@@ -46,7 +59,9 @@ Placed = dict[str, tuple[int, Any]]
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: bounds and loops follow the law alone."""
     if case.scene is not None and (found := frictional(case.scene)):
-        return found
+        return found if profile != "admm" else why_no_steps("Pinocchio's admm", case.scene)
+    if profile != "law" and case.force is not None:
+        return "What acts here feels forces that are finite: impacts and time stepping have impulses instead."
     if profile != "law" and case.general:
         return "The rows of a scene follow the law: impacts in no time and time stepping have none."
     return None
@@ -61,30 +76,51 @@ def followed(case: Case, profile: str) -> Case | None:
     return replace(case, collisions=rule, closed_form=None, claims=()) if other and rule is not None else None
 
 
+class Bodies:
+    """The bodies of a scene in Pinocchio and what acts on them beside their rows.
+
+    Attributes:
+        model, data: Pinocchio's.
+        placed: where each body is.
+        forces: of the scene; to: coordinates.
+        none: whether nothing but gravity ever acts.
+    """
+
+    def __init__(self, scene: Scene, force: Force | None = None) -> None:
+        self.forces = parts.Forces(scene)
+        self.model, self.placed = tree(scene)
+        self.armature = self.model.armature[:] = self.forces.armature
+        self.data, self.to = self.model.createData(), Coordinates(scene)
+        self.forces.spans = spans(scene, self.model, self.placed, self.to)
+        self._centres = at_centres(scene, self.forces, self.model, self.model.createData(), self.placed)
+        self._lifting = bool(scene.pushes) or any(body.weightless for body in scene.bodies)
+        self._bends = any(self.armature[first : first + 3].any() for _, first in self.to.frees)
+        self._act, self._beside = None if force is None else acting_of(force), np.zeros(scene.nv)
+        self.none = self.forces.none and self.to.same and not self._lifting and self._act is None
+
+    def apply(self, q: Floats, v: Floats, tau: Floats) -> None:
+        """Write the generalised forces (nv,) beside gravity at a state of Pinocchio's."""
+        # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
+        r, u = (q, v) if self.to.same else (self.to.ours(q), self.to.velocities(q, v))
+        ours = self.forces(r, u)
+        if self._act is not None:
+            self._act(self.forces.t, r, u, self._beside)
+            ours += self._beside
+        if self._bends:
+            ours -= self.armature * self.to.bend(q, v)
+        own = ours if self.to.same else self.to.back(q, ours)
+        tau[:] = own + self._centres(q) if self._lifting else own
+
+
 def build(case: Case, algebra: str) -> Prepared:
     """Return the model of a scene with its forces and rows."""
     scene = case.scene
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     law = (real_time(case, two_sets=True) or case).law
-    forces = parts.Forces(scene)
-    model, placed = tree(scene)
-    armature = forces.armature
-    model.armature[:] = armature
-    to = Coordinates(scene)
-    forces.spans = spans(scene, model, placed, to)
-    centres = at_centres(scene, forces, model, model.createData(), placed)
-    lifting = bool(scene.pushes) or any(body.weightless for body in scene.bodies)
-    bends = any(armature[first : first + 3].any() for _, first in to.frees)
-
-    def apply(q: Floats, v: Floats, tau: Floats) -> None:
-        # A free joint's armature resists the acceleration of p', of which Pinocchio's velocities turn with the body.
-        ours = forces(to.ours(q), to.velocities(q, v))
-        if bends:
-            ours -= armature * to.bend(q, v)
-        tau[:] = to.back(q, ours) + centres(q) if lifting else to.back(q, ours)
-
-    acting = None if forces.none and to.same and not lifting else apply
+    bodies = Bodies(scene, case.force)
+    model, placed, forces, to = bodies.model, bodies.placed, bodies.forces, bodies.to
+    acting = None if bodies.none else bodies.apply
     gaps = Gaps(scene, forces, (model, placed), to)
     pinned = PinRows(
         model, lambda q: gaps.gradients(q)[1], gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
@@ -99,16 +135,26 @@ def build(case: Case, algebra: str) -> Prepared:
         root = np.linalg.cholesky(mass_matrix(model, pinned.data, start[0]))
         A = np.linalg.solve(root, gaps.gradients(start[0])[1][: sum(widths)].T).T
         loose = loose_rows(A, widths, case.rank) if widths else ()
+        if widths and apt(scene, law, len(case.contacts)) and np.linalg.cond(A) * DEPENDENT < 1.0:
+            pinned.native = Native(model, placed, scene, law)
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
         rows=pinned, points=() if case.general else Points(scene, model, placed),
-        observe=_observe(scene, model, placed, forces, gaps, to),
-        sizes=(np.full(to.nq, SMALL), np.full(to.nv, SMALL)) if case.general else _sizes(pinned, *start),
+        observe=observer(scene, bodies, gaps),
+        sizes=_given_sizes(case, to) or _sizes(pinned, *start),
         start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
-        world=_world(case, forces, to), audit=_audit(scene, pinned, forces, apply, to),
+        world=_world(case, forces, to), audit=_audit(scene, pinned, bodies),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def _given_sizes(case: Case, to: Coordinates) -> tuple[Floats, Floats] | None:
+    """Return the sizes of coordinates (nq,) and velocities (nv,) that a force gives; those of robots are small."""
+    if case.general:
+        return np.full(to.nq, SMALL), np.full(to.nv, SMALL)
+    force = case.force
+    return (np.array(force.far), np.array(force.fast)) if force is not None and force.far else None
 
 
 def _sizes(rows: PinRows, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -327,7 +373,10 @@ def _joint(joint: Joint) -> Any:
 
 def _inertia(body: Body) -> Any:
     xx, yy, zz, xy, xz, yz = body.inertia
-    return pin.Inertia(body.mass, np.array(body.com), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    found = pin.Inertia.Zero()  # part by part: made at once, what no rigid body has would be refused
+    found.mass, found.lever = body.mass, np.array(body.com)
+    found.inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return found
 
 
 def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed: Placed) -> Callable[[Floats], Floats]:
@@ -340,7 +389,7 @@ def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed
 
     def force(q: Floats) -> Floats:
         total: Floats = np.zeros(model.nv)
-        acting = [*lifted.items(), *zip(pushed, forces.pushes, strict=True)]
+        acting = [*lifted.items(), *(zip(pushed, forces.pushes, strict=True) if forces.pushed else ())]
         if acting:
             pin.computeJointJacobians(model, data, q)
         for body, each in acting:
@@ -352,26 +401,29 @@ def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed
     return force
 
 
-def _observe(
-    scene: Scene, model: Any, placed: Placed, forces: parts.Forces, gaps: Gaps, to: Coordinates
-) -> Any:  # fmt: skip
-    """Gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
+def observer(scene: Scene, bodies: Bodies, gaps: Gaps) -> Observe:
+    """Return what gives gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
+    model, placed, forces, to = bodies.model, bodies.placed, bodies.forces, bodies.to
     data = model.createData()
     # Pinocchio leaves out what is fixed to the world.
     fixed = [(body, placed[body.name][1]) for body in scene.bodies if placed[body.name][0] == 0]
+    lighter, armed = [body for body in scene.bodies if body.weightless], bool(model.armature.any())
     held = -sum(body.mass * float(pose.act(np.array(body.com)) @ np.array(scene.gravity)) for body, pose in fixed)
 
     def observe(q: Floats, v: Floats) -> tuple[Floats, Floats]:
         energy: Floats = np.empty((len(q), 2))
         for i in range(len(q)):
             # Pinocchio's own kinetic energy has the armature of some types of joints and not of others.
-            energy[i, 0] = 0.5 * v[i] @ mass_matrix(model, data, q[i]) @ v[i]
+            energy[i, 0] = (
+                0.5 * v[i] @ mass_matrix(model, data, q[i]) @ v[i]
+                if armed
+                else pin.computeKineticEnergy(model, data, q[i], v[i])
+            )
             energy[i, 1] = held + pin.computePotentialEnergy(model, data, q[i])
-            for body in scene.bodies:
-                if body.weightless:
-                    carrier, pose = placed[body.name]
-                    height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
-                    energy[i, 1] += body.weightless * body.mass * height
+            for body in lighter:
+                carrier, pose = placed[body.name]
+                height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
+                energy[i, 1] += body.weightless * body.mass * height
         energy[:, 1] += forces.energy(to.ours(q))
         return gaps.recorded(q), energy
 
@@ -395,33 +447,37 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
         forces.t = t
 
     return World(
-        instants=acting.instants, change=change, reset=reset, acting=acting, clock=clock if len(case.act0) else None
+        instants=acting.instants, change=change, reset=reset, acting=acting,
+        clock=clock if len(case.act0) or case.force is not None else None,
     )  # fmt: skip
 
 
-def _audit(
-    scene: Scene, rows: PinRows, forces: parts.Forces, apply: Forces, to: Coordinates
-) -> dict[str, Any]:  # fmt: skip
-    """What differs from the rows' own audit: masses body by body, forces at zero input, and the scene's coordinates."""
-    model, data = rows.model, rows.data
-    on = rows_on(rows)
-
-    def bias(q: Floats, v: Floats) -> Floats:
-        forces.still()
-        r = to.theirs(q)
-        u = to.back(r, v)
-        apply(r, u, rows.tau)
-        own = pin.nonLinearEffects(model, data, r, u) - rows.tau
-        total: Floats = to.velocities(r, own) - M(q) @ to.bend(r, u)
-        return total
+def mechanics(scene: Scene, bodies: Bodies) -> dict[str, Any]:
+    """Return for the audit the masses body by body, M and the bias at zero input, in the scene's coordinates."""
+    model, data, to, forces, tau = bodies.model, bodies.data, bodies.to, bodies.forces, np.zeros(bodies.model.nv)
 
     def M(q: Floats) -> Floats:
         r = to.theirs(q)
         half = to.velocities(r, mass_matrix(model, data, r))  # J M J^T: J is orthogonal
         return to.velocities(r, half.T)
 
-    def lam(q: Floats, v: Floats) -> Floats:
+    def bias(q: Floats, v: Floats) -> Floats:
         forces.still()
+        r = to.theirs(q)
+        u = to.back(r, v)
+        bodies.apply(r, u, tau)
+        total: Floats = to.velocities(r, pin.nonLinearEffects(model, data, r, u) - tau) - M(q) @ to.bend(r, u)
+        return total
+
+    return {"masses": parts.masses(scene), "M": M, "bias": bias}
+
+
+def _audit(scene: Scene, rows: PinRows, bodies: Bodies) -> dict[str, Any]:
+    """What differs from the rows' own audit."""
+    on, to = rows_on(rows), bodies.to
+
+    def lam(q: Floats, v: Floats) -> Floats:
+        bodies.forces.still()
         r = to.theirs(q)
         return rows.accelerate(r, to.back(r, v), on)[1]
 
@@ -429,13 +485,7 @@ def _audit(
         r = to.theirs(q)
         return to.velocities(r, rows.jacobian(r))
 
-    return {
-        "masses": parts.masses(scene),
-        "M": M,
-        "bias": bias,
-        "H": H,
-        "lam": lam,
-    }
+    return mechanics(scene, bodies) | {"H": H, "lam": lam}
 
 
 def rows_on(rows: PinRows) -> tuple[int, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from crossbody.cases.arrays import Floats
 
@@ -84,6 +84,7 @@ class Fit:
         outcome: "converged"; "unconverged" where the search ended before that, with intervals about where it ended; or
             "stopped" at the time limit: the best so far, without intervals and errors.
         message: of the search.
+        profile: parameter -> values about its estimate, and the cost at each over that at the estimate.
     """
 
     model: str
@@ -104,6 +105,7 @@ class Fit:
     evaluations: int
     outcome: str
     message: str
+    profile: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
     @property
     def success(self) -> bool:

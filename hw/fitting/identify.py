@@ -51,7 +51,7 @@ def identify(
         horizon: length of a window, s; up to the next restart if not given.
         starts: "free": the start of each window is an unknown too; "measured": it is the measured state, whose noise no
             interval counts; "auto": free wherever derivatives are exact and the unknowns are not too many.
-        hold: every so manieth window is held out; 0 for none.
+        hold: every hold-th window is held out of the fit; 0 for none.
         stride: of so many samples one is compared (neighbours that tell the same need not all be).
         bounds: name -> lowest and highest value, inside those of the model.
         engine: what runs a model whose contacts open: E or E:PROFILE.

@@ -16,6 +16,7 @@ from crossbody.hw.fitting.covariance import Scatter, scatter
 from crossbody.hw.fitting.derivative import DELAY, Exact
 from crossbody.hw.fitting.fit import CONVERGED, STOPPED, UNCONVERGED, Agreement, Estimate, Fit
 from crossbody.hw.fitting.information import WEIGHT, in_words, information, unseen_by, weak
+from crossbody.hw.fitting.profile import profiles
 from crossbody.hw.fitting.search import Found
 from crossbody.hw.fitting.start_noise import moves
 from crossbody.hw.models._contract import Model
@@ -78,6 +79,8 @@ def judged(search: Search) -> Fit:
     )  # fmt: skip
     sizes = np.where(np.abs(x) > 1e-9 * np.abs(search.x0), search.sizes, np.maximum(search.sizes, np.abs(search.x0)))
     off = problem.checked(x, J, sizes[:count], limits[0])
+    stds = {i: e.std for i, e in enumerate(estimates) if np.isfinite(e.std) and e.std > 0.0 and i in loose}
+    risen = profiles(problem, x, J, search.sizes, stds, limits)
     before, after = (_errors(search.sides, y[:count]) for y in (search.x0, x))
     values = {name: float(x[i]) for i, name in enumerate(free) if name != DELAY}
     fit = Fit(
@@ -88,6 +91,7 @@ def judged(search: Search) -> Fit:
         sensitivities=f"{problem.how}; central differences at the solution differ by {off:.1e} of their size",
         covariance=spread.how, warnings=(), evaluations=found.evaluations,
         outcome=CONVERGED if found.success else UNCONVERGED, message=found.message,
+        profile={free[i]: one for i, one in risen.items()},
     )  # fmt: skip
     about = [] if problem.starts else [MEASURED.format(COUNTED if isinstance(problem, Exact) else NEVER)]
     warnings = (*_warnings(fit, unseen, found, flat, off, problem.tolerance), *about)

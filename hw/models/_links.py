@@ -8,6 +8,10 @@ from types import MappingProxyType
 import numpy as np
 
 from crossbody.cases import Case, Coordinate, Inputs, Law, Parameter, Value
+from crossbody.cases.arrays import Floats
+from crossbody.cases.case import Force
+from crossbody.cases.form import Form, formed
+from crossbody.cases.scene import Actuator, Body, Joint, Scene
 from crossbody.hw.models._contract import Model, Numbers, Segment
 from crossbody.reference.systems import link_chain
 
@@ -75,4 +79,54 @@ def scene(name: str, title: str, count: int, numbers: Numbers, segment: Segment)
             a0=np.full(rows, POLE**2), a1=np.full(rows, 2.0 * POLE), a2=np.zeros(rows),
             unilateral=np.zeros(rows, np.bool_),
         ),
+        form=on_hinges,
+    )  # fmt: skip
+
+
+def on_hinges(case: Case, powered: bool = True, steady: bool = False) -> Form:
+    """Return a chain of hinges, r_0 = pi - th_0 and r_i = th_(i-1) - th_i: its links hang straight at zero.
+
+    Hinges turn clockwise, seen with x to the right and z up, so that what turns a link forward turns its hinge back.
+    """
+    n, given = int(case.parameters["links"]), case.inputs
+    dry = np.array([case.number(f"s{i + 1}") for i in range(n)])
+    friction = Force(function=_dry_friction, numbers=np.append(dry, case.number("slip")))
+
+    def to_case(r: Floats, rd: Floats) -> tuple[Floats, Floats]:
+        return link_chain.place(case.parameters, np.pi - np.cumsum(r, axis=-1), -np.cumsum(rd, axis=-1))
+
+    def to_scene(q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        return np.diff(-q[..., 2::3], prepend=-np.pi), np.diff(-v[..., 2::3], prepend=0.0)
+
+    hung = _hung(case)
+    inputs = given if given is None else Inputs(names=hung.inputs, times=given.times, values=given.values)
+    return Form(
+        case=formed(case, hung, *to_scene(case.q0, case.v0), inputs=inputs, force=friction if dry.any() else None),
+        to_case=to_case, to_scene=to_scene, rows=(-1,) * len(case.contacts),
+    )  # fmt: skip
+
+
+def _dry_friction(_t: float, _r: Floats, rd: Floats, p: Floats, out: Floats) -> None:
+    """Brake every hinge; the rate over which that is smoothed stands last."""
+    for i in range(len(rd)):
+        out[i] = -p[i] * rd[i] / np.sqrt(rd[i] * rd[i] + p[-1] * p[-1])
+
+
+def _hung(case: Case) -> Scene:
+    """Return the links on hinges, each with a motor and viscous friction."""
+    names = [f"link {i + 1}" for i in range(int(case.parameters["links"]))]
+    m, a, lengths, inertias, k = ([case.number(f"{key}{i + 1}") for i in range(len(names))] for key in "maLIk")
+    links = zip(names, ["", *names], [0.0, *lengths], m, a, inertias, strict=False)
+    return Scene(
+        bodies=tuple(
+            Body(name=name, parent=parent, position=(0.0, 0.0, -reach), mass=mass, com=(0.0, 0.0, -centre),
+                 inertia=(inertia,) * 3 + (0.0,) * 3)
+            for name, parent, reach, mass, centre, inertia in links
+        ),
+        joints=tuple(
+            Joint(name=name, body=name, type="hinge", axis=(0.0, 1.0, 0.0), damping=(one, 0.0, 0.0))
+            for name, one in zip(names, k, strict=True)
+        ),
+        actuators=tuple(Actuator(name=f"torque of {name}", joint=name, gear=(-1.0,)) for name in names),
+        gravity=(0.0, 0.0, -case.number("gravity")),
     )  # fmt: skip

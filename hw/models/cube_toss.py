@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from crossbody.cases import Case, Coordinate, Law, Parameter, Trajectory
+from crossbody import cases
+from crossbody.cases import Case, Coordinate, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.cases.library.tossed_cube import PARAMETERS
 from crossbody.hw.models._contract import Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
 
@@ -16,19 +19,16 @@ PLACE = ("px", "py", "pz")
 TURN = ("qw", "qx", "qy", "qz")
 COMPARED = (*(Coordinate(name=p, unit="m") for p in PLACE), *(Coordinate(name=f"r{a}", unit="rad") for a in "xyz"))
 RATES = ("wx", "wy", "wz")
+SCENE = ("height", "t_end")
 
 
 def build(numbers: Numbers, segment: Segment) -> Case:
-    """One toss; the law is that of MuJoCo's solref: a0 = 1/(zeta tau)^2, a1 = 2/tau."""
-    tau, zeta = float(numbers["timeconst"]), float(numbers["dampratio"])
-    return Case(
-        name="cube_toss", variant="replay", title="Cube tossed on a table", mechanism="cube_toss", parameters=numbers,
-        coordinates=COMPARED, contacts=("table",), q0=segment.y, v0=segment.yd, t_end=segment.t_end,
-        law=Law(
-            a0=np.array([1.0 / (zeta * tau) ** 2]), a1=np.array([2.0 / tau]), a2=np.zeros(1),
-            unilateral=np.ones(1, np.bool_),
-        ),
-    )  # fmt: skip
+    """One toss from the measured place, attitude and rates; it claims nothing."""
+    case = cases.load("tossed_cube", t_end=segment.t_end, **numbers)  # type: ignore[arg-type]
+    attitude = Rotation.from_rotvec(segment.y[3:]).as_quat(scalar_first=True)
+    return replace(
+        case, name="cube_toss", variant="replay", q0=np.append(segment.y[:3], attitude), v0=segment.yd, limits=()
+    )
 
 
 def read(model: Model, log: Log) -> tuple[Floats, Floats | None]:
@@ -44,9 +44,10 @@ def see(model: Model, run: Trajectory, times: Floats) -> tuple[Floats, Floats]:
     keep = np.append(np.diff(run.t) > 0.0, True)
     t, q, v = run.t[keep], run.q[keep], run.v[keep]
     inside = np.clip(times, t[0], t[-1])
-    found = np.column_stack([np.interp(inside, t, column) for column in q.T])
+    found = np.column_stack([np.interp(inside, t, column) for column in q[:, :6].T])
     if len(t) > 1:
-        found[:, 3:] = Slerp(t, Rotation.from_rotvec(np.array(q[:, 3:])))(inside).as_rotvec()
+        attitude = Slerp(t, Rotation.from_quat(np.array(q[:, 3:]), scalar_first=True))(inside)
+        found = np.column_stack((found[:, :3], attitude.as_rotvec()))
     rates = np.column_stack([np.interp(inside, t, column) for column in v.T])
     late = times > t[-1] + 1e-9
     found[late], rates[late] = np.nan, np.nan
@@ -61,16 +62,7 @@ def differ(y: Floats, yhat: Floats) -> Floats:
 MODEL = Model(
     name="cube_toss",
     title="Cube tossed on a table",
-    parameters={
-        "side": Parameter(default=0.1048, unit="m", doc="side", low=1e-3, high=1e2),
-        "mass": Parameter(default=0.37, unit="kg", doc="mass", low=1e-6, high=1e4),
-        "inertia": Parameter(default=0.00081, unit="kg m^2", doc="moment of inertia", low=1e-12, high=1e4),
-        "gravity": Parameter(default=9.81, unit="m/s^2", doc="down", low=0.0, high=100.0),
-        "friction": Parameter(default=0.18, unit="1", doc="Coulomb's coefficient", low=1e-3, high=2.0),
-        "timeconst": Parameter(default=4e-3, unit="s", doc="time constant of the contact (solref)", low=1e-3, high=0.1),
-        "dampratio": Parameter(default=1.0, unit="1", doc="damping ratio of the contact (solref)", low=0.05, high=5.0),
-        "restitution": Parameter(default=0.125, unit="1", doc="of an engine that has one", low=0.0, high=1.0),
-    },
+    parameters={name: parameter for name, parameter in PARAMETERS.items() if name not in SCENE},
     measured=COMPARED,
     needs=PLACE + TURN,
     seen=tuple(range(6)),
@@ -80,9 +72,6 @@ MODEL = Model(
     turns=(3,),
     differ=differ,
     falls=2,
-    engine="mujoco",
-    why_not=MappingProxyType(
-        {"reference": "Rows of the reference push along their normal: no Coulomb friction sticks and slips."}
-    ),
-    profiles=MappingProxyType({"pinocchio": "admm"}),
+    profiles=MappingProxyType({"pinocchio": "admm", "mujoco": "default"}),
+    settings=MappingProxyType({"mujoco": {"timeconst": 4e-3, "cone": "elliptic", "dt": 1e-3}}),
 )

@@ -9,6 +9,7 @@ import numpy as np
 from crossbody.cases import Case, Coordinate, Inputs, Law, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.library.delta_tracking import PARAMETERS
+from crossbody.cases.mechanisms.delta.form import in_tree
 from crossbody.cases.mechanisms.delta.scene import JOINTS, LOOPS, NAMES, ROBOT
 from crossbody.hw.models._contract import Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
@@ -49,7 +50,7 @@ def build(numbers: Numbers, segment: Segment) -> Case:
     return Case(
         name="delta", variant="replay", title=TITLE, mechanism="delta", parameters=robot,
         coordinates=tuple(Coordinate(name=joint, unit="rad") for joint in JOINTS), contacts=LOOPS, q0=q0, v0=v0,
-        t_end=segment.t_end, inputs=inputs, law=_law(numbers),
+        t_end=segment.t_end, inputs=inputs, law=_law(numbers), form=in_tree,
     )  # fmt: skip
 
 

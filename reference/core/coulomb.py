@@ -23,9 +23,11 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import substitute
 from crossbody.reference.core.filters import STAGES_RANGE
 from crossbody.reference.core.friction import (
+    bound,
     count_from_none,
     has_begun,
     has_friction,
+    is_dry,
     is_tangent,
     most_drift,
     slip,
@@ -397,7 +399,29 @@ def _factor_in_turn(s: Any, m: Model, w: Work) -> None:
 
 @compiled
 def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
-    """Fill la of all rows in contact from the right-hand side r and what `factor` left; rows that are off get none."""
+    """Fill la of all rows in contact from the right-hand side r and what `factor` left; rows that are off get none.
+
+    Those that slide with a bound of their own get it, and their forces count on the right-hand side.
+    """
+    if s.dry == 0:
+        respond(s, m, w, r, la)
+        return
+    for j in range(s.na):
+        w.pushed[j] = r[j]
+    for c in range(s.na):
+        if is_dry(m, w.idx[c]) and w.slides[w.idx[c]]:
+            force = -m.friction[w.idx[c]] * w.along[c]
+            for j in range(s.na):
+                w.pushed[j] -= w.gram[j, c] * force
+    respond(s, m, w, w.pushed, la)
+    for c in range(s.na):
+        if is_dry(m, w.idx[c]) and w.slides[w.idx[c]]:
+            la[c] = -m.friction[w.idx[c]] * w.along[c]
+
+
+@compiled
+def respond(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
+    """Fill la of all rows in contact by how it changes with r: constant forces of rows that slide have no part."""
     total = s.unknowns
     for a in range(total):
         w.found[a] = r[w.unknown[a]] / w.size[a]
@@ -411,7 +435,7 @@ def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
         la[w.unknown[a]] = w.found[a] / w.size[a]
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i) and w.slides[i] and not w.off[i]:
+        if has_friction(m, i) and w.slides[i] and not (w.off[i] or is_dry(m, i)):
             first = w.listed[m.tangent[i]]
             for c in range(first, first + m.tangents[i]):
                 la[c] = -m.friction[i] * la[j] * w.along[c]
@@ -455,6 +479,8 @@ def _weigh(s: Any, m: Model, w: Work) -> None:
         for b in range(count):
             if w.unknown[b] == w.listed[n]:
                 load = m.friction[n] * w.found[b] / w.size[b] if m.friction[n] < np.inf else w.found[b] / w.size[b]
+        if is_dry(m, n):
+            load = m.friction[n]
         w.weight[a] = max(load, 0.0) * w.size[count + a] ** 2
         most = max(most, w.weight[a])
     for a in range(s.unknowns - count):
@@ -470,7 +496,7 @@ def stiffness(s: Any, m: Model, w: Work, j: int) -> float:
     for a in range(s.na):
         w.r[a] = 0.0
     w.r[j] = 1.0
-    solve(s, m, w, w.r, w.trial)
+    respond(s, m, w, w.r, w.trial)
     return float(1.0 / w.trial[j]) if w.trial[j] != 0.0 else np.inf
 
 
@@ -494,7 +520,7 @@ def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
             out[i] = margin(m, w, i, w.la)
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i) and w.slides[i]:
+        if has_friction(m, i) and w.slides[i] and not is_dry(m, i):
             out[i] = stiffness(s, m, w, j)
 
 
@@ -543,7 +569,7 @@ def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
     force = -m.friction[i] * w.lam0[i]
     for j in range(s.na):
         w.r[j] = -force * (w.gram[j, c] * x + w.gram[j, c + 1] * y)
-    solve(s, m, w, w.r, w.la)
+    respond(s, m, w, w.r, w.la)
     w.la[c] += force * x
     w.la[c + 1] += force * y
     return float(1.0 / size)
@@ -551,11 +577,11 @@ def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
 
 @compiled
 def _within_bound(m: Model, i: int, lam: Array, normal: int, first: int) -> float:
-    """Mu lam_n - |lam_t| of contact i, whose rows stand at `normal` and from `first` on in lam."""
+    """By how much friction of contact i is below its bound; its rows stand at `normal` and from `first` on in lam."""
     square = 0.0
     for t in range(first, first + m.tangents[i]):
         square += lam[t] * lam[t]
-    return float(m.friction[i] * lam[normal] - np.sqrt(square))
+    return float(bound(m, i, lam[normal]) - np.sqrt(square))
 
 
 @compiled
@@ -573,5 +599,5 @@ def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
 
 @compiled
 def margin(m: Model, w: Work, i: int, la: Array) -> float:
-    """Mu lam_n - |lam_t| of contact i, from the multipliers of the rows in contact."""
+    """By how much friction of contact i is below its bound, from the multipliers of the rows in contact."""
     return float(_within_bound(m, i, la, w.listed[i], w.listed[m.tangent[i]]))

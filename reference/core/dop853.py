@@ -144,7 +144,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
             return -1.0
         watch_multipliers(s, m, w, stage)
         if stage == 4 or stage == 8 or stage == 10:
-            if s.na < s.nc:
+            if s.switching and s.na < s.nc:
                 watch_gaps(K, s, m, w, t, stage // 4 + stage // 10 - 1)
             if s.ng > 0:
                 watch_guards(K, s, m, w, t, stage // 4 + stage // 10 - 1)

@@ -25,7 +25,7 @@ from crossbody.reference.core.dop853 import (
     watch_guards,
     watch_multipliers,
 )
-from crossbody.reference.core.friction import NOTHING, SOLVE, TURN_PART, ask, has_friction
+from crossbody.reference.core.friction import NOTHING, RESPOND, TURN_PART, ask, has_friction, is_tangent
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -94,12 +94,12 @@ def _displace(s: Any, w: Work, c: int, step: float) -> None:
 def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
     """Subtract M^-1 H^T (G^-1)_.j (a0_j + 3 a2_j h_j^2, a1_j) H_j."""
     i = w.idx[j]
-    if s.frictional and w.slides[i] and not has_friction(m, i):
+    if s.frictional and w.slides[i] and is_tangent(m, i):
         return  # what slides has no law of its own
     w.r[: s.na] = 0.0
     w.r[j] = 1.0
     if s.frictional:
-        ask(SOLVE, s, m, w, NOTHING)
+        ask(RESPOND, s, m, w, NOTHING)
     else:
         solve_schur(w.G, s.na, w.reach, w.r, w.la)
     spring = w.law[i, 0] + 3.0 * w.law[i, 2] * w.ha[j] ** 2
@@ -313,7 +313,7 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
             s.have_jacobian = 0
             return np.inf
         watch_multipliers(s, m, w, stage)
-        if s.na < s.nc and 2 <= stage <= 4:
+        if s.switching and s.na < s.nc and 2 <= stage <= 4:
             watch_gaps(K, s, m, w, s.t + C[stage] * h, stage - 2)
         if s.ng > 0 and 2 <= stage <= 4:
             watch_guards(K, s, m, w, s.t + C[stage] * h, stage - 2)

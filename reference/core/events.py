@@ -15,7 +15,7 @@ from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
-from crossbody.reference.core.friction import NOTHING, TURNS_ASIDE, WATCH, ask
+from crossbody.reference.core.friction import NOTHING, TURNS_ASIDE, WATCH, ask, is_dry
 from crossbody.reference.core.guards import (
     CATCH,
     CONE,
@@ -78,8 +78,9 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
         other = CATCH if s.fsm == LEVEL else PRESS
         if s.frozen and m.beta[i, 0] > 0.0:
             other = TOUCH_INSIDE  # it collides at once, whatever presses it
-    w.kind[i] = kind
-    place = first_below(K, s, m, w, mode, kind, i)
+    dry = s.frictional and is_dry(m, i)  # it neither lets go nor jams
+    w.kind[i] = NONE if dry else kind
+    place = NEVER if dry else first_below(K, s, m, w, mode, kind, i)
     if other == CATCH and opens(s, w, i, min(place, 1.0)):
         return place
     if other != NONE:
@@ -87,7 +88,7 @@ def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
         if not second >= place:  # NaN too
             w.kind[i] = other
             place = second
-    if other in (STOP, CONE):
+    if other == CONE or (other == STOP and not dry):
         third = JAM if other == STOP else DRIFT
         second = first_below(K, s, m, w, mode, third, i)
         if not second >= place:
@@ -202,7 +203,8 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     for i in range(s.nc):
         hit[i] = NEVER
         kind[i] = NONE
-        if unilateral[i] and follows[i] < 0 and not w.idle_rows[i] and filters.row_may_switch(s, m, w, mode, i):
+        leads = unilateral[i] and (follows[i] < 0 or follows[i] == i)
+        if leads and not w.idle_rows[i] and filters.row_may_switch(s, m, w, mode, i):
             hit[i] = 1.0
             any_gap = True
             any_multiplier = any_multiplier or is_active(mode[i])

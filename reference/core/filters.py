@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import bogacki, dop853_table, esdirk
 from crossbody.reference.core.algebra import inverse_diagonal
-from crossbody.reference.core.friction import HOLDS_ON, ask, slip_along
+from crossbody.reference.core.friction import HOLDS_ON, ask, is_dry, slip_along
 from crossbody.reference.core.layout import (
     BETWEEN,
     COLLISION,
@@ -165,9 +165,9 @@ def row_may_switch(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     if mode[i] == COLLISION:
         return not (_presses_on(s, w, i) and _stays_elastic(s, w, i))
     if mode[i] == STICK:
-        return not (_presses_on(s, w, i) and ask(HOLDS_ON, s, m, w, i) > 0.0)
+        return not ((is_dry(m, i) or _presses_on(s, w, i)) and ask(HOLDS_ON, s, m, w, i) > 0.0)
     if mode[i] == SLIP:  # near a jam its multiplier grows without bound
-        return not (_presses_on(s, w, i) and _slides_on(s, m, w, i))
+        return not ((is_dry(m, i) or _presses_on(s, w, i)) and _slides_on(s, m, w, i))
     return mode[i] != CONTACT or not _presses_on(s, w, i)
 
 

@@ -22,9 +22,9 @@ DRIFT = 10.0  # times as much as has no direction, from which on a contact that 
 TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes may be off
 
 (
-    BEGIN, FACTOR, SOLVE, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS, HOLDS_ON,
-    BEGIN_SLIP, DECIDE,
-) = np.arange(14)  # fmt: skip
+    BEGIN, FACTOR, SOLVE, RESPOND, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS,
+    HOLDS_ON, BEGIN_SLIP, DECIDE,
+) = np.arange(15)  # fmt: skip
 NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun
 
 
@@ -36,8 +36,20 @@ def ask(what: int, s: Any, m: Model, w: Work, i: int) -> float:
 
 @compiled
 def has_friction(m: Model, i: int) -> bool:
-    """Whether row i is the normal row of a contact with friction."""
+    """Whether row i is the normal row of a contact with friction, or has dry friction of its own."""
     return bool(m.tangents[i] > 0)
+
+
+@compiled
+def is_dry(m: Model, i: int) -> bool:
+    """Whether row i has dry friction of its own: its own tangential row, always in contact, of a constant bound."""
+    return bool(m.tangent[i] == i)
+
+
+@compiled
+def bound(m: Model, i: int, normal: float) -> float:
+    """The most that friction of row i can be, where its normal row presses with `normal`."""
+    return float(m.friction[i] if is_dry(m, i) else m.friction[i] * normal)
 
 
 @compiled
@@ -122,7 +134,7 @@ def watch_slips(s: Any, m: Model, w: Work, stage: int) -> None:
 
 @compiled
 def is_tangent(m: Model, i: int) -> bool:
-    """Whether row i is a tangential row of a contact with friction."""
+    """Whether row i is a tangential row of a contact with friction, or has dry friction of its own."""
     return bool(m.follows[i] >= 0 and m.tangents[m.follows[i]] > 0)
 
 

@@ -13,6 +13,7 @@ from crossbody.reference.core.friction import (
     HOLDS_ON,
     MARGIN,
     RENEW,
+    RESPOND,
     SOLVE,
     STANDS,
     STIFFNESS,
@@ -31,6 +32,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
 
     FACTOR          A from G; i = 1 if directions of slip turn; 1 if it is not finite
     SOLVE           w.la from w.r
+    RESPOND         likewise, but for what slides with a bound of its own: how multipliers change with w.r
     STIFFNESS       what a multiplier of contact i does to its own gap
     MARGIN          how far contact i is from sliding
     WATCH           either of all contacts, into w.cones[i]
@@ -48,6 +50,8 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         return float(coulomb.factor(s, m, w, i != 0))
     if what == SOLVE:
         coulomb.solve(s, m, w, w.r, w.la)
+    elif what == RESPOND:
+        coulomb.respond(s, m, w, w.r, w.la)
     elif what == STIFFNESS:
         return float(coulomb.stiffness(s, m, w, w.listed[i]))
     elif what == MARGIN:

@@ -14,6 +14,7 @@ from crossbody.reference.core.friction import (
     MARGIN,
     STIFFNESS,
     ask,
+    bound,
     decided_to,
     has_begun,
     has_friction,
@@ -89,7 +90,7 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
         # A slip that grazes zero goes on; one that has just begun is known no better than a slip with no direction.
         w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + (1.0 if has_begun(w, i) else GRAZE) * small_slip(s)
     elif kind == CONE:
-        begun = max(ON_BOUND * m.friction[i] * abs(w.lams[0, i]), w.tolerated[i])
+        begun = max(ON_BOUND * bound(m, i, abs(w.lams[0, i])), w.tolerated[i])
         if w.cones[0, i] <= begun:
             w.bands[0] = 2.0 * begun
 

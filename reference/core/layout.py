@@ -35,6 +35,7 @@ OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
     "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight",
     "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
+    "pushed",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -69,6 +70,7 @@ STATE = np.dtype(
         ("has_control", "i8"),
         ("has_switch", "i8"),
         ("frictional", "i8"),  # some rows in contact have friction
+        ("dry", "i8"),  # and some have it by themselves, with a bound of their own
         ("friction_code", "i8"),  # where the code stands that answers for them
         ("instant_code", "i8"),  # and that which settles modes
         ("rtol", "f8"),
@@ -102,6 +104,7 @@ STATE = np.dtype(
         ("stalled", "i8"),
         ("cautious", "i8"),  # accepted steps until the last one that was rejected is forgotten
         ("hold", "i8"),
+        ("promised", "f8"),  # an implicit step, by the last explicit one
         ("trial_steps", "i8"),
         ("trial_rhs", "i8"),
         ("trial_t", "f8"),
@@ -175,8 +178,8 @@ class Model:
     follows: Index  # the row whose activity this row shares; -1 for none
     span: Index2  # (nc, 2) first column, and one past the last, of each row of H
     above: Index  # nearest lower coordinate that M couples each one to; -1 for none
-    friction: Floats  # (nc,) coefficient of each normal row
-    tangent: Index  # (nc,) its first tangential row,
+    friction: Floats  # (nc,) coefficient of each normal row; of one with dry friction of its own the bound itself
+    tangent: Index  # (nc,) its first tangential row, of one with dry friction itself,
     tangents: Index  # and how many there are, one behind the other; 0 without friction
     drift: Floats  # (nc,) velocity of a surface along a tangential row
 
@@ -338,6 +341,7 @@ class Work:
     turn_by: Floats  # by how much each turns
     turning: Index  # their places
     turned: Index  # pivots
+    pushed: Floats  # (nc,) right-hand sides less what forces of rows do that slide with a bound of their own
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)

@@ -121,6 +121,8 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             proposal = h * min(choice.grow(s, error), 1.0 if rejected else 6.0)
             s.h = max(s.h, proposal) if clipped and not rejected else proposal
             s.cautious = max(0, s.cautious - 1)
+            if s.method == EXPLICIT and s.stalled >= choice.STALLED_STEPS - 1:
+                s.promised = choice.promised_step(s, m, w, h)
             return _finish(K, s, m, w, b)
         s.rejected += 1
         rejected = True

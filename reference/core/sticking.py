@@ -19,8 +19,16 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import factor_lu, solve_lu
-from crossbody.reference.core.coulomb import factor_set, note_speed, solve, stiffness, without_pull
-from crossbody.reference.core.friction import count_from_none, decided_to, has_friction, slip, small_slip
+from crossbody.reference.core.coulomb import factor_set, note_speed, respond, solve, stiffness, without_pull
+from crossbody.reference.core.friction import (
+    bound,
+    count_from_none,
+    decided_to,
+    has_friction,
+    is_dry,
+    slip,
+    small_slip,
+)
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import FREE, NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.kinds import Array
@@ -161,7 +169,7 @@ def _turned_force(s: Any, m: Model, w: Work, j: int) -> None:
     x, y = -w.along[c + 1], w.along[c]
     for a in range(s.na):
         w.r[a] = -force * (w.gram[a, c] * x + w.gram[a, c + 1] * y)
-    solve(s, m, w, w.r, w.trial)
+    respond(s, m, w, w.r, w.trial)
     w.trial[c] += force * x
     w.trial[c + 1] += force * y
 
@@ -231,9 +239,11 @@ def _worst(s: Any, m: Model, w: Work) -> int:
             missing, becomes = -w.excess[j], STICK if w.stands[i] else SLIP
         else:
             missing, becomes = -w.load[j] * w.gram[j, j], FREE
+            if is_dry(m, i):
+                missing = -1.0
             other, then = -1.0, STICK
             if w.state[i] == STICK:
-                other, then = (_size(m, w, i, w.la) - m.friction[i] * max(w.la[j], 0.0)) * w.gram[j, j], SLIP
+                other, then = (_size(m, w, i, w.la) - bound(m, i, max(w.la[j], 0.0))) * w.gram[j, j], SLIP
             elif w.stands[i]:
                 other = max(-_ahead(m, w, i), abs(_aside(m, w, i)))
             if other > missing:
@@ -371,29 +381,30 @@ def _sweep(s: Any, m: Model, w: Work) -> None:
     for _ in range(SWEEPS):
         for j in range(s.na):
             i = w.idx[j]
-            if m.follows[i] >= 0 and has_friction(m, m.follows[i]):
+            if m.follows[i] >= 0 and has_friction(m, m.follows[i]) and not is_dry(m, i):
                 continue
-            _relax(s, m, w, j)
-            if m.unilateral[i]:
-                w.la[j] = max(w.la[j], 0.0)
+            if not is_dry(m, i):
+                _relax(s, m, w, j)
+                if m.unilateral[i]:
+                    w.la[j] = max(w.la[j], 0.0)
             if has_friction(m, i):
-                first, last = _first(m, w, i), _first(m, w, i) + m.tangents[i]
+                first, last, most = _first(m, w, i), _first(m, w, i) + m.tangents[i], bound(m, i, w.la[j])
                 for c in range(first, last):
                     if w.stands[i]:
                         _relax(s, m, w, c)
                     else:
-                        w.la[c] = -m.friction[i] * w.la[j] * w.along[c]
+                        w.la[c] = -most * w.along[c]
                 size = _size(m, w, i, w.la)
                 for c in range(first, last):
-                    w.la[c] *= min(1.0, m.friction[i] * w.la[j] / size) if size > 0.0 else 1.0
+                    w.la[c] *= min(1.0, most / size) if size > 0.0 else 1.0
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
             if w.stands[i]:
                 _aim(m, w, i)
-            if w.la[j] * w.gram[j, j] <= decided_to(s):
+            if w.la[j] * w.gram[j, j] <= decided_to(s) and not is_dry(m, i):
                 _put(m, w, i, FREE)
-            elif w.stands[i] and _size(m, w, i, w.la) < (1.0 - CLEAR) * m.friction[i] * w.la[j]:
+            elif w.stands[i] and _size(m, w, i, w.la) < (1.0 - CLEAR) * bound(m, i, w.la[j]):
                 _put(m, w, i, STICK)
             else:
                 _put(m, w, i, SLIP)
@@ -424,7 +435,7 @@ def _vary(s: Any, m: Model, w: Work, number: int) -> int:
                 for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
                     w.way[w.idx[c]] = -w.way[w.idx[c]]
             elif digit == 3 or (digit == 1 and not w.stands[i]) or digit == start_digit(start):
-                state = FREE
+                state = start if is_dry(m, i) else FREE
             _put(m, w, i, state)
     return changed
 
@@ -590,6 +601,6 @@ def _jammed(s: Any, m: Model, w: Work) -> int:
     for j in range(s.na):
         i = w.idx[j]
         off = abs(w.excess[j]) > DIFFERENT * s.push_scale
-        if has_friction(m, i) and w.state[i] == SLIP and (off or not stiffness(s, m, w, j) > 0.0):
+        if has_friction(m, i) and w.state[i] == SLIP and not is_dry(m, i) and (off or not stiffness(s, m, w, j) > 0.0):
             return int(i)
     return -1

@@ -147,7 +147,7 @@ class _Walk:
         self.at, self.over, self.rtol = at, over, rtol
         self.x = np.concatenate([at.q, at.v])
         self.S = np.hstack([np.eye(2 * n), np.zeros((2 * n, len(over.names)))])
-        self.modes = initial_modes(at.system).astype(int).tolist()
+        self.modes = initial_modes(at.system, at.q, at.v).astype(int).tolist()
         self.jumps: list[Jump] = []
 
     def along(self, run: Trajectory, t_end: float) -> Outcome:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import root
 
 from crossbody.cases import Mode, Outcome
-from crossbody.reference._system import System
+from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import LevelMachine, View
@@ -59,14 +59,18 @@ class Tried:
 class FrictionMachine(LevelMachine):
     """The level machine with STICK and SLIP; see `LevelMachine`."""
 
-    def __init__(self, system: System, equations: Equations, rtol: float, tolerance: float) -> None:
+    def __init__(
+        self, system: System, equations: Equations, rtol: float, tolerance: float, start: tuple[Floats, Floats]
+    ) -> None:  # fmt: skip
         super().__init__(system, equations)
         self.rtol, self.tolerance, self.watch, self.system = rtol, tolerance, system.watch, system
         self.sliding = Sliding(system, equations)
         self.ways: dict[int, Floats] = {}
         self.begun: set[int] = set()
         self.alarms: list[Alarm] = []
-        self._joining, self._stops, self._begins = set[int](), set[int](), dict[int, Floats]()
+        self.modes = [Mode(mode) for mode in initial_modes(system, *start).tolist()]
+        self.rows = sorted({*self.rows, *self.sliding.dry})
+        self._joining, self._stops, self._begins = set(self.sliding.dry), set[int](), dict[int, Floats]()
         self._stopped = set[int]()
         self._jump, self._rounds, self._at = True, 0, -np.inf
 
@@ -196,9 +200,9 @@ class FrictionMachine(LevelMachine):
                 continue
             slip = self.sliding.slip(seen, i)
             size = float(np.linalg.norm(slip))
-            slides = self.modes[i] == Mode.SLIP and i not in self._stops
+            slides = self.modes[i] == Mode.SLIP and i not in self._stops and i in self.ways
             slides = slides and not (self._jump and size <= self.small)
-            if (slides and i in self.ways) or (i in joins and size > STILL * self.small):
+            if slides or (i in joins and size > STILL * self.small):
                 ways[i] = self.direction(i, slip) if slides else slip / size
             else:
                 self._stands.add(i)
@@ -268,11 +272,11 @@ class FrictionMachine(LevelMachine):
                     (-tried.excess[k], self._pressed(i, {j: w for j, w in tried.ways.items() if j not in self._stands}))
                 ]
             else:
-                off = [(-tried.lam[k] * heavy, Mode.FREE)]
+                off = [(-tried.lam[k] * heavy, Mode.FREE)] if i not in self.sliding.dry else [(-1.0, mode)]
                 ways = [seen.at[t] for t in self.sliding.ways.get(i, ())]
                 if mode == Mode.STICK:
                     force = float(np.linalg.norm(tried.lam[ways]))
-                    off.append(((force - self.sliding.mu[i] * max(tried.lam[k], 0.0)) * heavy, Mode.SLIP))
+                    off.append(((force - max(self.sliding.bound(seen, tried.lam, i), 0.0)) * heavy, Mode.SLIP))
                 elif mode == Mode.SLIP and i in self._stands:
                     off.append((-float(tried.ways[i] @ tried.excess[ways]), Mode.STICK))
                     if len(ways) > 1:
@@ -312,16 +316,18 @@ class FrictionMachine(LevelMachine):
             before = lam.copy()
             for i in modes:
                 k = seen.at[i]
-                lam[k] = max(0.0, lam[k] + (seen.bare[k] - seen.G[k] @ lam) / own[k])
+                if i not in self.sliding.dry:
+                    lam[k] = max(0.0, lam[k] + (seen.bare[k] - seen.G[k] @ lam) / own[k])
                 for row in self.sliding.tied.get(i, ()):
                     c = seen.at[row]
                     lam[c] += (seen.bare[c] - seen.G[c] @ lam) / own[c]
                 along = [seen.at[t] for t in self.sliding.ways.get(i, ())]
+                bound = self.sliding.bound(seen, lam, i)
                 if i in fixed:
-                    lam[along] = -self.sliding.mu[i] * lam[k] * fixed[i]
+                    lam[along] = -bound * fixed[i]
                 elif along:
                     step = lam[along] + (seen.bare[along] - seen.G[along] @ lam) / own[along].max()
-                    size, bound = float(np.linalg.norm(step)), self.sliding.mu[i] * lam[k]
+                    size = float(np.linalg.norm(step))
                     lam[along] = step * (bound / size) if size > bound else step
             if np.abs(lam - before).max() <= SETTLED * np.abs(lam).max():
                 break
@@ -330,8 +336,8 @@ class FrictionMachine(LevelMachine):
         excess, found, ways = seen.G @ lam - seen.bare, dict(modes), dict(fixed)
         for i in modes:
             along = [seen.at[t] for t in self.sliding.ways.get(i, ())]
-            size, bound = float(np.linalg.norm(lam[along])), self.sliding.mu[i] * lam[seen.at[i]]
-            if lam[seen.at[i]] * own[seen.at[i]] <= limit:
+            size, bound = float(np.linalg.norm(lam[along])), self.sliding.bound(seen, lam, i)
+            if lam[seen.at[i]] * own[seen.at[i]] <= limit and i not in self.sliding.dry:
                 found[i] = Mode.FREE
             elif i in self._stands and size < (1.0 - WITHIN) * bound:
                 found[i] = Mode.STICK
@@ -359,12 +365,15 @@ class FrictionMachine(LevelMachine):
                 add(i, "LEAVE", 1)
                 add(i, "CATCH", 2)
             else:
-                add(i, "RELEASE", 1)
+                dry = i in self.sliding.dry
+                if not dry:
+                    add(i, "RELEASE", 1)
                 if mode == Mode.STICK:
                     add(i, "CONE", 1)
                 elif mode == Mode.SLIP:
                     add(i, "STOP", 2)
-                    add(i, "JAM", 1)
+                    if not dry:
+                        add(i, "JAM", 1)
         for k in range(self.system.guards if self.watch is not None else 0):
             add(k, "WATCH", 1, armed=False)
 
@@ -391,7 +400,7 @@ class FrictionMachine(LevelMachine):
                 found.append(lam[seen.at[i]])
             elif tells == "CONE":
                 force = np.linalg.norm(bare[[seen.at[w] for w in self.sliding.ways[i]]])
-                found.append(self.sliding.mu[i] * bare[seen.at[i]] - force)
+                found.append(self.sliding.bound(seen, bare, i) - float(force))
             elif tells == "STOP":
                 slip = self.sliding.slip(seen, i)
                 near = float(np.linalg.norm(slip)) - STILL * self.small if len(slip) > 1 else -1.0

@@ -183,7 +183,7 @@ class FrictionRun(SundialsRun):
         super().start()
 
     def _machine(self, e: Equations) -> LevelMachine:
-        self.friction = FrictionMachine(self.system, e, self.options.rtol, self.options.tolerance)
+        self.friction = FrictionMachine(self.system, e, self.options.rtol, self.options.tolerance, (self.q0, self.v0))
         return self.friction
 
     def _scene(self, nz: int, scale: float) -> Any:

@@ -18,7 +18,7 @@ from enum import IntEnum
 import numpy as np
 
 from crossbody.cases import Event, Mode, Outcome
-from crossbody.reference._system import System, initial_modes
+from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.compiled.evaluation import LIFTED, Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
@@ -100,7 +100,7 @@ class LevelMachine:
         self.follows = np.asarray(system.follows).tolist()
         self.switching = np.asarray(system.unilateral, dtype=bool).tolist()
         self.rows = [i for i in range(system.nc) if self.switching[i] and self.follows[i] < 0]
-        self.modes: list[Mode] = [Mode(mode) for mode in initial_modes(system).tolist()]
+        self.modes: list[Mode] = [Mode.BILATERAL if held else Mode.FREE for held in system.held]
         self.events: list[Event] = []
         self.frozen: frozenset[int] = frozenset()
         self.work = np.zeros(system.nc)

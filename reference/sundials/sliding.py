@@ -1,4 +1,4 @@
-"""Contacts with Coulomb friction in whole matrices: forces of any set of modes, by singular values (spec 7.1, 7.3).
+"""Coulomb friction of contacts, dry friction of rows: forces of any set of modes, by singular values (spec 7.1, 7.3).
 
 With G = H M^-1 H^T of all rows in contact and b what their laws ask for, a set of modes has G lam = b in the rows that
 are solved for, and lam_t = -mu lam_n s in those that slide. Where these depend on each other the normal rows come
@@ -60,6 +60,7 @@ class Sliding:
         first, count = np.asarray(system.tangent), np.asarray(system.tangents)
         self.ways = {i: list(range(first[i], first[i] + count[i])) for i in np.flatnonzero(count).tolist()}
         self.normal = {t: i for i, ways in self.ways.items() for t in ways}
+        self.dry = set(np.flatnonzero(system.dry).tolist())
         self.tied: dict[int, list[int]] = {}
         for t, i in enumerate(np.asarray(system.follows).tolist()):
             if i >= 0 and t not in self.normal:
@@ -73,7 +74,7 @@ class Sliding:
             Ended: NOT_FINITE or ILL_POSED.
         """
         e = self.equations
-        rows = sorted(row for i in contacts for row in (i, *self.ways.get(i, ()), *self.tied.get(i, ())))
+        rows = sorted({row for i in contacts for row in (i, *self.ways.get(i, ()), *self.tied.get(i, ()))})
         with e._selected(rows):
             M, f = e.terms(t, q, v)
             H, h, Hdv = (a.copy() for a in e.rows(t, q, v))
@@ -91,6 +92,10 @@ class Sliding:
         bare = -(H @ vd + Hdv) - np.where(slides, 0.0, law)
         return Seen(rows, {row: k for k, row in enumerate(rows)}, H @ X, bare, np.where(slides, -law, 0.0), rate, X, vd)
 
+    def bound(self, seen: Seen, lam: Floats, i: int) -> float:
+        """The most that friction of contact i can be under the multipliers lam (m,), N."""
+        return float(self.mu[i] if i in self.dry else self.mu[i] * lam[seen.at[i]])
+
     def slip(self, seen: Seen, i: int) -> Floats:
         """Slip velocity (1,) or (2,) of contact i, m/s."""
         return seen.rate[[seen.at[t] for t in self.ways[i]]]
@@ -103,12 +108,12 @@ class Sliding:
         for row, k in seen.at.items():
             i = self.normal.get(row, row)
             if i in self.ways and modes[i] == Mode.SLIP:
-                if row == i:
+                if row == i and i not in self.dry:
                     places = [seen.at[t] for t in self.ways[i]]
                     columns[:, k] -= self.mu[i] * (seen.G[:, places] @ ways[i])
                     first.append(k)
             else:
-                (first if row == i else last).append(k)
+                (first if row not in self.normal and row == i else last).append(k)
         places = first + last
         own = np.diag(seen.G)
         beside = np.array([seen.at[self.normal.get(seen.rows[k], seen.rows[k])] for k in places], dtype=int)
@@ -128,7 +133,11 @@ class Sliding:
         if not len(lam):
             return lam
         places, count, A, size = self.system_of(seen, modes, ways)
-        b = (seen.bare + seen.pull if pulled else seen.bare)[places] / size
+        for i in (i for i in self.dry & ways.keys() if modes[i] == Mode.SLIP):
+            lam[seen.at[i]] = -self.mu[i] * ways[i][0]
+        b = ((seen.bare + seen.pull if pulled else seen.bare) - seen.G @ lam)[places] / size
+        if not places:  # all that there is slides with a bound of its own
+            return lam
         left, values, right = np.linalg.svd(A)
         if values[-1] > DEPENDENT * values[0]:
             x = right.T @ ((left.T @ b) / values)
@@ -137,7 +146,7 @@ class Sliding:
             x = self._in_turn(seen, places, count, A, b, size)
         lam[places] = x / size
         for i, way in ways.items():
-            if modes[i] == Mode.SLIP:
+            if modes[i] == Mode.SLIP and i not in self.dry:
                 lam[[seen.at[t] for t in self.ways[i]]] = -self.mu[i] * lam[seen.at[i]] * way
         return lam
 
@@ -155,6 +164,7 @@ class Sliding:
             for k, place in enumerate(places[count:]):
                 i = self.normal.get(seen.rows[place], -1)
                 load = x[places.index(seen.at[i])] / size[places.index(seen.at[i])] if i >= 0 else 0.0
+                load = 1.0 if i in self.dry else load
                 bound[k] = (self.mu[i] if i >= 0 else 1.0) * max(load, 0.0) * size[count + k] ** 2
             most = bound.max()
             weight = np.sqrt(np.maximum(bound, LIGHT * most) if most > 0.0 else np.ones(len(bound)))

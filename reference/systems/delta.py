@@ -24,10 +24,14 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
 
 
 def check_start(parameters: Mapping[str, Any], q0: Floats, v0: Floats) -> None:
-    """Raise SceneError for a start that does not close the loops; it offers one that does."""
+    """Raise SceneError for a start that does not close the loops, and InvalidValue for a path that cannot be followed.
+
+    It offers a start that does.
+    """
     scene.check_start(parameters, q0, v0)
+    scene.program_of(parameters)
 
 
 def listed(p: Floats) -> dict[str, Any]:
-    """What the parity audit lists: masses of the bodies arm by arm (kg) and gravity, from the parameter array."""
-    return {"masses": np.tile([p[4], p[5], p[6] / 3], 3), "gravity": float(p[8])}
+    """What the parity audit lists, from the parameter array: what moves as one, arm by arm, kg, and gravity."""
+    return {"masses": np.tile([p[4], p[5] + p[6] / 3], 3), "gravity": float(p[8])}

@@ -46,8 +46,9 @@ COUNT, STIFF, DAMP, BAND, FIRST, POINTS = 0, 1, 4, 8, 11, -3
 # A constraint row: kind, sign or component, places of coordinates, and numbers of its own.
 KIND, ROW = 0, 24
 LIMIT, TENDON_LIMIT, JOINT_LOOP, CONNECT, CONTACT, TURN, TENDON_LOOP, STRING, BALL_LIMIT, TANGENT = range(10)
+DRY_JOINT, DRY_TENDON, DRY_STRING = range(10, 13)  # friction of a velocity, of a sum of joints, of a distance
 LED, LEADS, POLYNOMIAL = 1, 4, 7  # of a coupling: coordinate and velocity, or tendon; where it rests; coefficients
-OF_POSES = (CONNECT, CONTACT, TURN, STRING, TANGENT)
+OF_POSES = (CONNECT, CONTACT, TURN, STRING, TANGENT, DRY_STRING)
 
 # What is kept of a node while it is computed: pose (rotation by rows, position from its tree's root), velocity,
 # acceleration without v', force, inertia, and of a root its origin in the world; of a degree of freedom: its motion

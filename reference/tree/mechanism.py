@@ -90,6 +90,10 @@ def _row(q: Array, v: Array, p: Array, i: int) -> Any:
         return p[o + 1] * (q[int(p[o + 2].real)] - p[o + 4]), p[o + 1] * v[int(p[o + 3].real)], 0.0 * v[0]
     if kind == layout.BALL_LIMIT:
         return balls.bound(q, v, p, o)
+    if kind == layout.DRY_JOINT:
+        return 0.0 * q[0], v[int(p[o + 3].real)], 0.0 * v[0]
+    if kind == layout.DRY_TENDON:
+        return 0.0 * q[0], forces.rate(v, p, forces.tendon(p, int(p[o + 2].real))), 0.0 * v[0]
     if kind == layout.TENDON_LIMIT:
         at = forces.tendon(p, int(p[o + 2].real))
         return p[o + 1] * (forces.length(q, p, at) - p[o + 3]), p[o + 1] * forces.rate(v, p, at), 0.0 * v[0]
@@ -104,11 +108,11 @@ def _gradient(q: Array, v: Array, p: Array, i: int, H: Array) -> None:
     """Fill H (n,) of row i where it is not zero."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     kind = int(p[o].real)
-    if kind == layout.LIMIT:
+    if kind in (layout.LIMIT, layout.DRY_JOINT):
         H[int(p[o + 3].real)] = p[o + 1]
     elif kind == layout.BALL_LIMIT:
         balls.bound_columns(q, p, o, H)
-    elif kind == layout.TENDON_LIMIT:
+    elif kind in (layout.TENDON_LIMIT, layout.DRY_TENDON):
         forces.pull(p, forces.tendon(p, int(p[o + 2].real)), p[o + 1] + 0.0 * q[0], H)
     else:
         y = _followed(q, v, p, kind, o + layout.LEADS)[0]
@@ -160,8 +164,10 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
             h[i], hd[i], _ = loops.connect(p, i, w)
         elif kind == layout.TURN:
             h[i], hd[i], _ = loops.turn(p, i, w)
-        elif kind == layout.STRING:
+        elif kind in (layout.STRING, layout.DRY_STRING):
             h[i], hd[i], _ = strings.string(p, i, w)
+            if kind == layout.DRY_STRING:
+                h[i] = 0.0 * w[0]
         elif kind == layout.CONTACT:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
@@ -190,8 +196,10 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
         elif kind == layout.TURN:
             h[j], _, Hdv[j] = loops.turn(p, idx[j], w)
             loops.turn_columns(p, idx[j], w, H[j])
-        elif kind == layout.STRING:
+        elif kind in (layout.STRING, layout.DRY_STRING):
             h[j], _, Hdv[j] = strings.string(p, idx[j], w)
+            if kind == layout.DRY_STRING:
+                h[j] = 0.0 * w[0]
             strings.string_columns(p, idx[j], w, H[j])
         elif kind == layout.CONTACT:
             at, (gap, n, place) = _contact(p, w, idx[j])

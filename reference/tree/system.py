@@ -34,15 +34,18 @@ def activations(scene: Scene, act0: Floats | None) -> Activations:
 
 
 def _friction(scene: Scene, nc: int) -> dict[str, Any]:
-    """Return which normal row each tangential row follows, and its coefficient."""
-    met, follows, mu = contacts(scene), np.full(nc, -1), np.full(nc, np.inf)
-    normal, row = nc - sum(len(one.rows) for one in met), nc - sum(len(one.tangents) for one in met)
+    """Return which normal row each tangential row follows, its coefficient, and bounds of dry friction of its own."""
+    met, follows, mu, loss = contacts(scene), np.full(nc, -1), np.full(nc, np.inf), np.zeros(nc)
+    own = [part.friction_loss for part, width in scene.dry for _ in range(width)]
+    first = nc - len(own)
+    loss[first:] = own
+    normal, row = first - sum(len(one.rows) for one in met), first - sum(len(one.tangents) for one in met)
     for contact in met:
         count = len(contact.tangents)
         follows[row : row + count] = normal + np.arange(count) // len(WAYS)
         mu[row : row + count] = contact.friction
         normal, row = normal + contact.places, row + count
-    return {"follows": follows, "mu": mu}
+    return {"follows": follows, "mu": mu, "friction_loss": loss}
 
 
 def system(

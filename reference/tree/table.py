@@ -6,7 +6,7 @@ its parent is T0 + c T1 + s T2, with c, s = cos, sin of a hinge's angle or c = t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -320,6 +320,11 @@ class _Builder:
             )  # fmt: skip
         return row
 
+    def ends(self, tendon: Tendon) -> list[float]:
+        """Return where the points of a tendon are: a node and a point in its frame, twice."""
+        placed = zip(tendon.bodies, tendon.positions, strict=True)
+        return [float(number) for end in placed for number in self.placed(*end)]
+
     def _tendon(self, i: int, tendon: Tendon) -> Floats:
         b0, *others = tendon.damping
         b0 += sum(a.gear[0] ** 2 * a.damping for a in self.scene.actuators if a.tendon == tendon.name)
@@ -327,8 +332,7 @@ class _Builder:
         bend = self._bend(layout.SPRING_BENDS, i, any(tendon.stiffness) and _bends(tendon.rest))
         spring = *tendon.stiffness, b0, *others, drag, *tendon.rest, bend
         if tendon.bodies:
-            ends = [self.placed(*end) for end in zip(tendon.bodies, tendon.positions, strict=True)]
-            return np.array([layout.POINTS, *spring, *ends[0], *ends[1], 0.0])
+            return np.array([layout.POINTS, *spring, *self.ends(tendon), 0.0])
         steps = [
             (self.coordinates[name], self.dofs[name], c)
             for name, c in zip(tendon.joints, tendon.coefficients, strict=True)
@@ -363,7 +367,7 @@ def _pose(joint: Joint, before: Place) -> tuple[Floats, Floats, Floats]:
 
 
 def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
-    """Return the rows: loops, bounds of joints, bounds of tendons, contacts of shapes."""
+    """Return the rows: loops, bounds of joints, bounds of tendons, contacts of shapes, dry friction."""
     rows: list[Floats] = []
     for loop in scene.loops:
         rows += _loop(loop, builder)
@@ -376,8 +380,7 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
                 continue
             beyond = bound + sign * tendon.margin
             if tendon.bodies:
-                ends = [builder.placed(*end) for end in zip(tendon.bodies, tendon.positions, strict=True)]
-                rows.append(_row(layout.STRING, sign, *ends[0], *ends[1], beyond))
+                rows.append(_row(layout.STRING, sign, *builder.ends(tendon), beyond))
             else:
                 rows.append(_row(layout.TENDON_LIMIT, sign, i, beyond))
     met = contacts(scene)
@@ -386,7 +389,19 @@ def constraint_rows(scene: Scene, builder: _Builder) -> list[Floats]:
     for i, contact in enumerate(met):
         for row in _contact_rows(contact, i, builder) if contact.friction > 0.0 else ():
             rows += [_tangent(row, across) for across in range(2)]
-    return rows
+    return [*rows, *_dry(scene, builder)]
+
+
+def _dry(scene: Scene, builder: _Builder) -> Iterator[Floats]:
+    """Return the rows of dry friction."""
+    for part, width in scene.dry:
+        if isinstance(part, Joint):
+            first = builder.dofs[part.name]
+            yield from (_row(layout.DRY_JOINT, 1.0, 0.0, first + k) for k in range(width))
+        elif part.bodies:
+            yield _row(layout.DRY_STRING, 1.0, *builder.ends(part))
+        else:
+            yield _row(layout.DRY_TENDON, 1.0, scene.tendons.index(part))
 
 
 def _tangent(row: Floats, across: int) -> Floats:

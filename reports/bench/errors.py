@@ -11,6 +11,7 @@ import numpy as np
 from crossbody import engines
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.cases.scene_contacts import frictional
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import law_of, truth_of
 from crossbody.reports.measuring.truth import Truth
@@ -49,7 +50,8 @@ class Truths:
 
     def _followed(self, run: Any) -> Case | None:
         case, followed = self.case, run.follows
-        if followed is None and run.settings.get("law") == "memoryless" and case.law.unilateral.any():
+        rubs = case.scene is not None and frictional(case.scene)  # contacts that slide have one machine alone
+        if followed is None and not rubs and run.settings.get("law") == "memoryless" and case.law.unilateral.any():
             followed = replace(case, fsm="memoryless", collisions="resolved", closed_form=None)
         same = followed is None or (followed.fsm, followed.collisions) == (case.fsm, case.collisions)
         return None if same else followed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -16,12 +17,13 @@ from crossbody.engines import importers
 from crossbody.reports import voice
 from crossbody.reports.importers import told
 from crossbody.reports.importers.audit import Audit, audited
-from crossbody.reports.importers.causes import advice, explained
+from crossbody.reports.importers.causes import advice, explained, parts
 from crossbody.reports.importers.compare import FAILED, OK, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
 from crossbody.reports.importers.fix import MARK, fixed
 from crossbody.reports.importers.lines import files_of
 
-WIDTH, FIRST = 80, 13
+WIDTH, FIRST, COLUMN = 80, 13, 11
+"""Columns of a page at most, of the names of quantities, and of an engine at least."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +37,7 @@ class Ask:
         seconds: what an importer may take.
         explain: whether causes are looked for.
         fix, sarif, markdown: files to write.
-        force: whether `fix` may write over a file that was not written so.
+        force: whether these may be written over what was not written so.
     """
 
     path: Path
@@ -83,16 +85,17 @@ def audit(ask: Ask) -> int:
 def _check_out(ask: Ask) -> None:
     """Check that nothing is written over what is read, and no file of somebody's over."""
     read = files_of(ask.path)
-    for option, out in (("--fix", ask.fix), ("--sarif", ask.sarif), ("--markdown", ask.markdown)):
-        if out is not None and out.resolve() in read:
-            raise OutputError(f"{option} {shown(str(out))}: it must be another file than {ask.path} and what it reads.")
-    if ask.fix is None:
-        return
-    if not ask.fix.parent.is_dir():
-        raise OutputError(f"--fix {shown(str(ask.fix))}: there is no folder {shown(str(ask.fix.parent))}.")
-    if ask.fix.exists() and not ask.force and not (ask.fix.is_file() and MARK in ask.fix.read_text("utf-8", "replace")):
-        raise OutputError(f"--fix {shown(str(ask.fix))}: there is such a file, which was not written by --fix; valid: "
-                          "another name, or --force, which writes over it.")  # fmt: skip
+    options = (("--fix", ask.fix, MARK), ("--sarif", ask.sarif, told.MARK), ("--markdown", ask.markdown, told.MARK))
+    for option, out, mark in ((option, out, mark) for option, out, mark in options if out is not None):
+        here = f"{option} {shown(str(out))}"
+        if out.resolve() in read:
+            raise OutputError(f"{here}: it must be another file than {ask.path}, what it reads and what is written.")
+        if not out.parent.is_dir():
+            raise OutputError(f"{here} cannot be written: there is no folder {shown(str(out.parent))}.")
+        if out.exists() and not ask.force and not (out.is_file() and mark in out.read_text("utf-8", "replace")):
+            raise OutputError(f"{here}: there is such a file, which was not written by {option}; valid: another name, "
+                              "or --force, which writes over it.")  # fmt: skip
+        read.add(out.resolve())
 
 
 def _fix(ask: Ask, out: Path) -> int:
@@ -109,7 +112,7 @@ def read_by_all(ask: Ask) -> tuple[Audit, list[Row]]:
         found = audit_of
         rows += own
         if len(wanted) > 1:
-            voice.note(textwrap.shorten(f"{name}: {summary(own)}", WIDTH - len("crossbody: "), placeholder=" ..."))
+            voice.note(textwrap.shorten(f"{name}: {summary(own)}", _width() - len("crossbody: "), placeholder=" ..."))
     if found is None:
         asked = ", ".join(wanted)
         raise EngineUnavailable(f"None of these is installed: {asked}; pip install 'crossbody[engines]' brings two.")
@@ -143,7 +146,7 @@ def _show(found: Audit, rows: Sequence[Row]) -> None:
         _say(f"{found.path.name}: {', '.join(f'{count} {name}' for name, count in counts.items())}")
         for text in (*found.findings, *filter(None, found.strange.values())):
             _say(text)
-        print("\n".join(table(rows)))
+        print("\n".join(table(rows, _width())))
     for row in rows:
         if row.verdict in (WRONG, FAILED) or (row.verdict in (UNSUPPORTED, UNSEEN) and not voice.quiet()):
             _say(told.sentence(row))
@@ -164,19 +167,30 @@ def _explain(path: Path, rows: Sequence[Row]) -> None:
         if cause:
             _say(f"{Path(own[0].file).name}:{own[0].line}: {doubt} {cause} ({engine}: {what})")
             _say(advice(cause))
-            _say(f"    The smallest file that shows it: crossbody conformance --feature '{cause}' -e {engine}")
+            for one in parts(cause):
+                _say(f"    The smallest file that shows it: crossbody conformance --feature '{one}' -e {engine}")
         else:
             _say(f"{engine}: {what}: no feature of the table that this file uses explains it.")
 
 
+def _width() -> int:
+    """Return the columns that a page has."""
+    return min(WIDTH, max(shutil.get_terminal_size((WIDTH, 24)).columns, FIRST + COLUMN))
+
+
 def _say(text: str) -> None:
     text = " ".join("".join(one if one.isprintable() else "?" for one in word) for word in text.split())
-    print(textwrap.fill(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False))
+    print(textwrap.fill(text, _width(), subsequent_indent="    ", break_on_hyphens=False))
 
 
-def table(rows: Sequence[Row]) -> list[str]:
-    """Return lines of 80 columns: quantities down, engines across."""
-    lines = told.grid(rows)
-    width = min((WIDTH - FIRST) // max(len(lines[0]) - 1, 1), 16)
-    made = ["".join([first.ljust(FIRST), *(text[: width - 1].rjust(width) for text in rest)]) for first, *rest in lines]
-    return ["", *(line.rstrip() for line in made), ""]
+def table(rows: Sequence[Row], columns: int = WIDTH) -> list[str]:
+    """Return lines of so many columns: quantities down, engines across, one table below another where they are many."""
+    lines, made = told.grid(rows), list[str]()
+    most = max((columns - FIRST) // COLUMN, 1)
+    for k in range(1, len(lines[0]), most):
+        part = [[first, *rest[k - 1 : k - 1 + most]] for first, *rest in lines]
+        width = min((columns - FIRST) // (len(part[0]) - 1), 16)
+        made.append("")
+        made += ["".join([first.ljust(FIRST), *(text[: width - 1].rjust(width) for text in rest)]).rstrip()
+                 for first, *rest in part]  # fmt: skip
+    return [*made, ""]

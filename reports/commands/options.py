@@ -39,10 +39,13 @@ class _Positive(click.FloatRange):
         return found
 
 
+ABOVE_0 = _Positive(0.0, min_open=True)
+
+
 def time_limit(text: str, seconds: float = 3660.0) -> Callable[[_Work], _Work]:
     """--time-limit, as `limit`, with what happens then."""
     return click.option(
-        "--time-limit", "limit", type=_Positive(0.0, min_open=True), default=seconds, show_default=True, metavar="S",
+        "--time-limit", "limit", type=ABOVE_0, default=seconds, show_default=True, metavar="S",
         help=text,
     )  # fmt: skip
 

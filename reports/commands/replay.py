@@ -128,7 +128,7 @@ def run_identify(
     Args:
         ask: log, map and model.
         free: names of the parameters; "delay" is that of the measured coordinates.
-        hold: every so manieth window is held out.
+        hold: every hold-th window is held out of the fit; 0 for none.
         starts: "auto", "measured" or "free".
         stride: of so many samples one is compared.
         budget: time that the search may take, s.
@@ -165,7 +165,8 @@ def run_identify(
     limits.check(asked, found, (limits.HELD,))
     rows = replay.verdicts(found, command, asked, fit)
     tables["held_out"]["verdict"] = _held_verdicts(fit, rows)
-    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables, "identify")
+    drawn = {"identify-profile": replay.profile(fit), "identify-correlation": replay.correlation(fit)}
+    _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables | drawn, "identify")
     more = {"warnings": pd.DataFrame({"text": list(fit.warnings)}), "metrics": _metrics(found, rows)}
     if not voice.told_as_json(tables | more):
         if not voice.quiet():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 from crossbody.cases import SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
-from crossbody.cases.files.inertias import of_shapes, six
+from crossbody.cases.files.inertias import Inertia, of_shapes, six
 from crossbody.cases.files.reading import findings_of, is_urdf, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.files.urdf import bounds, parsed, planar
@@ -23,9 +23,14 @@ from crossbody.cases.files.without import without_meshes
 from crossbody.cases.scene import Body, Scene
 from crossbody.engines.importers import SECONDS, Reading
 from crossbody.reports.importers.compare import Row, rows
+from crossbody.reports.importers.declared import excused
 from crossbody.reports.importers.expected import expected, job_of
+from crossbody.reports.importers.forms import Forms
 from crossbody.reports.importers.lines import named as lines_named
+from crossbody.reports.importers.solids import SINGLE
 
+FIRST, BEHIND = "mujoco", 5
+"""Reader whose answer is to be there first, as the other yardstick, and how much nicer the others are to it and us."""
 KEYS = 4
 """Keyframes at which importers are compared beside the random states."""
 
@@ -77,14 +82,15 @@ def audited(
         left_out.add("actuators")  # of transmissions, which move nothing by themselves
     with TemporaryDirectory(prefix="crossbody-audit-") as folder:
         given = meshless(path, Path(folder)) if is_urdf(path) and without_meshes(without) else path
-        readings = [Reading(name, given, is_urdf(path), seconds) for name in engines]
+        readings = [Reading(name, given, is_urdf(path), seconds, int(name != FIRST) * BEHIND) for name in engines]
         try:
             found = audit or opened(path, without)
         except BaseException:
             for reading in readings:
                 reading.abandon()
             raise
-        yield from _answered(found, readings, left_out)
+        with Forms(path, lambda form: opened(form, without, found.job)) as forms:
+            yield from _answered(found, readings, left_out, forms)
 
 
 def meshless(path: Path, folder: Path) -> Path:
@@ -99,7 +105,9 @@ def meshless(path: Path, folder: Path) -> Path:
     return copy
 
 
-def _answered(found: Audit, readings: Sequence[Reading], left_out: Set[str]) -> Iterator[tuple[Audit, str, list[Row]]]:
+def _answered(
+    found: Audit, readings: Sequence[Reading], left_out: Set[str], forms: Forms
+) -> Iterator[tuple[Audit, str, list[Row]]]:
     with ThreadPoolExecutor(max(len(readings), 1)) as pool:
         answers = {pool.submit(reading.answer, found.job): reading.name for reading in readings}
         for done in as_completed(answers):
@@ -110,11 +118,17 @@ def _answered(found: Audit, readings: Sequence[Reading], left_out: Set[str]) -> 
             else:
                 found.strange[name] = answer.get("strange", "")
                 told = rows(name, answer, found.wanted, found.job["joints"], found.named)
+                told = excused(told, answer, found, forms)
                 yield found, name, [row for row in told if row.quantity not in left_out]
 
 
-def opened(path: Path, without: str = "") -> Audit:
+def opened(path: Path, without: str = "", job: dict[str, Any] | None = None) -> Audit:
     """Return what a file says, with the states at which it is compared.
+
+    Args:
+        path: of the file.
+        without: what is left out.
+        job: states that are to be taken, where the file has its joints.
 
     Raises:
         SceneError: with what stands against it.
@@ -123,13 +137,16 @@ def opened(path: Path, without: str = "") -> Audit:
     scene = scene_of(path, model)
     if not scene.joints:
         raise SceneError(f"{path} has no joint: there is no motion in which readers could differ; valid: one at least.")
-    scene = scene if is_urdf(path) else with_closed_forms(path, scene)
+    own = {} if is_urdf(path) else of_shapes(path)
+    scene = with_closed_forms(scene, own)
     keys = [np.array(key) for key in model.key_qpos[:KEYS]]
     paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
     meets = [bool(one) or i in paired for i, one in enumerate(model.geom_contype | model.geom_conaffinity)]
     named = mjcf.names(model, "geom")
-    found = of_scene(path, scene, keys, (*told, *findings_of(path)), [named(i) for i, one in enumerate(meets) if one])
+    touching = [named(i) for i, one in enumerate(meets) if one]
+    found = of_scene(path, scene, keys, (*told, *findings_of(path)), touching, job)
     found.named = lines_named(path)
+    found.wanted["precision"] = SINGLE if None in own.values() else 0.0
     if is_urdf(path):
         found.wanted["planar"] = planar(path)
         found.wanted["contacts"] = None  # which of its links may touch each other a URDF does not say
@@ -140,21 +157,23 @@ def opened(path: Path, without: str = "") -> Audit:
     return found
 
 
-def with_closed_forms(path: Path, scene: Scene) -> Scene:
+def with_closed_forms(scene: Scene, own: Mapping[str, Inertia | None]) -> Scene:
     """Return the scene with inertias of shapes as we compute them: what the compiler makes of them is seen then."""
-    own = of_shapes(path)
 
     def of(body: Body) -> Body:
-        mass, com, about = own[body.name]
-        return replace(body, mass=mass, com=tuple(com.tolist()), inertia=six(about))
+        inertia = own.get(body.name)
+        if inertia is None:
+            return body
+        return replace(body, mass=inertia.mass, com=tuple(inertia.com.tolist()), inertia=six(inertia.about))
 
-    return scene.replace(bodies=tuple(of(body) if body.name in own else body for body in scene.bodies))
+    return scene.replace(bodies=tuple(map(of, scene.bodies)))
 
 
 def of_scene(
     path: Path, scene: Scene, keys: Sequence[Floats] = (), findings: tuple[str, ...] = (),
-    touching: Sequence[str] | None = None,
+    touching: Sequence[str] | None = None, job: dict[str, Any] | None = None,
 ) -> Audit:  # fmt: skip
     """Return the audit of a file of which a scene says what it means; without `touching` shapes are not compared."""
-    job = job_of(scene, keys)
+    own = job_of(scene, keys)
+    job = job if job is not None and job["joints"] == own["joints"] else own
     return Audit(path=path, scene=scene, job=job, wanted=expected(scene, job, touching), findings=findings)

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from threading import Lock
 from typing import Any
-from uuid import uuid4
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-from crossbody.cases import CrossbodyError
 from crossbody.cases.files.conformance import FEATURES, Feature
 from crossbody.engines.importers import SECONDS, answers
 from crossbody.reports.importers.audit import opened
@@ -22,14 +19,17 @@ from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, W
 from crossbody.reports.importers.compare import rows as compared
 from crossbody.reports.importers.conformance import judged_all
 from crossbody.reports.importers.fix import fixed
+from crossbody.reports.importers.forms import Forms, removed
 from crossbody.reports.importers.lines import Node, Place, names, with_lines
 
 TELLS = "The engine reads it as something else; say it in the engine."
 PLAIN = ("arm", "URDF: arm", "URDF: link without mass", "URDF: inertia of the root")
 """What every robot has: without it nothing would be left to differ."""
+AND, PAIRED = " together with ", 5
+"""Between the names of two causes that act together; of how many features pairs are tried."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Use:
     """Where a file uses a feature.
 
@@ -42,6 +42,10 @@ class Use:
     feature: Feature
     places: tuple[Place, ...]
     names: tuple[frozenset[str], ...]
+
+    def at(self, wanted: Sequence[str]) -> list[Place]:
+        """Return where it is used at parts of these names."""
+        return [place for place, own in zip(self.places, self.names, strict=True) if not own.isdisjoint(wanted)]
 
 
 def uses(path: Path, urdf: bool) -> list[Use]:
@@ -62,12 +66,12 @@ def uses(path: Path, urdf: bool) -> list[Use]:
     return found
 
 
-def _at(root: Node, places: dict[Node, Place], way: str) -> list[Node]:
-    """Return the elements at a path of ElementTree; behind a ! stands what they must not have."""
+def _at(root: Node, places: Mapping[Node, Place], way: str) -> list[Node]:
+    """Return the elements at a path of ElementTree; behind a ! stands what they must not have, = what stands for it."""
     if way == ".//include":
         return [node for node in places if node.tag == "include"]
     path, _, without = way.partition("!")
-    absent = without.split(",") if without else []
+    absent = [one.partition("=")[0] for one in without.split(",")] if without else []
     return [node for node in root.findall(path) if not any(_has(node, one) for one in absent)]
 
 
@@ -75,18 +79,25 @@ def _has(node: Node, part: str) -> bool:
     return part[1:] in node.attrib if part.startswith("@") else node.find(part) is not None
 
 
-def left_out(path: Path, features: Sequence[Feature], out: Path) -> None:
-    """Write a file without what makes it use some features: the attributes that their paths name, or the elements."""
-    root, places = with_lines(path)
-    for feature in features:
-        for way in feature.finds:
-            for node in _at(root, places, way):
-                told = re.findall(r"@(\w+)", way.partition("!")[0].rpartition("/")[2])
-                for key in told:
-                    node.attrib.pop(key, None)
-                for parent in [] if told or "!" in way else [one for one in root.iter() if node in list(one)]:
-                    parent.remove(node)
-    ElementTree.ElementTree(root).write(out, encoding="utf-8")
+def left_out(features: Sequence[Feature], root: Node, places: Mapping[Node, Place]) -> None:
+    """Take out of a file what makes it use some features: the attributes that their paths name, or the elements.
+
+    Where something is not said, that is said which the format takes for it.
+    """
+    for way in [way for feature in features for way in feature.finds]:
+        path, _, without = way.partition("!")
+        told = re.findall(r"@(\w+)", path.rpartition("/")[2])
+        for node in _at(root, places, way):
+            for key in told:
+                node.attrib.pop(key, None)
+            for one in [one for one in without.split(",") if "=" in one]:
+                part, _, value = one.partition("=")
+                if part.startswith("@"):
+                    node.set(part[1:], value)
+                else:
+                    ElementTree.SubElement(node, part, dict(filter(None, [value.split("=")])) if value else {})
+            if not told and not without:
+                removed(root, node)
 
 
 def explained(
@@ -95,8 +106,9 @@ def explained(
     """Return the rows, those that are wrong with the feature that is to blame and where that stands.
 
     To blame is a feature that the file uses, which the importer fails in its smallest file, and without which it reads
-    the file's quantity as the file then says. Named as a guess is the nearest where only all of them together do it, or
-    the file in plainer words; what does it though its smallest file is read; and what cannot be left out.
+    the file's quantity as the file then says; or two of them together, where neither does it alone. Named as a guess is
+    what it fails in every file, or the nearest where only all of them do it, or the file in plainer words; what does it
+    though its smallest file is read; and what cannot be left out.
 
     Args:
         path: of the file.
@@ -109,78 +121,95 @@ def explained(
     off = [row for row in rows if row.verdict in (WRONG, FAILED)]
     if not off:
         return list(rows)
-    used = [use for use in uses(path, urdf) if use.feature.name not in PLAIN]
-    with TemporaryDirectory(prefix="crossbody-causes-") as folder, ThreadPoolExecutor(jobs) as pool:
-        for one in path.resolve().parent.iterdir():
-            (Path(folder) / one.name).symlink_to(one)
-        trials = _Trials(path, urdf, Path(folder), seconds, without)
+    used = uses(path, urdf)
+    with Forms(path, lambda form: opened(form, without)) as forms, ThreadPoolExecutor(jobs) as pool:
+        trials = _Trials(urdf, forms, seconds, without)
         engines = list(dict.fromkeys(row.engine for row in off))
         told = dict(zip(engines, pool.map(lambda name: _of_engine(name, trials, used, off), engines), strict=True))
     return [told[row.engine].get(row.quantity, row) if row in off else row for row in rows]
 
 
+@dataclass(frozen=True, slots=True)
 class _Trials:
-    """Forms of a file without some features, each opened once."""
+    """Forms of a file without some features, and what importers make of them."""
 
-    def __init__(self, path: Path, urdf: bool, folder: Path, seconds: float, without: str) -> None:
-        self.path, self.urdf, self.folder, self.seconds, self.without = path, urdf, folder, seconds, without
-        self._opened: dict[tuple[str, ...], Any] = {}
-        self._lock = Lock()
+    urdf: bool
+    forms: Forms
+    seconds: float
+    without: str
 
-    def opened(self, features: Sequence[Feature]) -> Any:
-        """Return the audit of such a form, of that in plain words without any; None where it is no robot."""
-        key = tuple(feature.name for feature in features)
-        with self._lock:
-            return self._form(key, features)
-
-    def _form(self, key: tuple[str, ...], features: Sequence[Feature]) -> Any:
-        if key not in self._opened:
-            out = self.folder / f"{uuid4().hex}{self.path.suffix}"  # links to the user's files stand there too
-            self._opened[key] = None
-            try:
-                left_out(self.path, features, out) if features else fixed(self.path, out, self.without)
-                self._opened[key] = opened(out, self.without)
-            except CrossbodyError:
-                pass
-        return self._opened[key]
-
-    def asked(self, engine: str, groups: Sequence[Sequence[Feature]]) -> list[list[Row]]:
+    def asked(self, engine: str, groups: Sequence[Sequence[Feature] | str]) -> list[list[Row]]:
         """Return the rows of an importer for every form that is a robot, none for one that is not."""
-        forms = [self.opened(group) for group in groups]
+        forms = [self._form(group) for group in groups]
         there = [form for form in forms if form is not None]
         given = iter(answers(engine, [form.path for form in there], self.urdf, [form.job for form in there],
                              self.seconds))  # fmt: skip
         return [[] if form is None else compared(engine, next(given), form.wanted, form.job["joints"], form.named)
                 for form in forms]  # fmt: skip
 
+    def _form(self, group: Sequence[Feature] | str) -> Any:
+        if isinstance(group, str):
+            return self.forms.made(group, lambda out: fixed(self.forms.path, out, self.without))
+        key = tuple(feature.name for feature in group)
+        return self.forms.opened(key, lambda root, places: left_out(group, root, places))
+
 
 def _of_engine(engine: str, trials: _Trials, used: Sequence[Use], off: Sequence[Row]) -> dict[str, Row]:
     """Return quantity -> its row with what is to blame, for one importer."""
     own = [row for row in off if row.engine == engine]
+    if own[0].quantity == "reading" and any(_agrees(own[0], told) for told in trials.asked(engine, [[]])):
+        return {}  # asked again it reads the file: it had not enough time, say
     asked = [use for use in used if any(row.quantity in ("reading", *use.feature.about) for row in own)]
     table = judged_all([use.feature for use in asked], engine, trials.seconds)
-    failed = [(use, told) for use, told in zip(asked, table, strict=True) if isinstance(told, Row) and told.verdict in (
+    bad = [(use, told) for use, told in zip(asked, table, strict=True) if isinstance(told, Row) and told.verdict in (
         WRONG, FAILED, UNSUPPORTED)]  # fmt: skip
-    alone = trials.asked(engine, [[use.feature] for use, _ in failed])
-    every = [[use.feature for use, _ in failed], []] if failed else []
-    together = trials.asked(engine, every)
+    failed = [(use, told) for use, told in bad if use.feature.name not in PLAIN]
+    alone = dict(
+        zip([use for use, _ in failed], trials.asked(engine, [[use.feature] for use, _ in failed]), strict=True)
+    )
     found = {}
     for row in own:
-        proven = [use for (use, _), told in zip(failed, alone, strict=True) if _agrees(row, told)]
-        guessed = [use for use, told in failed if row.quantity in ("reading", *use.feature.about) and (
-            row.quantity != "reading" or told.quantity == "reading")]  # fmt: skip
-        if proven:
-            found[row.quantity] = _blamed(row, proven, "")
-        elif guessed and any(_agrees(row, told) for told in together):
-            found[row.quantity] = _blamed(row, guessed, "perhaps")
-    left = [use for use in asked if use not in [use for use, _ in failed]] if len(found) < len(own) else []
-    others = trials.asked(engine, [[use.feature] for use in left])
+        if proven := [use for use, told in alone.items() if _agrees(row, told)]:
+            found[row.quantity] = _blamed(row, [(use,) for use in proven], "")
     for row in (row for row in own if row.quantity not in found):
+        if both := _pairs(
+            row, engine, trials, [use for use in alone if row.quantity in ("reading", *use.feature.about)]
+        ):
+            found[row.quantity] = _blamed(row, both, "")
+        elif plain := [use for use, told in bad if use.feature.name in PLAIN and row.quantity in use.feature.about]:
+            found[row.quantity] = _blamed(row, [(use,) for use in plain], "perhaps")
+    return found | _guessed([row for row in own if row.quantity not in found], engine, trials, failed, alone, asked)
+
+
+def _pairs(row: Row, engine: str, trials: _Trials, near: Sequence[Use]) -> list[tuple[Use, ...]]:
+    """Return pairs of features without which an importer agrees, of those that are nearest to where it does not."""
+    places = _places(row)
+    tried = sorted(near, key=lambda use: not use.at(places))[:PAIRED]
+    pairs = list(combinations(tried, 2))
+    told = trials.asked(engine, [[one.feature, two.feature] for one, two in pairs])
+    return [pair for pair, rows in zip(pairs, told, strict=True) if _agrees(row, rows)]
+
+
+def _guessed(
+    rows: Sequence[Row], engine: str, trials: _Trials, failed: Sequence[tuple[Use, Row]],
+    alone: Mapping[Use, Sequence[Row]], asked: Sequence[Use],
+) -> dict[str, Row]:  # fmt: skip
+    """Return quantity -> its row with the nearest cause that is not proved, of rows that have no other."""
+    found: dict[str, Row] = {}
+    together = trials.asked(engine, [[use.feature for use, _ in failed], "plain"]) if rows and failed else []
+    for row in rows:
+        likely = [use for use, told in failed if row.quantity in ("reading", *use.feature.about) and (
+            row.quantity != "reading" or told.quantity == "reading")]  # fmt: skip
+        if likely and any(_agrees(row, told) for told in together):
+            found[row.quantity] = _blamed(row, [(use,) for use in likely], "perhaps")
+    rows = [row for row in rows if row.quantity not in found]
+    left = [use for use in asked if use not in alone and use.feature.name not in PLAIN] if rows else []
+    others = trials.asked(engine, [[use.feature] for use in left])
+    for row in rows:
         same = [use for use, told in zip(left, others, strict=True) if _agrees(row, told)]
-        same = same or [use for (use, small), told in zip(failed, alone, strict=True) if not told and (
-            small.quantity == row.quantity)]  # fmt: skip
+        same = same or [use for use, small in failed if not alone[use] and small.quantity == row.quantity]
         if same:
-            found[row.quantity] = _blamed(row, same, "perhaps")
+            found[row.quantity] = _blamed(row, [(use,) for use in same], "perhaps")
     return found
 
 
@@ -196,20 +225,28 @@ def _agrees(row: Row, told: Sequence[Row]) -> bool:
     return False
 
 
-def _blamed(row: Row, causes: Sequence[Use], doubt: str) -> Row:
+def _places(row: Row) -> list[str]:
+    """Return the names of joints and bodies where a row differs."""
+    return [part.partition(":")[0].strip() for part in re.split(", | is | behind ", row.where)]
+
+
+def _blamed(row: Row, causes: Sequence[tuple[Use, ...]], doubt: str) -> Row:
     """Return a row with its cause: of several that which is used at the joint or body."""
-    places = [part.partition(":")[0].strip() for part in re.split(", | is | behind ", row.where)]
+    places = _places(row)
+    cause = min(causes, key=lambda group: not any(use.at(places) for use in group))
+    file, line = next((place for use in cause for place in use.at(places)), cause[0].places[0])
+    names = AND.join(use.feature.name for use in cause)
+    return replace(row, cause=names, file=str(file), line=line, doubt=doubt)
 
-    def near(use: Use) -> list[Place]:
-        both = zip(use.places, use.names, strict=True)
-        return [place for place, own in both if not own.isdisjoint(places)]
 
-    use = min(causes, key=lambda one: not near(one))
-    file, line = (near(use) or use.places)[0]
-    return replace(row, cause=use.feature.name, file=str(file), line=line, doubt=doubt)
+def parts(cause: str) -> list[str]:
+    """Return the names of the features that a cause is."""
+    names = {feature.name for feature in FEATURES}
+    return [one for one in cause.split(AND) if one in names]
 
 
 def advice(cause: str) -> str:
-    """Return the rule of the format and the rewrite that stand behind a cause; empty where it is none of the table."""
-    feature = next((one for one in FEATURES if one.name == cause), None)
-    return " ".join(filter(None, (feature.rule, feature.rewrite))) or TELLS if feature else ""
+    """Return rules of the format and rewrites that stand behind a cause; empty where it is none of the table."""
+    named = [feature for feature in FEATURES if feature.name in parts(cause)]
+    told = [" ".join(filter(None, (one.rule, one.rewrite))) for one in named]
+    return " ".join(dict.fromkeys(filter(None, told))) or TELLS if named else ""

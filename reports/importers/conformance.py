@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,8 +11,10 @@ from typing import Any
 
 from crossbody.cases.files.conformance import Feature
 from crossbody.engines.importers import SECONDS, answers
-from crossbody.reports.importers.audit import Audit, of_scene
-from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WRONG, Row, Said, rows
+from crossbody.reports.importers.audit import Audit, of_scene, opened
+from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WRONG, Row, rows
+from crossbody.reports.importers.declared import excused
+from crossbody.reports.importers.forms import Forms
 
 PART = 16
 """Features that one process of an importer is asked at least."""
@@ -25,6 +26,7 @@ def written(feature: Feature, folder: Path) -> Path:
     folder.mkdir(exist_ok=True)
     path = folder / f"feature.{'urdf' if feature.format == 'urdf' else 'xml'}"
     for name, text in {path.name: feature.text, **feature.files}.items():
+        (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     return path
 
@@ -43,29 +45,24 @@ def judged_all(features: Sequence[Feature], engine: str, seconds: float = SECOND
             paths = [written(feature, Path(folder) / str(k)) for k, feature in enumerate(own)]
             audits = [of_scene(path, feature.scene) for path, feature in zip(paths, own, strict=True)]
             told = answers(engine, paths, kind == "urdf", [audit.job for audit in audits], seconds)
-        for feature, audit, answer in zip(own, audits, told, strict=True):
-            found[feature.name] = _told(feature, engine, audit, answer)
+            for feature, audit, answer in zip(own, audits, told, strict=True):
+                found[feature.name] = _told(feature, engine, audit, answer)
     return [found[feature.name] for feature in features]
 
 
 def _told(feature: Feature, engine: str, audit: Audit, answer: dict[str, Any]) -> Row | str:
     if answer["status"] == "absent":
         return str(answer["why"])
-    found = rows(engine, answer, audit.wanted, audit.job["joints"])
-    worst = min((row for row in found if row.quantity in ("reading", *feature.about)), key=_badness)
-    said = Said(answer["told"], {}, set()).excuse(words(feature), set()) if worst.verdict == WRONG else ""
-    told: dict[str, Any] = {"verdict": UNSUPPORTED, "why": said} if said else {}
-    return replace(worst, version=answer.get("version", ""), cause=feature.name, **told)
+    with Forms(audit.path, lambda form: opened(form, job=audit.job)) as forms:
+        found = excused(rows(engine, answer, audit.wanted, audit.job["joints"]), answer, audit, forms)
+    about = [row for row in found if row.quantity in ("reading", *feature.about) and not _follows(row)]
+    worst = min(about, key=lambda row: WORST.index(row.verdict))
+    return replace(worst, version=answer.get("version", ""), cause=feature.name)
 
 
-def _badness(row: Row) -> int:
-    return WORST.index(row.verdict)
-
-
-def words(feature: Feature) -> str:
-    """Return a pattern of the attributes and tags that are this feature, as importers name them."""
-    named = [re.findall(r"@(\w+)", path) or re.findall(r"(\w+)$", path) for path in feature.finds]
-    return "|".join(rf"\b{word}\b" for group in named for word in group if word != "name")
+def _follows(row: Row) -> bool:
+    """Return whether a quantity that is not shown follows from the others."""
+    return (row.quantity, row.verdict) == ("energy", UNSEEN)
 
 
 def table(

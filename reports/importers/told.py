@@ -13,6 +13,8 @@ from crossbody.reports.importers.causes import advice
 from crossbody.reports.importers.compare import FAILED, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
 
 LEVELS = {WRONG: "error", FAILED: "error", UNSUPPORTED: "note"}
+MARK = "Written by crossbody audit"
+"""What says that a file may be written over."""
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
@@ -20,11 +22,13 @@ def sentence(row: Row) -> str:
     """Return what is wrong, in one sentence."""
     if row.verdict in (FAILED, UNSUPPORTED, UNSEEN):
         return f"{row.engine}: {row.quantity} {row.verdict}: {row.why}"
-    if None in (row.value, row.expected):
+    if row.value is None or row.expected is None:
         return f"{row.engine}: {row.quantity}: {row.where}."
     if row.where.endswith((" missing", " more", " joints", " touch")):  # then they are numbers of parts
         return f"{row.engine}: {row.quantity}: {row.where}: {row.value:g} of them, and {row.expected:g} in the file."
-    return f"{row.engine}: {row.quantity}: {row.where} is {row.value:.6g}, and {row.expected:.6g} in the file."
+    digits = next((n for n in (6, 9, 12) if f"{row.value:.{n}g}" != f"{row.expected:.{n}g}"), 17)
+    value, expected = (f"{one:.{digits}g}" for one in (row.value, row.expected))
+    return f"{row.engine}: {row.quantity}: {row.where} is {value}, and {expected} in the file."
 
 
 def cell(row: Row | None) -> str:
@@ -62,7 +66,7 @@ def markdown(path: Path, rows: Sequence[Row]) -> str:
         + "\n\n"
         + "\n".join(told)
         + said
-        + "\n"
+        + f"\n\n<!-- {MARK} -->\n"
     )
 
 
@@ -79,7 +83,7 @@ def sarif(path: Path, rows: Sequence[Row]) -> str:
         "name": "crossbody", "version": version("crossbody"),
         "rules": [{"id": k, "shortDescription": {"text": k}, "help": {"text": text}} for k, text in rules.items()],
     }  # fmt: skip
-    run = {"tool": {"driver": driver}, "results": [_result(path, row) for row in off]}
+    run = {"properties": {"comment": MARK}, "tool": {"driver": driver}, "results": [_result(path, row) for row in off]}
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=1)
 
 
@@ -89,10 +93,7 @@ def _rule(row: Row) -> str:
 
 def _result(path: Path, row: Row) -> dict[str, Any]:
     uri = quote(row.file or path.as_posix())
-    place: dict[str, Any] = {
-        "artifactLocation": {"uri": uri},
-        "region": {"startLine": row.line or 1},
-    }
+    place: dict[str, Any] = {"artifactLocation": {"uri": uri}, "region": {"startLine": row.line or 1}}
     return {
         "ruleId": _rule(row), "level": LEVELS[row.verdict], "message": {"text": sentence(row)},
         "locations": [{"physicalLocation": place}],

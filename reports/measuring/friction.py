@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbing:
-    """Places where a motion may slip: m of them, each a normal row with its tangential ones.
+    """Places where a motion may slip: m of them, each a normal row with its tangential ones, or one of dry friction.
 
     Attributes:
         rows (m,): normal rows.
         pair (m,): which pair of shapes each belongs to.
-        mu (m,): coefficients of friction.
+        mu (m,): coefficients of friction; of dry friction its bound.
         slip (n, m, k): velocity of the second shape over the first along the tangential rows, m/s.
         force (n, m, k): of the first on the second, N.
-        normal (n, m): N.
+        normal (n, m): N; 1 of dry friction.
     """
 
     rows: NDArray[np.intp]
@@ -64,15 +64,16 @@ def rubbing(run: Trajectory, case: Case) -> Rubbing | None:
     rates -= np.asarray(system.drift, dtype=np.float64)
     return Rubbing(
         rows=rows, pair=_pairs(case, len(rows)), mu=system.friction[rows], slip=there * rates[:, tangents],
-        force=there * run.lam[:, tangents], normal=run.lam[:, rows],
+        force=there * run.lam[:, tangents], normal=np.where(system.dry[rows], 1.0, run.lam[:, rows]),
     )  # fmt: skip
 
 
 def _pairs(case: Case, count: int) -> NDArray[np.intp]:
-    """Return which pair of shapes each place belongs to; of equations of one's own each is a pair by itself."""
+    """Return which pair each place belongs to; each is one by itself in dry friction, and in equations of one's own."""
     met = contacts(case.scene) if case.general and case.scene is not None else ()
     found = [k for k, contact in enumerate(met) for _ in range(contact.places if contact.friction > 0.0 else 0)]
-    return np.array(found) if len(found) == count else np.arange(count)
+    dry = sum(width for _, width in case.scene.dry) if case.scene is not None else 0
+    return np.array([*found, *(len(met) + np.arange(dry))]) if len(found) + dry == count else np.arange(count)
 
 
 def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats, Floats]:

@@ -111,6 +111,9 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
     for i in spread(run, looked):
         rows = np.flatnonzero(closed[i] & ~slides[i])
+        if not len(rows):  # dry friction that slides, which has no law but its bound
+            scale = max(scale, float(np.max(np.abs(run.lam[i]))))
+            continue
         fast = run.mode[i] == Mode.COLLISION
         pushed = system.constraint(run.q[i])[0][slides[i]].T @ run.lam[i, slides[i]] if slides[i].any() else 0.0
         lam, moving = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, fast, inputs, pushed)

@@ -15,6 +15,7 @@ from crossbody.reports.judging.told import share
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import suits
+from crossbody.reports.pages.friction import friction
 from crossbody.reports.pages.html import Page
 from crossbody.reports.pages.hysteresis import hysteresis
 from crossbody.reports.pages.playback import playback
@@ -42,13 +43,20 @@ AUDIT_TEXT = (
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
 
 
-def case_page(found: Results, case: CaseFiles) -> Page:
-    """All sections of one case; its motions are read here and forgotten with the page."""
+def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
+    """All sections of one case; its motions are read here and forgotten with the page.
+
+    Args:
+        found: what a folder holds.
+        case: one of its cases.
+        share: of the usual room of plots and playback that they may take.
+    """
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about), engines=_engines(traces),
         sections=[
-            _glance(found, case), _verdicts(found, case), *playback(traces), *_plots(traces, rows), *hysteresis(traces),
+            _glance(found, case), _verdicts(found, case), *playback(traces, share),
+            *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
             *precision(found.out, case.label, rows, _walls(found, case)),
             *studied(found.out, case.about), _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],
@@ -109,10 +117,10 @@ def _far(row: Row) -> tuple[int, float]:
     return (grid.WORST.index(word), -share(row)) if word in grid.WORST else (len(grid.WORST), 0.0)
 
 
-def _plots(traces: Sequence[Trace], rows: Sequence[Row]) -> list[Section]:
+def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[Section]:
     if not traces:
         return []
-    points, limits = figures.points_for(traces, PLOTTED), figures.limits_of(rows)
+    points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
     drawn = {name: draw(traces, points, limits) for name, (_, draw) in figures.FIGURES.items() if suits(name, traces)}
     return [
         Section(

@@ -37,17 +37,16 @@ NONE: Limits = {}
 
 
 def limits_of(rows: Iterable[Row]) -> Limits:
-    """Return the limits by which engines are judged; where they have others each is called by whose it is."""
+    """Return the limits by which engines are judged; those of few are called by whose they are."""
     found: dict[str, dict[float, list[str]]] = {}
     for row in rows:
         if (row["limit"] or 0.0) > 0.0:
             found.setdefault(row["metric"], {}).setdefault(row["limit"], []).append(f"{row['engine']}:{row['profile']}")
-    return {
-        metric: {
-            limit: "limit" if len(limits) == 1 else f"limit ({', '.join(whose)})" for limit, whose in limits.items()
-        }
-        for metric, limits in found.items()
-    }
+    told: dict[str, dict[float, str]] = {}
+    for metric, limits in found.items():
+        usual = max(limits, key=lambda limit: len(limits[limit]))
+        told[metric] = {x: "limit" if x == usual else f"limit of {', '.join(whose)}" for x, whose in limits.items()}
+    return told
 
 
 def drawn(count: int) -> list[int]:
@@ -55,7 +54,7 @@ def drawn(count: int) -> list[int]:
     return list(dict.fromkeys(np.linspace(0, count - 1, min(count, MOST_SIGNALS)).round().astype(int).tolist()))
 
 
-def points_for(traces: Sequence[Trace], room: int) -> int:
+def points_for(traces: Sequence[Trace], room: float) -> int:
     """Samples a line so that all lines of a case take `room` bytes."""
     coordinates, contacts = (len(drawn(len(traces[0].about[name]))) for name in ("coordinates", "contacts"))
     lines = len(traces) * (2 * coordinates + 4 * contacts + 4)

@@ -146,7 +146,8 @@ def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, floa
 def _cost(wall: float | None, least: float) -> Cell:
     if not wall:
         return Cell(title="no run")
-    return Cell(title="", word="plain", text=duration(wall), small=f"{wall / least:.3g} times")
+    times = wall / least
+    return Cell(title="", word="plain", text=duration(wall), small=f"{times:.{0 if times > 10.0 else 1}f} times")
 
 
 def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
@@ -183,6 +184,7 @@ def short(value: float | None) -> str:
     """A number in two or three digits."""
     if value is None or value != value:
         return "-"
+    value += 0.0  # no -0
     return f"{value:.1e}" if value and not 1e-3 <= abs(value) < 1e4 else f"{value:.3g}"
 
 

@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from crossbody.reports.figures.section import Figure, Kind, Section
+from crossbody.reports.pages.packing import packed_text, packed_value
 
 TEMPLATES = Path(__file__).parent / "templates"
 PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
@@ -65,8 +66,19 @@ def environment() -> Environment:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    made.filters |= {"number": number, "bounded": bounded, "slug": slug, "plot": plot}
-    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST, "json": json_text}
+    made.filters |= {
+        "number": number,
+        "bounded": bounded,
+        "slug": slug,
+        "plot": plot,
+        "text_packed": packed_text,
+        "value_packed": packed_value,
+    }
+    made.globals |= {
+        "Kind": Kind,
+        "SIGNS": SIGNS,
+        "MOST": MOST,
+    }
     return made
 
 
@@ -84,9 +96,8 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
         inside = f"#{page}--{anchor}" if anchor else f"#{page}"
         return inside if single else f"{page}.html{inside if anchor else ''}"
 
-    inline = {"style": _text("page.css"), "script": _script(), "plotly": _plotly()} if single else {}
-    inline = {key: text.replace("</script", "<\\/script") for key, text in inline.items()}
-    scripts = [THEME, *(inline[key] for key in ("script", "plotly") if single)]
+    inline = {"style": _text("page.css"), "script": _script(), "plotly": _packed_plotly()} if single else {}
+    scripts = [THEME, *((_script(), _plotly()) if single else ())]
     template = environment().get_template("page.html")
     return template.render(
         pages=pages, links=links, footer=footer, href=href, drawn=any(_drawn(page) for page in pages),
@@ -139,22 +150,22 @@ def _plotly() -> str:
 
 
 @cache
+def _packed_plotly() -> str:
+    return packed_text(_plotly())
+
+
+@cache
 def _script() -> str:
     return "\n".join(_text(name) for name in PARTS)
 
 
-def json_text(value: Any) -> Markup:
-    """A text of JSON that cannot end the script element it stands in."""
-    return Markup(str(value).replace("<", "\\u003c"))
-
-
 def plot(figure: Figure) -> dict[str, Any]:
-    """A figure as JSON, with its title and height taken out of it; the page gives it its colours."""
+    """A figure as plain values, with its title and height taken out of it; the page gives it its colours."""
     made: dict[str, Any] = figure if isinstance(figure, dict) else json.loads(figure.to_json(engine="json"))
     layout = {key: value for key, value in made["layout"].items() if key not in ("title", "template")}
     layout["margin"] = {"l": 84, "r": 14, "t": 34, "b": 50}
-    text = json.dumps({"data": made["data"], "layout": layout}, separators=(",", ":"))
-    return {"title": made["layout"]["title"]["text"], "height": layout["height"], "json": json_text(text)}
+    value = {"data": made["data"], "layout": layout}
+    return {"title": made["layout"]["title"]["text"], "height": layout["height"], "value": value}
 
 
 def file_name(label: str) -> str:
@@ -184,4 +195,4 @@ def number(value: Any) -> str:
     """A number for a table: a count in full, any other with four digits, a dash where there is none."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)

@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import label, style
-from crossbody.reports.pages.sheet import coded, plain
+from crossbody.reports.figures.values import coded, plain
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 
@@ -21,12 +21,15 @@ TEXT = (
 )
 
 
-def hysteresis(traces: Sequence[Trace]) -> list[Section]:
-    """The section; nothing where no contact that opens and closes carries anything."""
+def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
+    """The section, with a share of the usual points.
+
+    Nothing where no contact that opens and closes carries anything.
+    """
     k = _busiest(traces)
     if k is None:
         return []
-    lines = [line for i, trace in enumerate(traces) if (line := _line(trace, i, k))]
+    lines = [line for i, trace in enumerate(traces) if (line := _line(trace, i, k, int(share * MOST)))]
     name = traces[0].about["contacts"][k]
     layout = {
         "title": {"text": f"Force over depth, contact {plain(name)}"}, "height": 420, "showlegend": False,
@@ -47,7 +50,7 @@ def _busiest(traces: Sequence[Trace]) -> int | None:
     return None
 
 
-def _line(trace: Trace, i: int, k: int) -> dict[str, object]:
+def _line(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
     """Force over depth of one engine while its contact carries, with a break where it does not; empty without any."""
     depth, lam = -trace.run.gap[:, k], trace.run.lam[:, k]
     carries = np.isfinite(lam) & (lam != 0.0) & np.isfinite(depth)
@@ -55,7 +58,7 @@ def _line(trace: Trace, i: int, k: int) -> dict[str, object]:
         return {}
     near = carries | np.insert(carries[:-1], 0, False)  # the first sample that does not carry ends a line
     x, y = (np.where(carries, values, np.nan)[near] for values in (depth, lam))
-    at = np.union1d(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), MOST), np.flatnonzero(np.isnan(y)))
+    at = np.union1d(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), most), np.flatnonzero(np.isnan(y)))
     look = style(trace, i)
     return {
         "type": "scatter", "mode": "lines", "x": coded(x[at].astype(np.float32)),

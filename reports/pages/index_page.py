@@ -38,10 +38,19 @@ def index_pages(found: Results) -> list[Page]:
     return [
         Page(
             name=name, title="crossbody" if i == 0 else f"crossbody, cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
-            lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
+            lead=_lead(found),
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip
+
+
+def _lead(found: Results) -> str:
+    """Who is within and who is off; a run without a limit is neither."""
+    if not found.verdicts:
+        return ""
+    if all(row["verdict"] not in grid.WORST for row in found.verdicts):
+        return "Nothing is judged here: no number has a limit."
+    return sentence(runs_of(found.verdicts))
 
 
 def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> list[Section]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -16,6 +14,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports import scenes
 from crossbody.reports.figures.section import Section
 from crossbody.reports.figures.styles import label, style
+from crossbody.reports.figures.values import coded
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace
@@ -32,8 +31,11 @@ TEXT = (
 )
 
 
-def playback(traces: Sequence[Trace]) -> list[Section]:
-    """The section, or one that says why there is none; nothing where no motion, or no mechanism, is stored."""
+def playback(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
+    """The section, in a share of its usual room, or one that says why there is none.
+
+    Nothing where no motion, or no mechanism, is stored.
+    """
     about = traces[0].about if traces else {}
     name = about.get("mechanism", "")
     if not name:  # a log that was replayed has none
@@ -42,29 +44,29 @@ def playback(traces: Sequence[Trace]) -> list[Section]:
         told = f"There is no picture of the mechanism {name}."
         return [Section(name="playback", title="Playback", text=told)]
     try:
-        scene = packed(traces, scenes.load(name))
+        scene = packed(traces, scenes.load(name), share)
     except (KeyError, ValueError, IndexError, CrossbodyError) as error:
         return [Section(name="playback", title="Playback", text=f"This motion cannot be drawn: {error}.")]
     caption = f"Motion of {about['case']}, {about['variant']}, as {', '.join(map(label, traces))} computed it."
     return [
         Section(
             name="playback", title="Playback", text=TEXT, template="playback.html",
-            context={"scene": json.dumps(scene, separators=(",", ":")), "caption": caption,
+            context={"scene": scene, "caption": caption,
                      "frames": scene["stage"]["frames"], "events": bool(scene["events"]),
                      "compared": len(scene["tracks"]) > 1 and any(track["truth"] for track in scene["tracks"])},
         )
     ]  # fmt: skip
 
 
-def packed(traces: Sequence[Trace], scene: scenes.Scene) -> dict[str, Any]:
-    """Stage, and of every trace its times, poses and arrows as single precision in base64."""
+def packed(traces: Sequence[Trace], scene: scenes.Scene, share: float = 1.0) -> dict[str, Any]:
+    """Stage, and of every trace its times, poses and arrows in single precision."""
     about = traces[0].about
     parameters = {**about["parameters"], "scene": about.get("scene")}
     stage = scene.stage(parameters)
-    one = scene.poses(traces[0].run.q[:1], parameters)[0].size
-    width = 1 + one + scene.arrows(traces[0].run.q[:1], traces[0].run.lam[:1], parameters)[0].size
-    frames = int(np.clip(ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
-    drawn = [_track(trace, i, scene, parameters, frames) for i, trace in enumerate(traces) if len(trace.run.t)]
+    pushing = _pushing(traces, scene, parameters)
+    width = 1 + scene.poses(traces[0].run.q[:1], parameters)[0].size + 2 * stage.dimensions * int(pushing.sum())
+    frames = int(np.clip(share * ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
+    drawn = [_track(trace, i, scene, parameters, frames, pushing) for i, trace in enumerate(traces) if len(trace.run.t)]
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
         "end": max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0),
@@ -74,36 +76,51 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _pushing(traces: Sequence[Trace], scene: scenes.Scene, parameters: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Which arrows have a length with the rows that ever carry anything, in some motion's poses."""
+    runs = [trace.run for trace in traces if len(trace.run.t)]
+    carrying: NDArray[np.bool_] = np.any([(np.nan_to_num(run.lam) != 0.0).any(axis=0) for run in runs], axis=0)
+    carrying[[event.contact for run in runs for event in run.events if event.impulse]] = True
+    q = np.concatenate([run.q[np.linspace(0, len(run.t) - 1, FEWEST).astype(np.intp)] for run in runs])
+    drawn = scene.arrows(q, np.broadcast_to(carrying.astype(np.float64), (len(q), len(carrying))), parameters)
+    found: NDArray[np.bool_] = (drawn[:, :, drawn.shape[2] // 2 :] != 0.0).any(axis=(0, 2))
+    return found
+
+
 def events(run: Trajectory) -> list[float]:
     """Instants that the buttons lead to, s: those of the first motion, the truth's where there is one."""
     found = np.unique([event.t for event in run.events])
     return [float(found[i]) for i in np.unique(np.linspace(0, len(found) - 1, min(len(found), BLOWS)).astype(int))]
 
 
-def _track(trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int) -> dict[str, Any]:
+def _track(
+    trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int, pushing: NDArray[np.bool_]
+) -> dict[str, Any]:  # fmt: skip
     run = trace.run
     t, q = filled(run, trace.quaternions)
     at = chosen(t, np.array([e.t for e in run.events]), frames)
     lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t[at], side="right"), 1))
-    poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)
+    poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)[:, pushing]
     look = style(trace, i)
     return {
         "name": label(trace), "color": look["color"], "strokes": look["strokes"], "truth": label(trace) == TRUTH,
-        "t": _base64(t[at]), "poses": _base64(poses), "arrows": _base64(arrows),
-    } | _blows(run, scene, parameters)  # fmt: skip
+        "t": _single(t[at]), "poses": _single(poses), "arrows": _single(arrows),
+    } | _blows(run, scene, parameters, pushing)  # fmt: skip
 
 
-def _blows(run: Trajectory, scene: scenes.Scene, parameters: Mapping[str, Any]) -> dict[str, str]:
+def _blows(
+    run: Trajectory, scene: scenes.Scene, parameters: Mapping[str, Any], pushing: NDArray[np.bool_]
+) -> dict[str, Any]:
     """Collisions that took no time: their instants, and arrows of N s instead of N."""
     struck = [event for event in run.events if event.impulse]
     chosen_ = [struck[i] for i in np.unique(np.linspace(0, len(struck) - 1, min(len(struck), BLOWS)).astype(int))]
     if not chosen_:
-        return {"struck": "", "blows": ""}
+        return {"struck": [], "blows": []}
     at = np.minimum(np.searchsorted(run.t, [event.t for event in chosen_]), len(run.t) - 1)
     impulses = np.zeros((len(chosen_), run.lam.shape[1]))
     impulses[np.arange(len(chosen_)), [event.contact for event in chosen_]] = [event.impulse for event in chosen_]
-    arrows = scene.arrows(run.q[at], impulses, parameters)
-    return {"struck": _base64(run.t[at]), "blows": _base64(arrows)}
+    arrows = scene.arrows(run.q[at], impulses, parameters)[:, pushing]
+    return {"struck": _single(run.t[at]), "blows": _single(arrows)}
 
 
 def chosen(t: Floats, events: Floats, frames: int) -> NDArray[np.intp]:
@@ -142,5 +159,5 @@ def _largest(values: Floats) -> float:
     return float(np.max(np.abs(np.nan_to_num(values)), initial=0.0))
 
 
-def _base64(array: Floats) -> str:
-    return base64.b64encode(np.ascontiguousarray(np.nan_to_num(array), dtype="<f4").tobytes()).decode()
+def _single(array: Floats) -> dict[str, str]:
+    return coded(np.nan_to_num(array).reshape(len(array), int(np.prod(array.shape[1:]))).astype("<f4"))

@@ -9,8 +9,8 @@ from typing import Any
 
 from crossbody.reports.figures.section import Figure, Plot, Section
 from crossbody.reports.figures.styles import COLOURS
+from crossbody.reports.figures.values import plain
 from crossbody.reports.pages.results import Results
-from crossbody.reports.pages.sheet import plain
 from crossbody.reports.runs.study import read_json
 
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")

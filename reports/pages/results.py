@@ -9,7 +9,8 @@ from typing import Any
 
 from pyarrow import ArrowException
 
-from crossbody.cases import OutputError
+from crossbody.cases import InvalidValue, OutputError
+from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import COLUMNS, Row, Word
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.runs.files import listed
@@ -178,3 +179,30 @@ def _missing(label: str, engines: list[str], times: Times, broken: list[str]) ->
     names = ", ".join(who.removesuffix(":") for who in lost)
     unreadable = f" (not readable: {', '.join(broken)})" if broken else ""
     return (f"No motion is stored for {names}{unreadable}: what is drawn below is without it.",)
+
+
+def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
+    """One motion of a folder, and its place among those of its case.
+
+    Args:
+        out: the folder.
+        case: case:variant; the first if empty.
+        engine: engine or engine:profile; "truth" for the truth.
+
+    Raises:
+        InvalidValue: if there is none; the message lists those that there are.
+    """
+    found = _cases(out, verdicts_of(out))[0]
+    mine = next((one for one in found if one.paths and case in ("", one.label)), None)
+    if mine is None:
+        raise InvalidValue(f"{out} has no motion of {case or 'a case'}; it has {_listed(one.label for one in found)}.")
+    traces = mine.traces()
+    names = [label(trace) for trace in traces]
+    place = next((i for i, name in enumerate(names) if engine in (name, name.partition(":")[0])), None)
+    if place is None:
+        raise InvalidValue(f"{out} has no motion of {engine} on {mine.label}; it has {_listed(names)}.")
+    return traces[place], place
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.styles import label, style
+from crossbody.reports.figures.values import coded, number, plain
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep
@@ -117,7 +117,13 @@ class Sheet:
 def _level(axis: str, value: float, name: str) -> dict[str, Any]:
     """A line across a plot, and what it is."""
     ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
-    label = {"text": plain(name), "textposition": "end", "font": {"size": 10, "color": LEVEL}, "padding": 1}
+    label = {
+        "text": plain(name),
+        "textposition": "end",
+        "yanchor": "top",
+        "font": {"size": 10, "color": LEVEL},
+        "padding": 1,
+    }
     line = {"color": LEVEL, "width": 1, "dash": "dash"}
     return {"type": "line", "layer": "below", "line": line, "label": label} | ends
 
@@ -130,21 +136,6 @@ def _pair(n: str, name: str, domain: list[float], timed: bool) -> dict[str, Any]
     title = {"text": plain(name).replace("\n", "<br>"), "standoff": 14, "font": {"size": 12}}
     y = {"anchor": f"x{n}", "domain": domain, "title": title, "exponentformat": "e", "tickfont": {"size": 10.5}}
     return {f"xaxis{n}": x, f"yaxis{n}": y}
-
-
-def number(row: int) -> str:
-    """How plotly numbers its axes: the first one is not numbered."""
-    return "" if row == 1 else str(row)
-
-
-def plain(text: str) -> str:
-    """A text in which plotly finds no tags."""
-    return text.replace("<", "&lt;")
-
-
-def coded(array: Floats) -> dict[str, str]:
-    """An array as plotly reads it from base64 ("typed array specification")."""
-    return {"dtype": f"f{array.itemsize}", "bdata": base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()}
 
 
 def _times(t: Floats) -> Floats:

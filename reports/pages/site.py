@@ -24,6 +24,8 @@ from crossbody.reports.runs.study import read_json
 
 INDEX = "index"
 PAGE = f"{INDEX}.html"
+FULL = 2.25
+"""Cases whose plots have their usual room in a single file; those of more share it."""
 
 
 def check(against: Path | None, others: Sequence[Path]) -> None:
@@ -95,7 +97,10 @@ def _rendered(found: Results, single_file: bool) -> Iterator[tuple[str, str]]:
     try:
         links = _links(found)
         if single_file:
-            yield PAGE, render(list(_pages(found)), links, found.footer, single=True)
+            yield (
+                PAGE,
+                render(list(_pages(found, FULL / max(FULL, len(found.cases)))), links, found.footer, single=True),
+            )
             return
         for page in _pages(found):
             yield f"{page.name}.html", render([page], links, found.footer)
@@ -147,13 +152,13 @@ def _origin(found: Results, shown: Sequence[Section]) -> list[Section]:
     """Provenance of a study, which may come from another folder than the verdicts."""
     file = next((table.file for section in shown for table in section.tables if table.file), "")
     told = read_json((found.out / file).with_suffix(".json"))["provenance"] if file else found.told
-    return [] if not found.cases else [provenance(told)]
+    return [] if _leads(found) else [provenance(told)]
 
 
-def _pages(found: Results) -> Iterator[Page]:
-    """Every page, made one after another; a folder of one study and no case is one page."""
+def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
+    """Every page, made one after another; a folder of one study and no case, or of a log, is led by its study."""
     studied = list(_studies(found))
-    alone = studied if not found.cases else []
+    alone = studied if _leads(found) else []
     for page in index_pages(found):
         if page.name == INDEX:
             page = replace(page, sections=[*(s for study in alone for s in study.sections), *page.sections])
@@ -161,11 +166,16 @@ def _pages(found: Results) -> Iterator[Page]:
     if not alone:
         yield from studied
     for case in found.cases:
-        yield case_page(found, case)
+        yield case_page(found, case, share)
+
+
+def _leads(found: Results) -> bool:
+    """Whether the index begins with the studies: no case was run, or a log was replayed."""
+    return not found.cases or "log" in found.told
 
 
 def _links(found: Results) -> list[Link]:
     links = [Link(page=INDEX, title="Index")]
-    if found.cases:
+    if not _leads(found):
         links += [Link(page=page.name, title=page.title) for page in _studies(found)]
     return links

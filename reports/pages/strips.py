@@ -10,7 +10,7 @@ import numpy as np
 from crossbody.cases import Mode, Trajectory
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import label
-from crossbody.reports.pages.sheet import plain
+from crossbody.reports.figures.values import plain
 from crossbody.reports.runs.store import Trace
 
 MODE_COLOURS = {

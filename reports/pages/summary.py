@@ -62,7 +62,8 @@ def _row(found: Results, who: str, mine: Mapping[str, Sequence[Row]]) -> dict[st
     ]  # fmt: skip
     costs = [cost for label in mine if (cost := _cost(found.walls, label, who))]
     return {
-        "who": who, "worst": next((word for word in (*grid.WORST, Word.SKIPPED.value) if words[word]), Word.INFO.value),
+        "who": who.removesuffix(":"),
+        "worst": next((word for word in (*grid.WORST, Word.SKIPPED.value) if words[word]), Word.INFO.value),
         "within": words["within"], "expected": words["expected-outside"], "outside": words["outside"],
         "skipped": words["skipped"], "error": median(errors) if errors else math.nan,
         "most": max(errors, default=math.nan), "cost": median(costs) if costs else math.nan,

@@ -106,18 +106,41 @@ def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[st
                 }  # fmt: skip
 
 
+RESIDUALS = ("who", "channel", "unit", "window", "t", "measured", "value")
+
+
 def residuals(found: Comparison, points: int = 2000) -> pd.DataFrame:
-    """Measured less predicted, thinned by taking every so manieth sample of each window, ends included."""
-    rows = []
+    """Measured less predicted (`value`) and measured, at evenly chosen samples of all windows, ends included."""
+    windows = np.repeat(np.arange(len(found.windows)), [len(w.t) for w in found.windows])
+    at = np.unique(np.linspace(0, len(windows) - 1, min(points, len(windows))).astype(int))
+    rows = [pd.DataFrame(columns=list(RESIDUALS))] if not found.predictions else []
     for prediction in found.predictions:
-        who = f"{prediction.engine}:{prediction.profile}"
-        left, t = found.residual(prediction), found.time
-        at = np.unique(np.linspace(0, len(t) - 1, min(points, len(t))).astype(int))
+        who, left = f"{prediction.engine}:{prediction.profile}", found.residual(prediction)
         for i, c in enumerate(found.coordinates):
-            rows.append(pd.DataFrame({"who": who, "channel": c.name, "unit": c.unit, "t": t[at], "value": left[at, i]}))
-    return (
-        pd.concat(rows, ignore_index=True) if rows else pd.DataFrame(columns=["who", "channel", "unit", "t", "value"])
-    )
+            told = (who, c.name, c.unit, windows[at], found.time[at], found.measured[at, i], left[at, i])
+            rows.append(pd.DataFrame(dict(zip(RESIDUALS, told, strict=True))))
+    return pd.concat(rows, ignore_index=True)
+
+
+def profile(fit: Fit) -> pd.DataFrame:
+    """One row a value of a parameter at which the cost was found."""
+    rows = [
+        {"name": name, "value": value, "cost": cost}
+        for name, (values, costs) in fit.profile.items()
+        for value, cost in zip(values.tolist(), costs.tolist(), strict=True)
+    ]
+    return pd.DataFrame(rows, columns=["name", "value", "cost"])
+
+
+def correlation(fit: Fit) -> pd.DataFrame:
+    """One row a pair of estimates."""
+    names = [one.name for one in fit.estimates]
+    rows = [
+        {"name": name, "other": other, "value": float(fit.correlation[i, j])}
+        for i, name in enumerate(names)
+        for j, other in enumerate(names)
+    ]
+    return pd.DataFrame(rows, columns=["name", "other", "value"])
 
 
 def log_about(found: Comparison) -> dict[str, Any]:

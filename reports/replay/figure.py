@@ -1,49 +1,189 @@
-"""Figures of a replay: what the model leaves over, and whether that is noise."""
+"""Figures of a replay and of an identification, as plain values: what was measured and predicted, and what is left."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
+from crossbody.cases.arrays import Floats
+from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES
+from crossbody.reports.figures.values import coded, number, plain
+
+GREY = "#888888"
+SIGMAS = 2.0
+"""Half of the noise band, standard deviations."""
 
 
-def _look(i: int) -> dict[str, object]:
-    return {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.5}
+def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:
+    """What was measured, and what every engine predicts in its band of noise, a plot a channel.
 
-
-def residual(rows: pd.DataFrame) -> go.Figure:
-    """Measured less predicted over the recorded time, a plot a channel, a line an engine."""
-    channels = list(dict.fromkeys(zip(rows["channel"], rows["unit"], strict=True)))
-    figure = make_subplots(rows=len(channels), cols=1, shared_xaxes=True, vertical_spacing=0.05)
-    for place, (channel, unit) in enumerate(channels, start=1):
+    Args:
+        rows: `who`, `channel`, `unit`, `window`, `t`, `measured`, `value` (measured less predicted).
+        noise: channel -> standard deviation of the measurement's noise.
+        held: windows that were not fitted, which are shaded.
+    """
+    channels = _channels(rows)
+    data: list[dict[str, Any]] = []
+    for place, (channel, _) in enumerate(channels, start=1):
         for i, (who, line) in enumerate(rows[rows["channel"] == channel].groupby("who", sort=False)):
-            figure.add_trace(
-                go.Scatter(x=line["t"], y=line["value"], name=str(who), legendgroup=str(who), mode="lines",
-                           line=_look(i), showlegend=place == 1), row=place, col=1,
-            )  # fmt: skip
-        figure.update_yaxes(title_text=f"{channel}<br>[{unit}]", exponentformat="power", row=place, col=1)
-    figure.update_xaxes(title_text="time [s]", row=len(channels), col=1)
-    figure.update_layout(title_text="Measured less predicted", height=130 + 170 * len(channels))
-    return figure
+            t, seen, left = _broken(line)
+            if i == 0:
+                data += [*_band(t, seen - left, noise.get(channel, np.nan), place), _line(t, seen, "measured", place)]
+                data[-1]["line"] = {"color": GREY, "width": 4}
+            data.append(_line(t, seen - left, str(who), place, i))
+    return _figure("Measured and predicted", data, [f"{name}\n[{unit}]" for name, unit in channels], "time [s]",
+                   _shades(rows, held, len(channels)))  # fmt: skip
 
 
-def correlation(rows: pd.DataFrame) -> go.Figure:
+def residual(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:
+    """Measured less predicted over the recorded time beside the band of noise, a plot a channel, a line an engine."""
+    channels = _channels(rows)
+    data, shapes = [], list(_shades(rows, held, len(channels)))
+    for place, (channel, _) in enumerate(channels, start=1):
+        for i, (who, line) in enumerate(rows[rows["channel"] == channel].groupby("who", sort=False)):
+            t, _, left = _broken(line)
+            data.append(_line(t, left, str(who), place, i))
+        half = SIGMAS * noise.get(channel, np.nan)
+        shapes += [_rectangle(place, y=(-half, half))] if np.isfinite(half) else []
+    return _figure(
+        "Measured less predicted", data, [f"{name}\n[{unit}]" for name, unit in channels], "time [s]", shapes
+    )
+
+
+def correlation(rows: pd.DataFrame) -> Figure:
     """Autocorrelation of the residuals and their correlation with the inputs, beside the 99 % band."""
     kinds = list(dict.fromkeys(zip(rows["channel"], rows["input"], strict=True)))
-    names = [f"{channel} with {given or 'itself'}" for channel, given in kinds]
-    figure = make_subplots(rows=len(kinds), cols=1, vertical_spacing=0.3 / len(kinds), subplot_titles=names)
+    data, shapes = [], []
     for place, (channel, given) in enumerate(kinds, start=1):
         chosen = rows[(rows["channel"] == channel) & (rows["input"] == given)]
         for i, (who, line) in enumerate(chosen.groupby("who", sort=False)):
-            figure.add_trace(
-                go.Scatter(x=line["lag"], y=line["value"], name=str(who), legendgroup=str(who), mode="lines+markers",
-                           line=_look(i), showlegend=place == 1), row=place, col=1,
-            )  # fmt: skip
+            lag, value = line["lag"].to_numpy(float), line["value"].to_numpy(float)
+            data.append(_line(lag, value, str(who), place, i) | {"mode": "lines+markers", "marker": {"size": 4}})
         band = float(chosen["band"].iloc[0])
-        figure.add_hrect(y0=-band, y1=band, fillcolor="#888888", opacity=0.25, line_width=0, row=place, col=1)
-        figure.update_yaxes(range=[-1.05, 1.05], row=place, col=1)
-    figure.update_xaxes(title_text="lag [averages of residuals]", row=len(kinds), col=1)
-    figure.update_layout(title_text="Correlation of the residuals; 99 % band in grey", height=130 + 150 * len(kinds))
-    return figure
+        shapes.append(_rectangle(place, y=(-band, band)))
+    names = [f"{channel} with\n{given or 'itself'}" for channel, given in kinds]
+    return _figure(
+        "Correlation of the residuals; 99 % band in grey", data, names, "lag [averages of residuals]", shapes
+    )
+
+
+def profile(rows: pd.DataFrame, estimates: pd.DataFrame) -> Figure:
+    """How the cost rises about every estimate, its 95 % interval in grey; a parabola where the model is linear."""
+    names = list(dict.fromkeys(rows["name"]))
+    known = estimates.set_index("name")
+    data, shapes = [], []
+    for place, name in enumerate(names, start=1):
+        line = rows[rows["name"] == name]
+        values, rise = line["value"].to_numpy(float), line["cost"].to_numpy(float) - 1.0
+        data.append(_line(values, rise, name, place) | {"mode": "lines+markers", "showlegend": False})
+        shapes.append(_rectangle(place, x=(float(known["low"][name]), float(known["high"][name]))))
+    layout = _figure("Cost about each estimate, less that at it; 95 % interval in grey", data,
+                     ["rise of the\ncost [1]"] * len(names), "", shapes)  # fmt: skip
+    for place, name in enumerate(names, start=1):
+        axis = layout["layout"][f"xaxis{number(place)}"]
+        axis |= {"title": {"text": f"{plain(name)} [{known['unit'][name]}]"}, "exponentformat": "power"}
+        axis.pop("matches", None)
+    return layout
+
+
+def together(rows: pd.DataFrame) -> Figure:
+    """Correlations of the estimates, as a map of squares."""
+    names = list(dict.fromkeys(rows["name"]))
+    wide = rows.pivot(index="name", columns="other", values="value").loc[names, names].to_numpy(float)
+    labels = [plain(name) for name in names]
+    heat = {
+        "type": "heatmap", "x": labels, "y": labels, "zmin": -1.0, "zmax": 1.0, "colorscale": "RdBu", "xgap": 1,
+        "ygap": 1, "z": [[None if np.isnan(x) else x for x in row] for row in wide.tolist()],
+        "text": [["" if np.isnan(x) else f"{x:+.2f}" for x in row] for row in wide], "texttemplate": "%{text}",
+        "colorbar": {"title": {"text": "correlation [1]"}},
+        "hovertemplate": "%{x} and %{y}: %{z:.4f}<extra></extra>",
+    }  # fmt: skip
+    return {
+        "data": [heat],
+        "layout": {
+            "title": {"text": "Correlation of the estimates"}, "height": 160 + 40 * len(names),
+            "xaxis": {"title": {"text": "parameter [-]"}, "type": "category"},
+            "yaxis": {"title": {"text": "parameter [-]"}, "type": "category", "autorange": "reversed",
+                      "automargin": True},
+        },
+    }  # fmt: skip
+
+
+def _channels(rows: pd.DataFrame) -> list[tuple[str, str]]:
+    return list(dict.fromkeys(zip(rows["channel"], rows["unit"], strict=True)))
+
+
+def _broken(line: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
+    """Times, measured values and residuals of one line, with a gap between windows."""
+    ends = np.flatnonzero(np.diff(line["window"].to_numpy())) + 1
+    columns = (line[key].to_numpy(float) for key in ("t", "measured", "value"))
+    t, seen, left = (np.insert(column, ends, np.nan) for column in columns)
+    return t, seen, left
+
+
+def _line(x: Floats, y: Floats, name: str, place: int, i: int = 0) -> dict[str, Any]:
+    """One line; its name stands in the legend once."""
+    look = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.5}
+    axis = number(place)
+    return {
+        "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)), "name": plain(name),
+        "legendgroup": plain(name), "showlegend": place == 1, "line": look, "xaxis": f"x{axis}", "yaxis": f"y{axis}",
+    }  # fmt: skip
+
+
+def _band(t: Floats, y: Floats, noise: float, place: int) -> Iterator[dict[str, Any]]:
+    """Where samples lie whose prediction is right: a filled outline a window."""
+    if not np.isfinite(noise):
+        return
+    half = SIGMAS * noise
+    cuts = np.flatnonzero(np.isnan(t))
+    parts = [np.delete(part, np.flatnonzero(np.isnan(t[part]))) for part in np.split(np.arange(len(t)), cuts)]
+    around = [(np.r_[t[at], t[at][::-1], np.nan], np.r_[y[at] + half, y[at][::-1] - half, np.nan]) for at in parts]
+    x, edge = (np.concatenate(one) for one in zip(*around, strict=True))
+    line = _line(x, edge, f"within {SIGMAS:g} deviations of the noise", place)
+    yield line | {"line": {"width": 0}, "fill": "toself", "fillcolor": "rgba(136,136,136,0.35)", "hoverinfo": "skip"}
+
+
+def _shades(rows: pd.DataFrame, held: Sequence[int], plots: int) -> Iterator[dict[str, Any]]:
+    """Windows that were held out, in every plot."""
+    spans = rows[rows["window"].isin(list(held))].groupby("window")["t"].agg(["min", "max"])
+    for k, (start, end) in enumerate(spans.itertuples(index=False)):
+        for place in range(1, plots + 1):
+            name = {"text": "held out", "textposition": "top left", "font": {"size": 10, "color": GREY}}
+            shade = _rectangle(place, x=(float(start), float(end))) | {"fillcolor": "#E69F00", "opacity": 0.12}
+            yield shade | ({"label": name} if k == 0 and place == 1 else {})
+
+
+def _rectangle(
+    place: int, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None
+) -> dict[str, Any]:
+    """A grey stretch of one plot between two values of x, or of y."""
+    n = number(place)
+    ends = {"xref": f"x{n}" if x else f"x{n} domain", "yref": f"y{n}" if y else f"y{n} domain"}
+    (x0, x1), (y0, y1) = x or (0.0, 1.0), y or (0.0, 1.0)
+    return {
+        "type": "rect", "layer": "below", "line": {"width": 0}, "fillcolor": GREY, "opacity": 0.25,
+        "x0": x0, "x1": x1, "y0": y0, "y1": y1,
+    } | ends  # fmt: skip
+
+
+def _figure(title: str, data: list[dict[str, Any]], rows: Sequence[str], below: str, shapes: Any) -> dict[str, Any]:
+    """Plots one below another, over the same x if that has one title."""
+    layout: dict[str, Any] = {
+        "title": {"text": title}, "height": 130 + (170 if below else 220) * len(rows), "shapes": list(shapes),
+        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
+    }  # fmt: skip
+    room = 1.0 / len(rows)
+    for i, row in enumerate(rows):
+        n, low = number(i + 1), 1.0 - (i + 1) * room
+        text, inside = plain(row).replace("\n", "<br>"), low + (0.22 if below else 0.35) * room * (len(rows) > 1)
+        layout[f"yaxis{n}"] = {"anchor": f"x{n}", "title": {"text": text, "standoff": 14}, "exponentformat": "power",
+                               "domain": [inside, low + room]}  # fmt: skip
+        layout[f"xaxis{n}"] = {"anchor": f"y{n}"} | ({"matches": "x"} if n else {})
+    if below:
+        layout[f"xaxis{number(len(rows))}"]["title"] = {"text": below}
+    return {"data": data, "layout": layout}

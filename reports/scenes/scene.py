@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.rotations import matrices
+from crossbody.cases.files.case import quaternions
+from crossbody.cases.rotations import matrices, rates
 from crossbody.cases.scene import Body, Scene
 from crossbody.cases.scene import Shape as SceneShape
 from crossbody.cases.scene_contacts import Contact, contacts
@@ -21,6 +22,8 @@ from crossbody.reports.scenes._kinematics import Pose, body_poses, placed
 
 MOST = 500
 """Bodies that are drawn."""
+SHORT = 1e-5
+"""Over so long a time velocities are taken from places, s: its square and rounding over it are both small."""
 AROUND = 24
 """Points of a drawn circle."""
 FLAT = 5
@@ -99,6 +102,33 @@ def _meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
     at, by = ((rotation, origin) for origin, rotation in stand)
     kinds, sizes = (shapes[0].type, shapes[1].type), (shapes[0].extents, shapes[1].extents)
     return meet(kinds, sizes, at, by, lying(kinds, sizes, at, by, np.full(len(at[1]), contact.parallel)))
+
+
+def slip(scene: Scene, contact: Contact, place: int, q: Floats, v: Floats) -> Floats:
+    """Return the velocity of the second shape over a plane along the plane's x and y (n, 2), m/s.
+
+    Where they meet is kept as a point of the second body, and of the plane's; both go along the velocities by SHORT.
+
+    Args:
+        scene: whose bodies they are.
+        contact: of a plane, its first shape, and another.
+        place: which of its places.
+        q: coordinates (n, nq).
+        v: velocities (n, nv).
+    """
+    owners = [shape.body for shape in (contact.first, contact.second)]
+    now, turns = body_poses(scene, q), matrices(np.asarray(contact.first.orientation))
+    at = _meeting(contact, now)[2][:, place]
+    inside = [np.einsum("nij,ni->nj", now[body][1], at - now[body][0]) for body in owners]
+    rate = rates(q, v, quaternions(scene))
+    ends = [body_poses(scene, q + side * SHORT * rate) for side in (-1.0, 1.0)]
+    moved = [
+        [poses[body][0] + np.einsum("nij,nj->ni", poses[body][1], x) for body, x in zip(owners, inside, strict=True)]
+        for poses in ends
+    ]
+    apart = (moved[1][1] - moved[1][0] - moved[0][1] + moved[0][0]) / (2.0 * SHORT)
+    found: Floats = np.einsum("ni,nij->nj", apart, (now[owners[0]][1] @ turns)[:, :, :2])
+    return found
 
 
 def _scene(p: Parameters) -> Scene:

@@ -1,7 +1,7 @@
 """Studies beside the verdicts of cases: what turns the tables of a folder into sections of a page.
 
-Ours are in `_own`; one of a user's own is a module with a docstring whose first line says what it shows, and the
-public names
+Ours are in `_own`; those of logs, and any of a user's own, are a module each, with a docstring whose first line says
+what it shows, and the public names
 
     TITLE                           heading of its page and of the link to it
     sections(out)                   tuple of `Section`; empty where the folder has no such data
@@ -34,8 +34,9 @@ def names(out: Path | None = None) -> tuple[str, ...]:
     Args:
         out: leave out those of ours that have no table in this folder: its name begins with that of its study.
     """
-    own = [name for name in STUDIES if out is None or any(out.glob(f"{name}*.json"))]
-    return tuple(sorted({*own, *_REGISTRY.names()}))
+    known = {*STUDIES, *_REGISTRY.names()}
+    absent = [name for name in (*STUDIES, *_REGISTRY.own()) if out is not None and not any(out.glob(f"{name}*.json"))]
+    return tuple(sorted(known.difference(absent)))
 
 
 def load(name: str) -> Study:

@@ -1,4 +1,4 @@
-"""The studies of crossbody itself: which of their tables a page shows, under which words, with which figures."""
+"""Our studies but those of logs: which of their tables a page shows, under which words, with which figures."""
 
 from __future__ import annotations
 
@@ -162,43 +162,6 @@ def _stability(out: Path) -> Iterator[Plot]:
     yield Plot(name="stability-map", figure=stability(_rows(out, "stability")))
 
 
-def _known(out: Path, stem: str, shown: Sequence[Column]) -> pd.DataFrame:
-    """The columns that are shown, also those that an earlier version did not write."""
-    return _rows(out, stem).reindex(columns=[column.key for column in shown])
-
-
-def _identify(out: Path) -> tuple[Section, ...]:
-    if not _has(out, "identify"):
-        return ()
-    told = read_json(out / "identify.json")["provenance"]["fit"]
-    text = (
-        f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}. {' '.join(told['warnings'])} "
-        "Held-out windows were not fitted; their errors say what the estimates are worth."
-    )
-    tables = (
-        _table("Estimates", words.ESTIMATES, _known(out, "identify", words.ESTIMATES), "identify"),
-        _table("Errors before and after", words.HELD, _known(out, "held_out", words.HELD), "held_out"),
-    )
-    return (Section(name="identify", title="Identified parameters", text=text, tables=tables),)
-
-
-def _replay(out: Path) -> tuple[Section, ...]:
-    if not _has(out, "replay"):
-        return ()
-    from crossbody.reports.replay.figure import correlation, residual
-
-    found = _rows(out, "findings")
-    drawn = {"residual": (residual, _rows(out, "residuals")), "correlation": (correlation, _rows(out, "correlations"))}
-    plots = [Plot(name=f"replay-{name}", figure=draw(rows)) for name, (draw, rows) in drawn.items() if len(rows)]
-    tables = [_table("Metrics of the replay", words.METRICS, _known(out, "replay", words.METRICS), "replay")]
-    if len(found):
-        tables.append(_table("Findings about the log", words.FINDINGS, found, "findings"))
-    about = read_json(out / "replay.json")["provenance"]["log"]
-    origin = "SYNTHETIC, no measurement." if about["synthetic"] else "A measurement."
-    text = f"{origin} {about['file']}: {about['about']} {words.REPLAY_TEXT}"
-    return (Section(name="replay", title="Log and model", text=text, plots=plots, tables=tables),)
-
-
 def _stress(out: Path) -> Iterator[Section]:
     if not _has(out, "stress_summary"):
         return
@@ -234,8 +197,6 @@ STUDIES: Mapping[str, Study] = {
             words.HEADLINE,
         ),
     ),
-    "identify": Study(TITLE="Identification", sections=_identify),
-    "replay": Study(TITLE="Replay", sections=_replay),
     "skip": Study(
         TITLE="What is skipped",
         sections=_plain("skip", "What is skipped", "What is skipped", words.SKIP_TEXT, words.RATIOS),

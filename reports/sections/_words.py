@@ -111,28 +111,6 @@ STABILITY = columns(
     who="Engine", scene="Scene", expected="Published", outcome="Outcome", arrival=("Arrival [s]", Kind.NUMBER),
     ended=("End [s]", Kind.NUMBER), changes=("Rings passed", Kind.NUMBER), why=("Says", Kind.LONG),
 )  # fmt: skip
-ESTIMATES = columns(
-    name="Parameter", value=("Estimate", Kind.NUMBER), low=("95 % from", Kind.NUMBER), high=("to", Kind.NUMBER),
-    unit="Unit", start=("Start", Kind.NUMBER), identifiable="Identifiable",
-    first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
-)  # fmt: skip
-HELD = columns(
-    error="Error", fitted_before=("Fitted windows, start", Kind.NUMBER), fitted_after=("estimate", Kind.NUMBER),
-    held_before=("Held-out windows, start", Kind.NUMBER), held_after=("estimate", Kind.NUMBER),
-    change=("Change on held-out [%]", Kind.NUMBER), verdict="Verdict",
-)  # fmt: skip
-REPLAY_TEXT = (
-    "The model starts in each window from what was measured there and runs on recorded inputs, held between their "
-    "recorded times. Residuals are averaged over a twelfth of the motion's period; where what is left is noise, and an "
-    "error no larger than that of one sample, 99 of 100 correlations lie within the band."
-)
-METRICS = columns(
-    who="Engine", metric="Metric", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
-    expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER), verdict="Verdict",
-)  # fmt: skip
-FINDINGS = columns(
-    what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)
-)
 STRESS_TEXT = (
     "Quasi-random and gridded scenes up to their extremes, each bounded in steps and time. A run is outside if it "
     "threw, leaked a warning or returned what is not a number; the reference also if it is further from a truth of "

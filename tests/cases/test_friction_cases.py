@@ -19,9 +19,15 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word, judge
 from crossbody.reports.measuring.truth import from_run, sample_times
 
-NAMES = ("sliding_block", "rolling_sphere", "rocking_block", "block_on_belt", "stacked_blocks")
+NAMES = (
+    "sliding_block", "rolling_sphere", "rocking_block", "block_on_belt", "stacked_blocks", "held_weight",
+    "dry_oscillator",
+)  # fmt: skip
 ALL = [(name, variant) for name in NAMES for variant in cases.variants(name)]
-BENT = [("sliding_block", "askew"), ("rolling_sphere", "side_spin"), ("block_on_belt", "grazes")]
+BENT = [
+    ("sliding_block", "askew"), ("rolling_sphere", "side_spin"), ("block_on_belt", "grazes"),
+    ("dry_oscillator", "swings"),
+]  # fmt: skip
 """Whose motions are no polynomials, so that a step has an error, and that switch."""
 STATE, TIME = 1e-9, 1e-11
 

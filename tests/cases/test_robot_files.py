@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 from places import ROBOTS
-from published import SAME, STATES, moves_as_in_mujoco
+from published import SAME, STATES, dynamics_of, moves_as_in_mujoco
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Outcome, SceneError, UnknownName
@@ -649,7 +649,6 @@ def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"shoulder": 'frictionloss=".1"'}, "shoulder.*friction.*without=friction"),
         ({"shoulder": 'actuatorgravcomp="true" actuatorfrclimited="true" actuatorfrcrange="-1 1"'}, "shoulder"),
         ({"integrator": 'RK4" wind="1 0 0'}, "wind.*without=medium"),
         ({"integrator": 'RK4" density="1'}, "density 1.*without=medium"),
@@ -857,6 +856,19 @@ def test_a_urdf_has_the_inertias_of_its_own(tmp_path: Path) -> None:
     assert [sentence.split("'")[1] for sentence in findings(path)] == ["hand"]
 
 
+def test_an_inertia_that_no_body_has_is_the_same_in_pinocchio(tmp_path: Path) -> None:
+    import pinocchio as pin
+
+    from crossbody.engines.pinocchio.scene import tree
+
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF.replace('iyy=".2"', 'iyy="-.01"'), encoding="utf-8")
+    scene = scene_of_file(path, model_of(path))
+    model, q = tree(scene)[0], np.array([0.3, 0.5])
+    upper = np.triu(pin.crba(model, model.createData(), q))
+    assert np.abs(dynamics_of(scene)(q, q, np.zeros(0))[0] - upper - np.triu(upper, 1).T).max() <= SAME
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -864,6 +876,11 @@ def test_a_urdf_has_the_inertias_of_its_own(tmp_path: Path) -> None:
         ('xyz="0 .1 -.2"', 'xyz="0 .1"', "three numbers"),
         ("</robot>", "", "no XML"),
         ("robot", "model", "<model>|compiler refuses"),
+        (
+            '<dynamics damping=".2"/>',
+            '<mimic joint="elbow"/>',
+            "mimics 'elbow', which does not exist; .*: shoulder, tip",
+        ),
     ],
 )
 def test_a_wrong_urdf_is_refused_by_name(tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -14,7 +14,7 @@ from crossbody import cases
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES
-from crossbody.engines._contacts import FAR, Contacts
+from crossbody.engines._contacts import FAR, Contacts, drift
 from crossbody.engines.equations import system_of
 from crossbody.engines.nearest import Pose
 from crossbody.reports.scenes.scene import _meeting
@@ -191,3 +191,18 @@ def test_the_reference_finds_the_same_gaps_apart_and_inside_each_other(types: tu
         theirs = met.touches(poses.__getitem__).gap
         there = theirs < FAR
         np.testing.assert_allclose(system.gap(q, np.zeros(12))[0][there], theirs[there], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_slope_of_a_rate_is_that_of_the_side_on_which_one_is(seed: int) -> None:
+    """Rates with a kink anywhere within the differences, or none."""
+    rng = np.random.default_rng(seed)
+    v = rng.normal(size=3)
+    place = rng.uniform(-3e-3, 3e-3, 50) / np.abs(v).max()
+    phase, bend = rng.uniform(0.0, 6.0, 50), rng.normal(size=50) * (rng.random(50) < 0.7)
+
+    def rates(times: Floats) -> Floats:
+        t = times[:, None]
+        return np.sin(t + phase) + bend * np.where(place > 0.0, np.maximum(t - place, 0.0), np.minimum(t - place, 0.0))
+
+    assert np.abs(drift(rates, v) - np.cos(phase)).max() <= 1e-9

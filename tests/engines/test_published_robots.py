@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from published import MJCF, STATES, URDF, close, dynamics_of, moves_as_in_mujoco
+from places import ROBOTS
+from published import (
+    MJCF,
+    STATES,
+    URDF,
+    close,
+    dynamics_of,
+    moves_as_in_mujoco,
+    rows_as_in_pinocchio,
+    stands_as_in_mujoco,
+)
 
 from crossbody.cases import SceneError
 from crossbody.cases.files.case import check_runnable
@@ -28,13 +38,14 @@ REFUSED = {
     "ur_description/ur3": "no joint",
 }
 """What a scene does not have, and the word by which the refusal says so."""
+PUBLISHED = sorted(path for path in ROBOTS.glob("*/*.xml"))
 NOTHING = [pytest.param("", marks=pytest.mark.skip(reason="The packages of the extra `robots` are not installed."))]
 
 
 def read(name: str, path: Path) -> tuple[Any, Scene] | None:
     """Return the model and the scene of a file less its friction; None where it is refused as it should be."""
     try:
-        model = model_of(path, "friction,meshes")
+        model = model_of(path, "friction")
         scene = scene_of(path, model)
         check_runnable(scene)
         tabulate(scene)
@@ -44,6 +55,18 @@ def read(name: str, path: Path) -> tuple[Any, Scene] | None:
         return None
     assert name not in REFUSED, f"{name} is read now"
     return model, scene
+
+
+EVERY = {**{f"shared/{path.stem}": path for path in PUBLISHED}, **MJCF, **URDF}
+
+
+@pytest.mark.parametrize("name", list(EVERY) or NOTHING)
+def test_a_published_file_has_the_frames_of_mujoco_and_the_rows_of_pinocchio(name: str) -> None:
+    found = read(name, EVERY[name])
+    if found is None:
+        return
+    stands_as_in_mujoco(*found)
+    rows_as_in_pinocchio(*found)
 
 
 @pytest.mark.parametrize("name", list(MJCF) or NOTHING)

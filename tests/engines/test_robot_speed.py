@@ -14,6 +14,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 from places import ROBOTS
 
@@ -22,6 +23,8 @@ from crossbody.cases import Case
 from crossbody.cases.files.warned import captured
 from crossbody.cases.rotations import differences
 from crossbody.engines.mujoco.scene import matched
+from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio.scene import tree
 
 pytestmark = pytest.mark.bench
 WANTED = 1e-9
@@ -88,3 +91,40 @@ def test_a_robot_moves_faster_than_in_mujoco_at_the_same_error(name: str) -> Non
     ratio = float(np.median([cpu(lambda: theirs(steps)) / cpu(ours.inner.go) for _ in range(7)]))
     print(f"\n{name}: {ratio:.1f} times as fast as MuJoCo in {steps} steps; rtol {ours.settings['rtol']:.1g}")
     assert ratio >= ROBOT[name][1]
+
+
+@pytest.mark.parametrize("name", ["universal_robots_ur5e/ur5e", "unitree_go1/go1"])
+def test_aba_alone_under_cvode_takes_less_than_ten_of_our_runs(name: str) -> None:
+    """What Pinocchio under a compiled CVODE would take lies between two figures.
+
+    From below its `aba` at every right-hand side of CVODE, and nothing else; from above beside it all that our own
+    CVODE takes, with its equations and its calls from Python. The robots are those without rows, where `aba` is all.
+    """
+    case, reference = thrown(name), engines.load("reference")
+    truth = reference.prepare(case, "compiled", rtol=1e-12).run()
+    pairs = []
+    for profile in ("compiled", "cvode"):
+        prepared = (
+            reference.prepare(case, profile, rtol=float(rtol), samples=[case.t_end], ledger=False)
+            for rtol in 10.0 ** -np.arange(5.0, 13.0, 0.25)
+        )
+        pairs.append(next(
+            (one, run) for one in prepared
+            if differences((run := one.run()).q[-1:], truth.q[-1:], case.quaternions).max() <= WANTED
+        ))  # fmt: skip
+    (ours, _), (cvode, with_cvode) = pairs
+    scene, count = case.scene, with_cvode.counts["rhs"]
+    assert scene is not None
+    model, to = tree(scene)[0], Coordinates(scene)
+    data, q, tau = model.createData(), to.theirs(case.q0), np.zeros(scene.nv)
+    v = to.back(q, case.v0)
+
+    def dynamics() -> None:
+        for _ in range(count):
+            pin.aba(model, data, q, v, tau)
+
+    taken = [(cpu(ours.inner.go), cpu(dynamics), cpu(cvode.run)) for _ in range(5)]
+    own, aba, whole = np.median(taken, axis=0)
+    print(f"\n{name}: {count} right-hand sides of CVODE; aba alone takes {aba / own:.1f} of our runs, "
+          f"beside our CVODE {(aba + whole) / own:.1f}")  # fmt: skip
+    assert aba / own < 10.0

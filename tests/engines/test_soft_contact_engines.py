@@ -96,7 +96,7 @@ def test_engines_hold_the_same_physics(engine, profile, changed):
 
 
 def test_the_obvious_model_in_mujoco_is_the_same_mechanism_with_softer_contacts():
-    """Its pads hang on springs of their own joints; its contacts give way more than the pads do."""
+    """Its balls touch at one place each, which gives way more than the pads do."""
     pytest.importorskip("mujoco")
     case = cases.load("soft_contact")
     prepared = load("mujoco").prepare(case, "default")
@@ -107,8 +107,8 @@ def test_the_obvious_model_in_mujoco_is_the_same_mechanism_with_softer_contacts(
     assert run.outcome is Outcome.FINISHED
     assert run.q[-1, FLANGE] == pytest.approx(6.4e-3, abs=1e-5)
     squeezed = case.number("squeeze") + run.gap[-1]
-    np.testing.assert_allclose(run.lam[-1], case.number("kp") * squeezed, rtol=1e-3)
-    assert 0.05 < run.lam[-1].max() / (case.number("kp") * case.number("squeeze")) < 0.15
+    assert run.lam[-1].sum() == pytest.approx(case.number("kp") * squeezed.sum(), rel=1e-3)  # the block still comes
+    assert 0.02 < run.lam[-1].max() / (case.number("kp") * case.number("squeeze")) < 0.03
 
 
 HASTE = {"descent": 0.1, "rise": 0.8, "rise_time": 0.3}
@@ -132,7 +132,7 @@ def test_what_an_engine_cannot_do_is_said():
     pytest.importorskip("pinocchio")
     for variant in ("axis", "delta"):
         for profile in ("impulse", "impulse_simultaneous", "admm"):
-            with pytest.raises(CaseUnsupported, match="sensors read forces"):
+            with pytest.raises(CaseUnsupported, match="feels forces that are finite"):
                 load("pinocchio").prepare(cases.load("soft_contact", variant), profile)
 
 

@@ -18,36 +18,33 @@ def missed(logs: tuple[hw.Log, ...], engine: str) -> np.ndarray:
     return np.array([np.linalg.norm(one.residual(one.predictions[0])[:, :3], axis=1).mean() for one in found])
 
 
-def test_tosses_in_mujoco_are_a_centimetre_off() -> None:
-    every_third = missed(tosses(3), "mujoco")
-    print(f"median {1e3 * np.median(every_third):.2f} mm of {len(every_third)} tosses")
-    assert np.median(every_third) == pytest.approx(10.5e-3, abs=1.5e-3)
+def test_tosses_are_a_centimetre_off_and_the_reference_is_no_worse_than_mujoco() -> None:
+    logs = tosses(19)
+    own, theirs = missed(logs, "reference"), missed(logs, "mujoco")
+    print(f"mean {1e3 * own.mean():.2f} mm, MuJoCo {1e3 * theirs.mean():.2f} mm, of {len(own)} tosses")
+    assert own.mean() <= theirs.mean() < 15e-3
 
 
-def test_the_obvious_model_is_off_by_more() -> None:
-    logs = tosses(9)
-    assert np.median(missed(logs, "mujoco:default")) > 1.5 * np.median(missed(logs, "mujoco"))
-
-
-def test_tosses_in_pinocchio_and_why_the_reference_has_none() -> None:
-    pytest.importorskip("pinocchio")
-    logs = tosses(38)
-    assert np.median(missed(logs, "pinocchio")) < 30e-3
-    found = hw.replay(logs[0], "cube_toss", wanted=("reference", "pinocchio:law"))
-    assert "no Coulomb friction" in found.skipped["reference", "matched"]
-    assert "no friction" in found.skipped["pinocchio", "law"]
-
-
-def test_friction_is_found_near_the_published_one() -> None:
-    fit = hw.identify(tosses(19), "cube_toss", ["friction"], hold=0, parameters={"friction": 0.25})
-    assert fit["friction"].value == pytest.approx(0.18, abs=0.02)
-    assert fit["friction"].identifiable
-    assert 0.12 < fit["friction"].low < fit["friction"].high < 0.24
+@pytest.mark.parametrize("engine", ["pinocchio", "drake", "dart"])
+def test_the_same_scene_is_tossed_in_every_engine(engine: str) -> None:
+    pytest.importorskip({"drake": "pydrake", "dart": "dartpy"}.get(engine, engine))
+    logs = tosses(95)
+    assert np.median(missed(logs, engine)) < 40e-3
+    found = hw.replay(logs[0], "cube_toss", wanted=("pinocchio:law",))
+    assert "has friction" in found.skipped["pinocchio", "law"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["timeconst", "dampratio"])
+def test_friction_is_found_in_its_published_interval() -> None:
+    fit = hw.identify(tosses(19), "cube_toss", ["mu"], hold=0, parameters={"mu": 0.25})
+    assert fit["mu"].value == pytest.approx(0.18, abs=0.03)
+    assert fit["mu"].identifiable
+    assert 0.12 < fit["mu"].low < fit["mu"].high < 0.24
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["a0", "a1"])
 def test_the_data_are_flat_in_stiffness_and_damping(name: str) -> None:
-    fit = hw.identify(tosses(9), "cube_toss", [name], hold=0)
+    fit = hw.identify(tosses(19), "cube_toss", [name], hold=0)
     assert not fit[name].identifiable
     assert any(f"{name} is not identifiable" in warning for warning in fit.warnings)

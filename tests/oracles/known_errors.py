@@ -249,6 +249,15 @@ def acting(s: Scene) -> tuple[Trajectory, float]:
     return changed(s.run, "lam", closed(s, shut=False), s.sign() * OFF * s.run.lam.max(), whole=True), OFF
 
 
+def acting_unseen(s: Scene) -> tuple[Trajectory, float]:
+    """The same of a run that has no modes: where it stands higher than anything that touches."""
+    k, row = closed(s, shut=False)
+    while s.run.gap[k, row] < 0.1 * s.run.gap.max():
+        k, row = closed(s, shut=False)
+    run = changed(s.run, "lam", (k, row), s.sign() * OFF * s.run.lam.max(), whole=True)
+    return replace(run, mode=np.full_like(run.mode, -1)), OFF
+
+
 def impulse(run: Trajectory) -> float:
     """The largest impulse of any row at any sample, by the trapezoidal rule."""
     total = np.cumsum(0.5 * np.diff(run.t)[:, None] * (run.lam[1:] + run.lam[:-1]), axis=0)
@@ -393,6 +402,7 @@ ERRORS: dict[str, tuple[str, Known]] = {
     "lam_impulse_path of collisions in no time": ("blow", struck),
     "complementarity": ("box", pulling),
     "complementarity of an open row": ("box", acting),
+    "complementarity without modes": ("box", acting_unseen),
     "event_gap": ("box", off_its_surface),
     "event_gap of one row": ("linear ball", off_its_surface),
     "event_gap of a row that lets go": ("linear ball", pushing_as_it_lets_go),

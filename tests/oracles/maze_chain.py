@@ -13,7 +13,7 @@ import mujoco
 
 from crossbody.cases import Law
 from crossbody.engines._maze.scene import BallMaze
-from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, direct_solref
+from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, solref_of
 
 FAR = 1e10
 """Margin that no gap falls below, m."""
@@ -76,8 +76,8 @@ def compiled(maze: BallMaze, law: Law) -> Any:
     text = _XML.format(
         gravity=-p.g, Jm=p.Jm, mb=p.mb, Jb=p.Jb, r=p.r, off=-FAR,
         solimp=f"{MAX_IMPEDANCE} {MAX_IMPEDANCE} 0.001 0.5 1",
-        normal=_pair(direct_solref(law, 0)),
-        slip=_pair(direct_solref(law, 6)) if maze.rows.rolling else "0 0",
+        normal=_pair(solref_of(law.a0[0], law.a1[0])),
+        slip=_pair(solref_of(law.a0[6], law.a1[6])) if maze.rows.rolling else "0 0",
         tips="".join(f'<geom name="{tip}" size="1" pos="1 1 0"/>' for tip in TIPS),
         pairs="".join(f'<pair name="{tip}" geom1="{tip}" geom2="ball"/>' for tip in TIPS),
     )  # fmt: skip

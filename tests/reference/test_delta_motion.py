@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from crossbody.cases import InvalidValue, Law, Outcome, SceneError
+from crossbody.cases import InvalidValue, Outcome, SceneError, load
+from crossbody.cases.mechanisms.delta import form as chart
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta import control, kick, paths, system
 from crossbody.reference.delta.kernels import robot as kernels
@@ -106,8 +107,7 @@ def test_impulse_changes_the_momentum_that_the_loops_leave_free():
 def test_pulse_under_servos_agrees_with_pinocchio():
     """5 s at rtol 1e-10 against Pinocchio's constrained dynamics through SciPy's DOP853 at 1e-13."""
     pytest.importorskip("pinocchio")
-    from crossbody.engines._delta import chart
-    from crossbody.engines.pinocchio._delta_model import by_hand
+    from crossbody.engines.pinocchio.scene import build
 
     robot = delta.LIGHT
     q0 = delta.inverse(robot, (0.0, 0.0, 0.6))
@@ -117,17 +117,17 @@ def test_pulse_under_servos_agrees_with_pinocchio():
     inputs = pulse(hold, force, 0.5, 0.02)
     run = simulate(system(robot, servo=servo), q0, np.zeros(9), 5.0, rtol=1e-10, samples=t, inputs=inputs)
 
-    law = Law(a0=np.full(6, P**2), a1=np.full(6, 2 * P), a2=np.zeros(6), unilateral=np.zeros(6, bool))
-    closed = by_hand(robot, law)
+    form = chart.in_tree(load("delta_free", p=P))
+    closed = build(form.case, "forwardDynamics").rows.native
 
     def motion(r, rd, f):
-        q, v = chart.from_tree(r, rd)
+        (q,), (v,) = chart.motion(r[None], rd[None])
         tau = -np.tile([robot.d1, robot.d2, robot.d3], 3) * v
         tau[MOTORS] += hold[:3] + kp * (y0 - q[MOTORS]) - kd * v[MOTORS]
         tau += delta.virtual_jacobian(robot, q).T @ f
-        return closed.accelerate(r, rd, chart.rate_matrix(r).T @ tau)
+        return closed.accelerate(r, rd, form.rate_matrix(r).T @ tau)
 
-    x, states = np.concatenate(chart.to_tree(q0, np.zeros(9))), []
+    x, states = np.concatenate(form.to_scene(q0, np.zeros(9))), []
     for start, stop, f in ((0.0, 0.5, 0 * force), (0.5, 0.52, force), (0.52, 5.0, 0 * force)):
         grid = t[(t >= start) & (t < stop)] if stop < 5 else t[t >= start]
         solved = solve_ivp(
@@ -137,7 +137,7 @@ def test_pulse_under_servos_agrees_with_pinocchio():
         states.append(solved.y.T[: len(grid)])
         x = solved.y[:, -1]
     states = np.vstack(states)
-    q = chart.from_tree(states[:, :9], states[:, 9:])[0]
+    q = chart.motion(states[:, :9], states[:, 9:])[0]
     z, own = (np.array([delta.flange(robot, row) for row in rows]) for rows in (q, run.q))
     np.testing.assert_allclose(own, z, atol=1e-10)
     at = np.abs(t - 0.5) > 1e-9  # lam jumps where the pulse begins

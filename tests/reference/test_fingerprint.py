@@ -28,7 +28,7 @@ from crossbody.reference.cache import Lean
 from crossbody.reference.core._struct import bundle_type
 from crossbody.reference.kernels import NAMES, helper
 
-MODULES = ("hw.fitting.rk4", "engines._delta.forces")
+MODULES = ("hw.fitting.rk4",)
 PACKAGES = (core, systems, linear)
 KEPT = {"helper", "compiled", *NAMES}
 

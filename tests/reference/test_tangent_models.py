@@ -18,6 +18,7 @@ from crossbody.cases.scene_rows import rows_of
 from crossbody.engines.linear import Spot
 from crossbody.reference import System, kernels, simulate
 from crossbody.reference.linear import linearise, sensitivity, tangents, trim
+from crossbody.reference.linear._derivatives import turning
 from crossbody.reference.linear.differences import differences
 from crossbody.reference.tree.system import system
 
@@ -266,3 +267,46 @@ def test_what_is_not_there_on_a_tangent_space_says_so() -> None:
         tangents(of, np.zeros((1, 7)))
     with pytest.raises(SceneError, match="has 7 entries"):
         linearise(of, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], names=[str(i) for i in range(7)])
+
+
+class Carried:
+    """What `turning` asks of a system, of which positions move at rest too: q' = N(q) v + r(q), all drawn."""
+
+    n = nq = 3
+    p = np.zeros(0)
+
+    def __init__(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self.ways, self.bent = np.eye(3) + 0.2 * rng.normal(size=(3, 3)), 0.3 * rng.normal(size=(3, 3, 3))
+        self.rest = rng.normal(size=(3, 3))
+
+    def velocity(self, t: float, q: np.ndarray, v: np.ndarray, p: np.ndarray, out: np.ndarray) -> None:
+        out[:] = (self.ways + self.bent @ np.sin(q)) @ v + self.rest @ np.cos(q)
+
+    def rates(self, q: np.ndarray, v: np.ndarray, t: float = 0.0) -> np.ndarray:
+        found = np.zeros(3)
+        self.velocity(t, q, v, self.p, found)
+        return found
+
+    def displacement(self, q: np.ndarray, d: np.ndarray) -> np.ndarray:
+        return (self.ways + self.bent @ np.sin(q)) @ d
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_tangent_space_that_is_carried_at_rest_turns_as_its_motion_says(seed: int) -> None:
+    """Two neighbouring motions, integrated: what T says of the coordinates of their difference, at any velocity."""
+    carried: Any = Carried(seed)
+    rng = np.random.default_rng(100 + seed)
+    q, v, off, dt = rng.normal(size=3), rng.normal(size=3), 1e-6, 1e-4
+
+    def moved(start: np.ndarray, by: float) -> np.ndarray:
+        middle = start + 0.5 * by * carried.rates(start, v)
+        return start + by * carried.rates(middle, v)
+
+    def coordinates(d: np.ndarray, by: float) -> np.ndarray:
+        near, far = (moved(q + sign * off * carried.displacement(q, d), by) for sign in (-1.0, 1.0))
+        N = np.stack([carried.displacement(moved(q, by), e) for e in np.eye(3)], axis=1)
+        return np.linalg.solve(N, (far - near) / (2.0 * off))
+
+    T = np.stack([(coordinates(e, dt) - coordinates(e, -dt)) / (2.0 * dt) for e in np.eye(3)], axis=1)
+    np.testing.assert_allclose(turning(carried, 0.0, q, v), T, atol=1e-5)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,10 @@ from crossbody.cases.files.conformance import FEATURES
 from crossbody.engines import importers
 from crossbody.engines.importers.process import bounds, rotation, tried
 from crossbody.reports.importers.audit import audited, opened
-from crossbody.reports.importers.causes import explained, uses
-from crossbody.reports.importers.compare import NONE, OK, UNSEEN, WORDS, WRONG, Said, rows
-from crossbody.reports.importers.fix import MARK
+from crossbody.reports.importers.causes import advice, explained, parts, uses
+from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WORDS, WRONG, Said, rows
+from crossbody.reports.importers.declared import excused
+from crossbody.reports.importers.forms import Forms
 from crossbody.reports.importers.told import sarif, sentence
 
 PARTS = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
@@ -181,14 +183,20 @@ def test_nothing_is_written_over_what_is_read_or_is_somebody_elses(
         ["--sarif", "part.xml"],
         ["--markdown", "arm.xml"],
         ["--fix", "other.xml"],
+        ["--sarif", "other.xml"],
+        ["--markdown", "other.xml"],
     ):
         words[1] = str(tmp_path / words[1])
         before = Path(words[1]).read_text()
         assert run(["audit", str(path), "-e", "mujoco", *words], capsys)[0] == 2, words
         assert Path(words[1]).read_text() == before
-    for words in (["--force"], []):  # what it has written it may write again
-        assert run(["audit", str(path), "-e", "mujoco", "--fix", str(other), *words], capsys)[0] == 0
-    assert MARK in other.read_text()
+    for option in ("--fix", "--sarif", "--markdown"):
+        other.write_text("mine")
+        for words in (["--force"], []):  # what it has written it may write again
+            assert run(["audit", str(path), "-e", "mujoco", option, str(other), *words], capsys)[0] == 0
+        assert "mine" not in other.read_text()
+    both = ["--sarif", str(tmp_path / "a"), "--markdown", str(tmp_path / "a")]
+    assert run(["audit", str(path), "-e", "mujoco", *both], capsys)[0] == 2
 
 
 def test_what_is_no_file_or_nobody_reads_is_a_sentence(
@@ -357,3 +365,103 @@ def test_rounding_of_weights_far_out_is_no_difference(seed: int, tmp_path: Path)
     )
     found = {row.quantity: row for _, _, rows in audited(path, ["mujoco", "pinocchio"]) for row in rows}
     assert not [row for row in found.values() if row.verdict == WRONG and row.quantity in ("gravity", "bias")]
+
+
+DECLARED = [
+    ("weight that is taken off", "a.xml:{}: The attribute 'gravcomp' found in a 'body' tag is unsupported.",
+     {"gravity", "bias"}),
+    ("gravity switched off", "a.xml:{}: The tag 'flag' found as a child of 'option' is currently unsupported.",
+     {"gravity", "bias", "energy"}),
+    ("total mass", "The attribute 'settotalmass' found in a 'compiler' tag will be ignored.",
+     {"inertia", "M", "gravity", "bias", "energy"}),
+    ("density of a geom", "a.xml:{}: The attribute 'density' found in a 'geom' tag will be ignored.",
+     {"inertia", "M", "gravity", "bias", "energy"}),
+    ("frame", "The tag 'frame' found as a child of 'body' is unsupported.", {"coordinates"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "line", "excuses"), DECLARED, ids=lambda one: one if isinstance(one, str) else "")
+def test_all_that_follows_from_what_is_declared_is_unsupported_and_nothing_else(
+    name: str, line: str, excuses: set[str], tmp_path: Path
+) -> None:
+    """The answer is that of a reader without fault to whom the file was given without it; then with a fault too."""
+    path, bare = tmp_path / "a.xml", tmp_path / "bare.xml"
+    text = next(feature.text for feature in FEATURES if feature.name == name)
+    path.write_text(text)
+    key = re.findall(r"'(\w+)'", line)[0]
+    without = re.sub(rf"<(frame|option><flag)[^>]*>(</option>)?|</frame>| {key}=\"[^\"]*\"", "", text)
+    number = 1 + next(k for k, one in enumerate(text.splitlines()) if key in one)
+    bare.write_text(re.sub(r'<body name="lower".*?</body>', "", without, flags=re.S) if key == "frame" else without)
+    for fault in ("", ' pos=".1 0 0"'):
+        bare.write_text(bare.read_text().replace('<joint name="shoulder"', f'<joint name="shoulder"{fault}'))
+        audit = opened(path)
+        answer = opened(bare, job=audit.job).wanted
+        lost = [name for name, *_ in audit.job["joints"] if name not in answer["numbers"]["armature"]]
+        answer = answer | {"version": "1", "told": [line.format(number)], "missing": lost}
+        with Forms(path, partial(opened, job=audit.job)) as forms:
+            told = excused(rows("e", answer, audit.wanted, audit.job["joints"], audit.named), answer, audit, forms)
+        off = {row.quantity: row.verdict for row in told if row.verdict not in (OK, NONE)}
+        if not fault or lost:
+            assert off == dict.fromkeys(excuses, UNSUPPORTED)
+        else:
+            assert off["M"] == off["frames"] == off["gravity"] == WRONG
+
+
+def test_two_features_that_act_together_are_named_together(tmp_path: Path) -> None:
+    """Weight is wrong by a mass and by gravity: without either it is wrong by the other."""
+    path = tmp_path / "arm.xml"
+    head = '<option gravity="0 0 -3"/><compiler settotalmass="3"/><worldbody>'
+    path.write_text(ARM.replace("<worldbody>", head))
+    found = [row for _, _, own in audited(path, ["pinocchio"], seconds=60.0) for row in own]
+    told = {row.quantity: row for row in explained(path, urdf=False, rows=found, seconds=60.0) if row.verdict == WRONG}
+    assert {told[key].cause for key in ("inertia", "M")} == {"total mass"}
+    both = told["gravity"]
+    assert (set(parts(both.cause)), both.doubt) == ({"total mass", "gravity"}, "")
+    assert all(advice(one) in advice(both.cause) for one in parts(both.cause))
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 200])
+def test_a_table_keeps_to_the_columns_that_there_are(
+    columns: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    path = tmp_path / "arm.xml"
+    path.write_text(PARTS)
+    engines = ["mujoco", "pinocchio", "dart"]
+    _, out, _ = run(["audit", str(path), *(word for name in engines for word in ("-e", name))], capsys)
+    assert max(map(len, out.splitlines())) <= min(columns, 80)
+    assert len(re.findall("^reading ", out, re.M)) == -(-len(engines) // ((min(columns, 80) - 13) // 11))
+
+
+def test_a_reader_that_had_no_luck_once_is_not_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It fails the first time alone, as one that compiles itself does: no feature of the file is to blame."""
+    monkeypatch.setattr(installed, "_FILES", {})
+    reader, path = tmp_path / "slow.py", tmp_path / "arm.xml"
+    body = f"""    from pathlib import Path
+    mark = Path({str(tmp_path / "mark")!r})
+    if not mark.exists():
+        mark.touch()
+        raise RuntimeError("not yet")
+    from importlib.util import module_from_spec, spec_from_file_location
+    spec = spec_from_file_location("own", {importers.REGISTRY.load("mujoco").__file__!r})
+    own = module_from_spec(spec)
+    spec.loader.exec_module(own)
+    return own.open_robot(path, urdf)
+"""
+    reader.write_text(HEAD + body)
+    installed.use([reader])
+    path.write_text(ARM.replace("<worldbody>", '<option gravity="0 0 -3"/><worldbody>'))
+    found = [row for _, _, own in audited(path, ["slow"], seconds=60.0) for row in own]
+    assert [row.verdict for row in found] == [FAILED]
+    assert [row.cause for row in explained(path, urdf=False, rows=found, seconds=60.0)] == [""]
+
+
+@pytest.mark.parametrize("far", [1.0, 1e4, 1e9])
+def test_a_robot_far_away_is_no_other_robot(far: float, tmp_path: Path) -> None:
+    """Centres are rounded as the places they are measured at; one that is another is another as far as that."""
+    text = PARTS.replace('pos="0 0 1"', f'pos="{far!r} 0 1"', 1)
+    text = re.sub(r"<equality>.*?</equality>", "", text, flags=re.S)
+    told = rows_of(tmp_path / "far.xml", "mujoco", text, text)
+    assert told["inertia"] == OK
+    other = text.replace('size=".1 .2" mass="1"', 'size=".1 .2" mass="1.001"')
+    assert rows_of(tmp_path / "far.xml", "mujoco", text, other)["inertia"] == WRONG

@@ -10,6 +10,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, InvalidValue, Outcome, SceneError, Tier, Trajectory, load
 from crossbody.cases.mechanisms.delta import pose
+from crossbody.cases.scene_rows import under_law
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.kinematics import tips
@@ -77,15 +78,6 @@ def test_engines_that_follow_the_law_stay_within_ten_nanometres(name: str, profi
     np.testing.assert_allclose(delta.flanges(robot, run.q[keep]), delta.flanges(robot, own.q), atol=1e-8)
 
 
-def test_both_sources_of_pinocchios_model_move_alike() -> None:
-    pytest.importorskip("pinocchio")
-    case = load("delta_impulse", t_end=1.0)
-    one, two = (
-        engines.load("pinocchio").prepare(case, "law", model=m, rtol=1e-12).run() for m in ("by_hand", "imported")
-    )
-    np.testing.assert_allclose(one.q[-1], two.q[-1], atol=1e-10)
-
-
 def test_verdicts_of_the_impulse() -> None:
     """Everything that follows the law is within; how far MuJoCo as it comes is off is known at the shipped horizon."""
     pytest.importorskip("mujoco")
@@ -137,9 +129,8 @@ def test_where_lam_is_ill_posed_its_force_is_compared_instead(tilt: int) -> None
     """H loses rank: no lam is reported; H^T lam is unique and the same in Pinocchio, MuJoCo and least squares."""
     pin = pytest.importorskip("pinocchio")
     mujoco = pytest.importorskip("mujoco")
-    from crossbody.engines._delta import chart
-    from crossbody.engines.mujoco._delta_model import compiled
-    from crossbody.engines.pinocchio._delta_model import by_hand
+    from crossbody.engines.mujoco.scene import matched
+    from crossbody.engines.pinocchio.scene import build
 
     robot = delta.LIGHT
     q = hanging_pose(robot, delta.ill_posed_tilts(robot)[tilt])
@@ -153,12 +144,13 @@ def test_where_lam_is_ill_posed_its_force_is_compared_instead(tilt: int) -> None
     assert np.abs(tips(robot, q) - tips(robot, q)[0]).max() < 1e-14
     lam = np.linalg.lstsq(H @ np.linalg.solve(M, H.T), H @ np.linalg.solve(M, g), rcond=1e-9)[0]
     force = H.T @ lam
-    r, rd = chart.to_tree(q, np.zeros(9))
+    form = case.form(case)
+    r, rd = form.to_scene(q, np.zeros(9))
 
-    closed = by_hand(robot, case.law)
+    closed = build(form.case, "forwardDynamics").rows.native
     closed.settings = pin.ProximalSettings(1e-12, 1e-6, 50)
     in_pinocchio = H.T @ closed.accelerate(r, rd, np.zeros(9))[1]
-    model = compiled(robot, case.law)
+    model = matched(under_law(form.case.scene, case.law))
     data = mujoco.MjData(model)
     data.qpos[:] = r
     mujoco.mj_forward(model, data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from pathlib import Path
 
 import mujoco
@@ -10,7 +11,7 @@ import pytest
 from places import ROBOTS
 
 from crossbody.cases import OutputError, SceneError
-from crossbody.cases.files.conformance import FEATURES, Feature
+from crossbody.cases.files.conformance import FEATURES, TETRAHEDRON, Feature
 from crossbody.reports.cli import main
 from crossbody.reports.importers.audit import audited, of_scene, opened
 from crossbody.reports.importers.compare import NONE, OK, WRONG, rows
@@ -18,10 +19,9 @@ from crossbody.reports.importers.conformance import written
 from crossbody.reports.importers.fix import SAME, fixed
 
 MOTION = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "frames")
-KEPT = tuple(feature for feature in FEATURES if feature.name not in ("URDF: floating joint",))
 
 
-@pytest.mark.parametrize("feature", KEPT, ids=lambda feature: feature.name)
+@pytest.mark.parametrize("feature", FEATURES, ids=lambda feature: feature.name)
 def test_what_a_file_means_is_what_it_meant(feature: Feature, tmp_path: Path) -> None:
     """By the scene that was written by hand: neither the old file nor a reader is asked."""
     path = written(feature, tmp_path)
@@ -75,13 +75,14 @@ def test_contacts_of_a_fixed_file_are_those_of_the_old_one(tmp_path: Path) -> No
 def test_what_a_rewriting_would_lose_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, out = tmp_path / "parts.xml", tmp_path / "plain.xml"
     path.write_text(PARTIAL)
-    monkeypatch.setattr("crossbody.reports.importers.fix._completed", lambda own, _above: own)
+    monkeypatch.setattr("crossbody.reports.importers.plain_mjcf._completed", lambda own, _above: own)
     path.write_text(PARTIAL.replace('size=".5" ', ""))
     with pytest.raises(SceneError, match="geom_friction of its compiled model would differ"):
         fixed(path, out)
     assert not out.exists()
 
 
+PIXEL = base64.b64decode("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC")
 ARM = """<mujoco><compiler angle="degree"/><worldbody>
 <body name="stand" pos="0 0 1" euler="0 30 0">{on_stand}
  <body name="arm" pos=".2 0 0"><joint axis="0 1 0"/><geom size=".1" pos="0 0 -.5"/>
@@ -130,3 +131,35 @@ def test_a_name_that_is_no_robot_files_is_told(tmp_path: Path) -> None:
     path.write_text(ARM.format(on_stand="", on_arm="", sensor=""))
     with pytest.raises(OutputError, match=r"ends in \.xml or \.urdf"):
         fixed(path, tmp_path / "notes.txt")
+
+
+MESHES = {
+    "arm.xml": """<mujoco><compiler {0}/><asset><mesh name="m" file="part.obj"/>
+<texture name="t" type="2d" file="t.png"/></asset><worldbody><body><joint axis="0 1 0"/>
+<geom type="mesh" mesh="m"/></body></worldbody></mujoco>""",
+    "arm.urdf": next(one.text for one in FEATURES if one.name == "URDF: mesh of a package"),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "folder"),
+    [
+        ("arm.xml", 'assetdir="parts"', "parts"),
+        ("arm.xml", 'assetdir="none" meshdir="parts" texturedir="parts"', "parts"), ("arm.xml", "", "."),
+        ("arm.urdf", "package://conformance/", "."), ("arm.urdf", "", "."), ("arm.urdf", "parts/", "parts"),
+    ],
+)  # fmt: skip
+def test_a_file_in_another_folder_has_the_meshes_of_the_old_one(
+    name: str, said: str, folder: str, tmp_path: Path
+) -> None:
+    """Readers that were told of no package find them too."""
+    home, out = tmp_path / "conformance", tmp_path / "far" / "away" / name
+    for made in (home / folder, out.parent):
+        made.mkdir(parents=True)
+    path = home / name
+    path.write_text(MESHES[name].format(said).replace("package://conformance/", said))
+    (home / folder / "part.obj").write_text(TETRAHEDRON)
+    (home / folder / "t.png").write_bytes(PIXEL)
+    fixed(path, out)
+    [(_, _, found)] = audited(out, ["mujoco"], seconds=60.0)
+    assert [row.verdict for row in found if row.quantity in ("reading", "shapes")] == [OK] * 2

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -11,10 +9,8 @@ from crossbody import cases, engines
 from crossbody.cases import Tier
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.mechanisms.soft.claims import STEP
+from crossbody.cases.mechanisms.soft.form import fastest
 from crossbody.cases.mechanisms.soft.scene import numbers
-from crossbody.engines._soft_contact import fastest
-from crossbody.engines.mujoco import soft_contact as axis
-from crossbody.engines.mujoco import soft_delta as robot
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.truth import _tight, truth_of
 from crossbody.reports.judging.verdict import limit_for
@@ -91,12 +87,12 @@ def test_the_sizes_that_a_case_names_are_no_larger_than_its_motion(name: str, va
         assert coordinate.rate <= 1.1 * np.abs(run.v[:, like]).max()
 
 
-@pytest.mark.parametrize(("variant", "module"), [("axis", axis), ("delta", robot)])
-def test_the_fixed_step_of_the_limits_is_that_of_the_engine(variant: str, module: Any) -> None:
+@pytest.mark.parametrize("variant", ["axis", "delta"])
+def test_the_fixed_step_of_the_limits_is_that_of_the_engine(variant: str) -> None:
     case = cases.load("soft_contact", variant)
     p = numbers(case.parameters)
     rate = fastest(p, p["flange_mass"] if variant == "axis" else p["m3"])
-    assert pytest.approx(module.default_step(case, "matched") * rate) == STEP
+    assert pytest.approx(engines.load("mujoco").prepare(case).settings["dt"] * rate) == STEP
 
 
 def test_a_ball_that_hardly_moves_is_allowed_the_tolerance_of_its_height() -> None:

@@ -207,3 +207,37 @@ def test_a_row_that_comes_free_where_a_variable_changes_has_another_gap_behind()
     late = replace(run, events=(*run.events[:k], replace(run.events[k], t=t + 1e-7), *run.events[k + 1 :]))
     assert measure("mode_times", case, replace(truth, trajectory=jumped), late) == 0.0
     assert measure("mode_times", case, replace(truth, trajectory=replace(jumped, switches=())), late) > 0.0
+
+
+def pressed(release: float, step: float) -> Trajectory:
+    """A row that bears 1 N from 0.2 s on until it lets go, at steps of a run; every jump from both sides."""
+    grid = np.arange(0.0, 1.0 + 0.5 * step, step)
+    t = np.sort(np.concatenate([grid[np.abs(grid - release) > 1e-9], [0.2], [release] * 2]))
+    order = np.arange(len(t))
+    on = (order >= np.searchsorted(t, 0.2, side="right") - 1) & (order <= np.searchsorted(t, release, side="left"))
+    modes = (Mode.FREE, Mode.CONTACT, Mode.FREE)
+    events = tuple(
+        Event(t=at, contact=0, before=a, after=b) for at, a, b in zip((0.2, release), modes, modes[1:], strict=False)
+    )
+    column = np.linspace(0.0, 1.0, len(t))[:, None]
+    return Trajectory(
+        t=t, q=column, v=column, gap=column, lam=on[:, None].astype(float), energy=np.hstack([column, column]),
+        mode=np.where(on, Mode.CONTACT, Mode.FREE)[:, None].astype(np.int8), events=events,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("late", [-1e-4, 1e-7, 1e-5, 1e-3])
+def test_a_release_that_is_late_has_the_impulse_of_that_time_and_not_of_half_a_step(late: float) -> None:
+    """Where a multiplier jumps as a row lets go, its two sides stand for its two sides in the truth, however coarse."""
+    case = load("bouncing_ball", "elastic", t_end=1.0)
+    truth = from_run(pressed(0.6, 1e-3), Tier.D, "made up")
+    said = measure("lam_impulse_path", case, truth, pressed(0.6 + late, 0.05))
+    assert said == pytest.approx(abs(late) / 0.4, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ball", "box", "springs"])
+def test_what_touches_is_known_without_modes(name: str) -> None:
+    """Multipliers of a run that has none act where the truth's contacts are."""
+    case, truth = right(name)
+    unseen = replace(truth.trajectory, mode=np.full_like(truth.trajectory.mode, -1))
+    assert measure("complementarity", case, truth, unseen) == measure("complementarity", case, truth, truth.trajectory)

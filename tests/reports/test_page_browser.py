@@ -308,3 +308,28 @@ def test_a_page_runs_no_script_but_its_own(out: Path, browser: chromium.Browser,
         assert browser.complaints() == []
         assert browser.js(put + " document.body.append(made); return window.put || 0; })()") == 0
         assert browser.js("fetch('https://example.org').then(() => 'went').catch(() => 'refused')") == "refused"
+
+
+def test_engines_are_laid_over_each_other_and_side_by_side_in_space(solids: Path, browser: chromium.Browser) -> None:
+    """A hidden engine is not drawn in either view; no button leads anywhere."""
+    browser.open(solids)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    browser.wait("document.querySelector('[data-speed]').options.length > 0")
+
+    def seen(action: str) -> bytes:
+        browser.js(action)
+        browser.js(drawn)
+        return browser.picture(".player canvas")
+
+    field = "document.querySelector('[data-view]')"
+    view = f"{field}.value = '%s'; {field}.dispatchEvent(new Event('change'))"
+    over, beside = seen(view % "ghosts"), seen(view % "beside")
+    assert over != beside
+    hidden = "document.querySelector('[data-show=\"reference:compiled\"]').click()"
+    alone = seen(hidden)
+    assert alone != beside
+    assert seen(hidden) == beside
+    draw_all(browser)
+    assert browser.js('document.querySelectorAll(\'[data-attr="sendChartToCloud"], [data-title*="loud"]\').length') == 0
+    assert browser.complaints() == []

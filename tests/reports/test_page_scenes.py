@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from unpacked import numbers
 
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Trajectory
@@ -19,6 +19,7 @@ from crossbody.reports import scenes
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.pages.case_page import PLOTTED
 from crossbody.reports.pages.figures import FIGURES, points_for
+from crossbody.reports.pages.packing import packed_value
 from crossbody.reports.pages.playback import chosen, packed, peaks, playback
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace
@@ -254,9 +255,9 @@ def test_playback_is_small_and_holds_the_motion(name: str, variant: str) -> None
     trace = trace_of(case)
     many = [trace] * 10
     (section,) = playback(many)
-    assert len(section.context["scene"]) < 450e3
+    assert len(packed_value(section.context["scene"])) < 450e3
     track = packed(many, scenes.load(case.mechanism))["tracks"][0]
-    t = np.frombuffer(base64.b64decode(track["t"]), "<f4")
+    t = numbers(track["t"])
     assert t[0] == 0.0
     assert t[-1] == pytest.approx(case.t_end, rel=1e-6)
 
@@ -273,11 +274,13 @@ def test_collisions_that_take_no_time_are_drawn_as_impulses() -> None:
     found = packed([struck], scene)
     assert (found["force"], found["impulse"]) == (0.0, 3.0)
     (track,) = found["tracks"]
-    blows = np.frombuffer(base64.b64decode(track["blows"]), "<f4").reshape(-1, 4)
-    at = np.frombuffer(base64.b64decode(track["struck"]), "<f4")
+    blows = numbers(track["blows"]).reshape(-1, 4)
+    at = numbers(track["struck"])
     assert at == pytest.approx([0.05], abs=case.t_end / 49)
     i = int(np.searchsorted(trace.run.t, 0.05))
     wanted = scene.arrows(trace.run.q[i : i + 1], 3.0 * np.eye(len(case.contacts))[2:3], case.parameters)[0]
+    wanted = wanted[(wanted[:, 2:] != 0.0).any(axis=1)]  # a contact that never pushes has no arrow
+    assert len(wanted) == 1
     assert np.allclose(blows, wanted, atol=1e-6)
     step = with_collisions(struck.run, events)
     assert np.allclose(step[:, 2], np.where(struck.run.t >= 0.05, 3.0, 0.0))

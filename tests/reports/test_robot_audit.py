@@ -15,6 +15,7 @@ from robot_damage import damaged
 from robot_readers import ARM, rows_of, run
 
 from crossbody.cases import CrossbodyError
+from crossbody.reference import code_store
 from crossbody.reports.importers.audit import audited, opened
 from crossbody.reports.importers.causes import advice, explained
 from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WORDS, WRONG, Row, Said
@@ -85,6 +86,13 @@ def test_wrong_use_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.fixture(scope="module")
+def compiled_code() -> Path:
+    found = code_store.base()
+    assert found is not None
+    return found.parent
+
+
+@pytest.fixture(scope="module")
 def explained_ur5e() -> list[Row]:
     path = ROBOTS / "universal_robots_ur5e" / "ur5e.xml"
     found = [row for _, _, rows in audited(path, ["pinocchio"], seconds=60.0) for row in rows]
@@ -127,7 +135,10 @@ def test_explain_sarif_and_markdown_from_the_command_line(tmp_path: Path, capsys
     assert "cannot be written" in err
 
 
-def test_one_pytest_item_a_reader_and_quantity(pytester: pytest.Pytester) -> None:
+def test_one_pytest_item_a_reader_and_quantity(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, compiled_code: Path
+) -> None:
+    monkeypatch.setenv("CROSSBODY_CACHE", str(compiled_code))  # whose place moves with the home folder
     pytester.makefile(".xml", arm=ARM.replace("<worldbody>", '<option gravity="0 0 -3"/><worldbody>'))
     found = pytester.runpytest_subprocess(
         "--crossbody-audit", "arm.xml", "--crossbody-engine", "mujoco", "--crossbody-engine", "pinocchio", "-rA"

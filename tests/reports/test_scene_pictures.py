@@ -193,7 +193,7 @@ def test_a_run_of_a_scene_has_its_playback() -> None:
     run = load("reference").prepare(case, "compiled").run()
     trace = Trace(about=study._about(case, "reference", "compiled"), run=run)
     (section,) = playback([trace])
-    assert json.loads(section.context["scene"])["stage"]["frames"] == len(scene.bodies)
+    assert section.context["scene"]["stage"]["frames"] == len(scene.bodies)
     many = BALL.replace(bodies=tuple(Body(name=f"body {i}") for i in range(600)), shapes=())
     trace.about["scene"].update(told(many)["scene"])
     (section,) = playback([trace])

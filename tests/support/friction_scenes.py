@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from crossbody.cases import Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Body, Joint, Pair, Push, RowLaw, Scene, Shape
+from crossbody.cases.scene import Body, Joint, Pair, Push, RowLaw, Scene, Shape, Tendon
 from crossbody.reference import System, kernels, simulate
 from crossbody.reference.tree.system import system
 
@@ -100,6 +101,40 @@ def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int 
     joints = tuple(Joint(name=body.name, body=body.name, type="free") for body in bodies)
     scene = Scene(bodies=tuple(bodies), joints=joints, shapes=tuple(shapes), pairs=tuple(pairs))
     return scene, np.array(q), np.array(v), mu
+
+
+def rubbed_tree(seed: int, *, floor: bool = False) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """Return bodies on joints of which most have dry friction, with a tendon that has some, and their start.
+
+    Over a floor the first one is a free box, which lands on it.
+    """
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 5))
+    bodies, joints, q = [], [], list[float]()
+    for i in range(count):
+        parent = str(rng.choice([bodies[-1].name, bodies[-1].parent or bodies[-1].name])) if bodies else ""
+        made = box_body(f"b{i}", HALF, float(rng.uniform(0.5, HEAVIEST)))
+        bodies.append(dataclasses.replace(made, parent=parent, position=(0.1, 0.05, -0.3) if parent else (0.0,) * 3))
+        kind = "free" if floor and i == 0 else str(rng.choice(["hinge", "hinge", "slide", "ball"]))
+        turn = rng.normal(size=4)
+        place = [0.0, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0] if kind == "free" else list(turn / np.linalg.norm(turn))
+        q += place if kind in ("free", "ball") else [float(rng.normal())]
+        spring = float(rng.choice([0.0, 20.0])) if kind in ("hinge", "slide") else 0.0
+        loss = float(rng.choice([0.0, 0.3, 1.0, 4.0])) if kind != "free" else 0.0
+        axis, anchor = rng.normal(size=3), rng.normal(size=3) * 0.1
+        joints.append(Joint(
+            name=f"j{i}", body=f"b{i}", type=kind, axis=tuple(axis), stiffness=(spring, 0.0, 0.0), friction_loss=loss,
+            anchor=tuple(anchor) if kind in ("hinge", "ball") else (0.0,) * 3, law=RowLaw(a0=400.0, a1=40.0),
+        ))  # fmt: skip
+    single = [joint.name for joint in joints if joint.type in ("hinge", "slide")]
+    tendons = (Tendon(name="rope", joints=tuple(single), coefficients=tuple(rng.normal(size=len(single))),
+                      friction_loss=0.5),) if single else ()  # fmt: skip
+    shapes, pairs = (), ()
+    if floor:
+        shapes = Shape(name="floor", type="plane"), Shape(name="box", body="b0", type="box", size=HALF)
+        pairs = (pair("floor", "box", float(rng.uniform(0.1, 0.9))),)
+    scene = Scene(bodies=tuple(bodies), joints=tuple(joints), tendons=tendons, shapes=shapes, pairs=pairs)
+    return scene, np.array(q), rng.normal(size=scene.nv)
 
 
 def run(scene: Scene, q0: Any, v0: Any, t_end: float, **options: Any) -> Trajectory:

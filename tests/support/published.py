@@ -1,4 +1,4 @@
-"""Robot files of packages that publish some, and the law that our dynamics of a file are MuJoCo's.
+"""Robot files of packages that publish some, and the laws that our dynamics, frames and rows of a file are others'.
 
 All the files are there with `pip install '.[robots]'`; without it, those of the packages that are installed.
 """
@@ -6,6 +6,7 @@ All the files are there with `pip install '.[robots]'`; without it, those of the
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,14 +14,25 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from scenes import rows_at
 
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import Loop, Scene
+from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_rows import rows_of
+from crossbody.engines._scene import Forces
+from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio.scene import Gaps, spans, tree
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 
 SAME = 1e-10
 """Of the largest entry: what two programs may make of the same numbers."""
 STATES = 100
+DECIDED = 1e-9, 1e-6
+"""A row that turns by the second where coordinates move by the first is decided by rounding: shapes whose axes or
+centres meet have no normal, and where two places are as near either may be taken."""
+SEEN = 0.9
+"""Least part of a file's rows, over all states, that are not."""
 
 
 def _inside(package: str, *parts: str) -> Path:
@@ -62,8 +74,86 @@ def dynamics_of(scene: Scene) -> Callable[[Any, Any, Any], tuple[Any, Any]]:
     return ours
 
 
-def close(mine: Any, theirs: Any) -> bool:
-    return bool(np.abs(mine - theirs).max() <= SAME * np.abs(theirs).max())
+def close(mine: Any, theirs: Any, least: float = 0.0) -> bool:
+    """Whether numbers are the same, by the largest of them, or by a least size."""
+    return bool(np.abs(mine - theirs).max(initial=0.0) <= SAME * np.abs(theirs).max(initial=least))
+
+
+def placed(model: Any, rng: Any) -> Any:
+    """Return positions at random, in MuJoCo's coordinates."""
+    q = np.array(model.qpos0)
+    mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), 1.0)
+    return q
+
+
+def stands_as_in_mujoco(model: Any, scene: Scene) -> None:
+    """Assert that every body's frame is MuJoCo's: origin and ends of its axes, as gaps to the world's origin."""
+    probes = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    loops = [
+        Loop(name=f"{body.name}.{k}", type="connect", first=body.name, first_position=probe)
+        for body in scene.bodies for k, probe in enumerate(probes)
+    ]  # fmt: skip
+    probed = scene.replace(loops=tuple(loops), tendons=(), pairs=(), shapes=(), actuators=())
+    data, rng = mujoco.MjData(model), np.random.default_rng(7)
+    for _ in range(STATES):
+        data.qpos[:] = q = placed(model, rng)
+        mujoco.mj_kinematics(model, data)
+        axes = data.xmat[1:].reshape(-1, 3, 3).transpose(0, 2, 1)
+        h = rows_at(probed, q, np.zeros(scene.nv), np.zeros(0))[1][: 3 * len(loops)].reshape(-1, 4, 3)
+        assert close(h, data.xpos[1:, None] + np.concatenate([np.zeros((len(axes), 1, 3)), axes], axis=1))
+
+
+def rows_as_in_pinocchio(model: Any, scene: Scene) -> None:
+    """Assert that h and H of all rows are those of Pinocchio's kinematics, and that H' v is the rate of H v.
+
+    The engine has its rows written apart; H' v is differenced by complex steps.
+    """
+    scene = _with_directions(model, scene)
+    to, carried, forces = Coordinates(scene), tree(scene), Forces(scene)
+    forces.spans = spans(scene, *carried, to)
+    theirs, table, rng = Gaps(scene, forces, carried, to), tabulate(scene), np.random.default_rng(7)
+    count, seen, rated, step, u = len(rows_of(scene)[0]), 0, 0, 1e-30, np.zeros(len(scene.inputs))
+    meets = _meets(scene, count)
+    h, qd = np.zeros((2, count), dtype=complex), np.zeros(scene.nq)
+    for _ in range(STATES if count else 0):
+        q, v = placed(model, rng), rng.normal(size=scene.nv) * 2.0
+        (H, gaps, Hdv), moved = rows_at(scene, q, v, u), q.copy()
+        mujoco.mj_integratePos(model, moved, rng.normal(size=scene.nv), DECIDED[0])
+        turned = np.abs(rows_at(scene, moved, v, u)[0] - H).max(axis=1)
+        sure = turned <= DECIDED[1] * np.maximum(1.0, np.abs(H).max(axis=1))
+        sure &= np.abs(gaps - meets) > DECIDED[0]
+        seen += int(sure.sum())
+        r = to.theirs(q)
+        gap, rows = theirs.gradient_of(r, slice(None))
+        assert close(gaps, gap, 1.0)
+        assert close(H[sure], to.velocities(r, rows)[sure], 1.0)
+        mechanism.velocity(0.0, q, v, table.p, qd)
+        with suppress(ZeroDivisionError):  # of a row that has no direction
+            mechanism.gaps(0.0, q + 1j * step * qd, v.astype(complex), table.p.astype(complex), *h)
+            rated += 1
+            size = np.maximum(1.0, np.abs(H).max(axis=1)) * np.abs(v).max() ** 2
+            assert (np.abs(h[1].imag / step - Hdv)[sure] <= SAME * np.maximum(size, np.abs(Hdv))[sure]).all()
+    assert not count or min(seen / count, rated) >= SEEN * STATES
+
+
+def _with_directions(model: Any, scene: Scene) -> Scene:
+    """Return the scene less pairs that are a part of one link at the place of another: they never have a normal."""
+    count, still = len(rows_of(scene)[0]), np.zeros(scene.nv)
+    gaps = rows_at(scene, placed(model, np.random.default_rng(8)), still, np.zeros(len(scene.inputs)))[1]
+    met = [contact.pair.name for contact in contacts(scene) for _ in range(contact.places)]
+    near = np.abs(gaps - _meets(scene, count)) <= DECIDED[0]
+    none = {name for name, one in zip(met, near[count - len(met) :], strict=True) if one}
+    return scene.replace(pairs=tuple(pair for pair in scene.pairs if pair.name not in none))
+
+
+def _meets(scene: Scene, count: int) -> Any:
+    """Return of every row the gap (count,) at which centres or axes meet, or a centre a face; -inf of others."""
+    found = [
+        -sum(one.size[0] for one in (contact.first, contact.second) if one.type in ("sphere", "capsule"))
+        - contact.pair.margin if contact.first.type != "plane" else -np.inf
+        for contact in contacts(scene) for _ in range(contact.places)
+    ]  # fmt: skip
+    return np.concatenate([np.full(count - len(found), -np.inf), found])
 
 
 def moves_as_in_mujoco(model: Any, scene: Scene) -> None:
@@ -72,9 +162,7 @@ def moves_as_in_mujoco(model: Any, scene: Scene) -> None:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     full = np.zeros((model.nv, model.nv))
     for _ in range(STATES):
-        q = np.array(model.qpos0)
-        mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), 1.0)
-        v, u = rng.normal(size=model.nv) * 2.0, rng.normal(size=model.nu) * 20.0
+        q, v, u = placed(model, rng), rng.normal(size=model.nv) * 2.0, rng.normal(size=model.nu) * 20.0
         act = rng.uniform(-0.3, 0.3, model.na)
         data.qpos[:], data.qvel[:], data.ctrl[:], data.act[:] = q, v, u, act
         mujoco.mj_forward(model, data)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 
@@ -18,7 +19,12 @@ Numbers = Mapping[str, float]
 
 def rotations(p: Numbers) -> Floats:
     """Rz(0), Rz(-sign 120 deg), Rz(+sign 120 deg) (3, 3, 3)."""
-    c, s = -0.5, p["sign"] * math.sqrt(0.75)
+    return _rotations(p["sign"])
+
+
+@cache
+def _rotations(sign: float) -> Floats:
+    c, s = -0.5, sign * math.sqrt(0.75)
     turned = [[[c, k * s, 0.0], [-k * s, c, 0.0], [0.0, 0.0, 1.0]] for k in (1.0, -1.0)]
     return np.array([np.eye(3), *turned])
 
@@ -60,13 +66,19 @@ def _arm(p: Numbers, own: Floats) -> Floats:
     return np.array([math.atan2(ez, ey), math.atan2(math.hypot(own[0], z - ez), y - ey), math.atan2(own[0], z - ez)])
 
 
-def flanges(p: Numbers, q: Floats) -> Floats:
-    """Flange (n, 3), m, of poses q (n, 9): the mean of the tips of its arms, which one loop gap parts at most."""
-    a, b, c = np.moveaxis(q.reshape(-1, 3, 3), -1, 0)
+def tips(p: Numbers, q: Floats) -> Floats:
+    """Ends of the arms (..., 3, 3), m, of poses q (..., 9)."""
+    a, b, c = np.moveaxis(q.reshape(*q.shape[:-1], 3, 3), -1, 0)
     x = p["l2"] * np.sin(b) * np.sin(c)
     y = _offset(p) + p["l1"] * np.cos(a) + p["l2"] * np.cos(b)
     z = p["l1"] * np.sin(a) + p["l2"] * np.sin(b) * np.cos(c)
-    mean: Floats = np.einsum("ijk,nik->nij", rotations(p), np.stack([x, y, z], axis=-1)).mean(axis=1)
+    found: Floats = np.einsum("ijk,...ik->...ij", rotations(p), np.stack([x, y, z], axis=-1))
+    return found
+
+
+def flanges(p: Numbers, q: Floats) -> Floats:
+    """Flange (n, 3), m, of poses q (n, 9): the mean of the tips of its arms, which one loop gap parts at most."""
+    mean: Floats = tips(p, q).mean(axis=1)
     return mean
 
 
@@ -95,9 +107,9 @@ def tip_jacobians(p: Numbers, q: Floats) -> Floats:
 
 def closure(p: Numbers, q: Floats) -> Floats:
     """H = dh/dq (6, 9)."""
-    a, b, c = tip_jacobians(p, q)
-    zero = np.zeros((3, 3))
-    return np.block([[a, -b, zero], [a, zero, -c]])
+    H, (a, b, c) = np.zeros((6, 9)), tip_jacobians(p, q)
+    H[:3, :3], H[3:, :3], H[:3, 3:6], H[3:, 6:] = a, a, -b, -c
+    return H
 
 
 def gravity(p: Numbers, q: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Coordinate, Inputs, Law, Parameter, Value
+from crossbody.cases.mechanisms.delta.form import in_tree
 from crossbody.cases.mechanisms.delta.metrics import FOLLOWING, METRICS
 
 ROBOT = {
@@ -71,6 +72,7 @@ def scene(
         v0=v0,
         t_end=float(parameters["t_end"]),
         law=law,
+        form=in_tree,
         metrics={**METRICS, **(FOLLOWING if "period" in parameters else {})},
         units={k: parameter.unit for k, parameter in table.items()},
         **more,

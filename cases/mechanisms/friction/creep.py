@@ -1,7 +1,14 @@
-"""How fast a place that friction holds creeps down a slope in MuJoCo, from MuJoCo's own parameters (spec 7.6).
+"""How fast a place that friction holds creeps down a slope in engines, from their own parameters.
 
-Its rows are springs and dampers b v + k d r of an impedance d, with R = (1 - d)/d of the inverse mass between the force
-and them. A force that holds needs a rate:
+Drake's lagged law gives mu N s/sqrt(1 + s^2) at s times its stiction tolerance, TAMSI's mu N s (2 - s); SAP's lets a
+place slip at sigma times what its inverse mass makes of friction's impulse in a step; DART adds a part cfm to the
+diagonal of its problem. With rho = tan(slope)/mu, the tangential acceleration g_t and the step dt:
+
+    lagged   v = stiction rho/sqrt(1 - rho^2)        tamsi  v = stiction (1 - sqrt(1 - rho))
+    sap      v = sigma g_t dt/sqrt(3)                DART   v = cfm g_t dt
+
+MuJoCo's rows are springs and dampers b v + k d r of an impedance d, with R = (1 - d)/d of the inverse mass between the
+force and them. A force that holds needs a rate:
 
     elliptic     v = (1 - d)/d g_t / (impratio b)
     pyramidal    b mu v = 2 rho N0 for rho = tan(slope)/mu <= 1/2, else N0 (3 rho - 1)/(1 - rho),  N0 = k d r
@@ -11,6 +18,7 @@ whatever mu below the cone, and whatever the step.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 HALVINGS, DEEPEST = 200, 0.1
@@ -74,3 +82,31 @@ def creep(mu: float, slope: float, press: float, soft: Soft, *, elliptic: bool) 
     edge = 2.0 * mu**2 * (1.0 + mu**2) / soft.impratio * (0.25 if rho <= 0.5 else 0.5 * (1.0 - rho))
     rest, _ = soft.rest(edge * press)
     return rest * (2.0 * rho if rho <= 0.5 else (3.0 * rho - 1.0) / (1.0 - rho)) / (soft.damping * mu)
+
+
+STICTION, HOLDS, SIGMA = 1e-3, 1e-6, 1e-3
+"""Drake's stiction tolerance, m/s, and that of its profile matched; SAP's relative regularisation of friction."""
+CFM, STEP = 1e-5, 1e-3
+"""DART's constraint force mixing, and the step of both engines, s."""
+
+
+def regularised(rho: float) -> dict[tuple[str, str], float]:
+    """Return the creep of Drake's profiles, m/s, whose friction is a function of the slip.
+
+    Args:
+        rho: tangent of the slope over the coefficient of friction, below 1.
+    """
+    return {
+        ("drake", "default"): STICTION * rho / math.sqrt(1.0 - rho * rho),
+        ("drake", "matched"): HOLDS * (1.0 - math.sqrt(1.0 - rho)),
+    }
+
+
+def mixed(pull: float, step: float = STEP) -> float:
+    """Return the creep of DART, m/s, from the tangential acceleration, m/s^2, and the step, s."""
+    return CFM * pull * step
+
+
+def near_rigid(pull: float, step: float = STEP) -> float:
+    """Return the creep of a point mass with Drake's SAP where contacts are near rigid, m/s; see `mixed`."""
+    return SIGMA * pull * step / math.sqrt(3.0)

@@ -1,9 +1,10 @@
-"""What cases with friction share: their exact motion as the truth, limits, and how far MuJoCo creeps by itself."""
+"""What cases with friction share: their exact motion as the truth, limits, and how far engines creep by themselves."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from crossbody.cases.case import Case, Limit, Parameter
 from crossbody.cases.mechanisms.friction.motions import Motion
@@ -12,15 +13,36 @@ OWN = (
     "MuJoCo's own pyramids, soft contacts and step: friction creeps where it holds, pushes off the slip where it "
     "slides, and lifts what slides fast"
 )
-CREEPS = "it creeps as MuJoCo's own parameters say: its rows are springs and dampers, and a force needs a rate"
+CREEPS = (
+    "it creeps as the engine's own parameters say: it has friction as a function of the slip, and a force needs one"
+)
+RIGID = (
+    "rigid contacts on a grid of steps: friction begins and ends with a step, and so does what it makes of a velocity"
+)
+KNOWN = {
+    ("mujoco", "default"): OWN,
+    ("pinocchio", "admm"): RIGID,
+    ("drake", "matched"): "stiff contacts on a grid of steps, and friction as a steep function of the slip",
+    ("drake", "default"): (
+        "soft contacts, one a pair of solids, where they are deepest; friction as a function of the slip, and the "
+        "normal force of the step before"
+    ),
+    ("dart", "matched"): f"{RIGID}; its friction is bounded along two axes, not in a cone",
+    (
+        "dart",
+        "default",
+    ): f"{RIGID}; its friction is bounded along two axes, not in a cone, and what rests is put to sleep",
+}
+"""What takes engines and profiles outside."""
 NEAR = 0.05
 """Part of a predicted creep by which the measured one may be off."""
+NOTHING: Mapping[tuple[str, str], float] = MappingProxyType({})
 HELD = "friction holds: what is left of a slip decays as a gap does"
 
 
 def limits(
     case: Case, title: str, parameters: Mapping[str, Parameter], motion: Motion | None,
-    p: Mapping[str, float], creeps: float = 0.0,
+    p: Mapping[str, float], creeps: Mapping[tuple[str, str], float] = NOTHING,
 ) -> Case:  # fmt: skip
     """Return a case with its title, its exact motion and the limits of all cases with friction.
 
@@ -30,20 +52,23 @@ def limits(
         parameters: of the case, for their units.
         motion: exact, and the truth where it is one.
         p: values of the parameters.
-        creeps: speed at which MuJoCo's own parameters have it creep, m/s; 0 where they do not say.
+        creeps: engine and profile -> speed at which its own parameters have it creep, m/s, where they say.
     """
     held = 1e-9 * max(1.0, p.get("speed", 0.0))
-    predicted = Limit(
-        metric="creep_speed", value=held, engine="mujoco", profile="default", known=CREEPS,
-        known_least=creeps * (1.0 - NEAR), known_size=creeps * (1.0 + NEAR),
-    )  # fmt: skip
     return replace(
         case, title=title, closed_form=motion if motion is not None and motion.presses else None,
         units={name: one.unit for name, one in parameters.items()},
         limits=(
-            *case.limits,
-            Limit(metric="creep_speed", value=held, why=HELD),
-            *((predicted,) if creeps else ()),
-            Limit(metric="*", engine="mujoco", profile="default", covers_none=True, known=OWN),
+            *case.limits, Limit(metric="creep_speed", value=held, why=HELD), *_predicted(creeps, held),
+            *(Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
+              for (engine, profile), known in KNOWN.items()),
         ),
     )  # fmt: skip
+
+
+def _predicted(creeps: Mapping[tuple[str, str], float], held: float) -> Iterator[Limit]:
+    for (engine, profile), speed in creeps.items():
+        yield Limit(
+            metric="creep_speed", value=held, engine=engine, profile=profile, known=CREEPS,
+            known_least=speed * (1.0 - NEAR), known_size=speed * (1.0 + NEAR),
+        )  # fmt: skip

@@ -52,14 +52,16 @@ class Motion:
         normals: number of rows that have events, which stand first.
         energy: q (n, nq), v (n, nv) -> kinetic and potential energy (n, 2), J.
         t_end: horizon, s.
+        before: mode of all rows before the first stage.
     """
 
     def __init__(
-        self, stages: Sequence[Stage], normals: int, energy: Callable[[Floats, Floats], Floats], t_end: float
+        self, stages: Sequence[Stage], normals: int, energy: Callable[[Floats, Floats], Floats], t_end: float,
+        before: Mode = Mode.FREE,
     ) -> None:  # fmt: skip
         stages = [stage for stage in stages if stage.start <= t_end]
         self.stages, self.energy, self.starts = stages, energy, np.array([stage.start for stage in stages])
-        free = Stage(0.0, (int(Mode.FREE),) * len(stages[0].modes), stages[0].at)
+        free = Stage(0.0, (int(before),) * len(stages[0].modes), stages[0].at)
         self.events = tuple(
             Event(t=b.start, contact=i, before=Mode(b_), after=Mode(a_))
             for a, b in pairwise((free, *stages))

@@ -10,7 +10,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.mechanisms.friction.blocks import CORNERS
 from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage, shares
-from crossbody.cases.mechanisms.friction.scene import HIGH, LOW, MASS
+from crossbody.cases.mechanisms.friction.scene import FINGER, HIGH, LIFTED, LOW, MASS
 from crossbody.cases.trajectory import Mode
 
 BASE = np.flatnonzero(CORNERS[:, 2] < 0.0)
@@ -112,3 +112,22 @@ def stack(p: Mapping[str, float]) -> Motion:
     modes[BASE] = int(Mode.SLIP if a1 > 0.0 else Mode.STICK)
     modes[8 + BASE] = int(Mode.SLIP if a1 != a2 else Mode.STICK)
     return Motion([Stage(0.0, (*modes.tolist(), *np.repeat(modes, 2).tolist()), at)], 16, energy, p["t_end"])
+
+
+def held(p: Mapping[str, float]) -> Motion:
+    """Return the motion of a weight between two fingers: q = (x, z, left, right), rows (n1, n2, four tangential)."""
+    g, press, most = p["gravity"], p["press"], p["mu"] * p["press"]
+    slips = MASS * g > 2.0 * most
+    force = most if slips else 0.5 * MASS * g
+    falls = g - 2.0 * force / MASS if slips else 0.0
+
+    def at(s: Floats) -> Rows:
+        q, v, lam = np.zeros((len(s), 4)), np.zeros((len(s), 4)), np.zeros((len(s), 6))
+        q[:, 1], v[:, 1] = -0.5 * falls * s**2, -falls * s
+        lam[:, :2], lam[:, [3, 5]] = press, -force
+        return q, v, np.zeros((len(s), 6)), lam
+
+    def energy(q: Floats, v: Floats) -> Floats:
+        return np.stack([0.5 * MASS * v[:, 1] ** 2, MASS * g * q[:, 1] + (MASS + 2.0 * FINGER) * g * LIFTED], axis=1)
+
+    return Motion([Stage(0.0, (int(Mode.SLIP if slips else Mode.STICK),) * 6, at)], 2, energy, p["t_end"])

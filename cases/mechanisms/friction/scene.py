@@ -22,6 +22,8 @@ SLIDES = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0))
 PLANAR = (("x", (1.0, 0.0, 0.0), "slide"), ("z", (0.0, 0.0, 1.0), "slide"), ("turn", (0.0, 1.0, 0.0), "hinge"))
 LOW, HIGH = (0.4, 0.3, 0.125), (0.1, 0.1, 0.125)
 """Half sides of two blocks, m, whose heights add up without rounding: a gap of 1e-17 m would be one to fall through."""
+GRIP, LIFTED, FINGER = 0.0625, 0.25, 0.125
+"""Of fingers: half of the width of what they hold, m, to which a radius adds up without rounding; height, m; kg."""
 FLOOR = Shape(name="floor", type="plane")
 
 
@@ -122,4 +124,36 @@ def sphere_on_floor(p: Mapping[str, float]) -> Scene:
         joints=(Joint(name="free", body="sphere", type="free"),),
         shapes=(FLOOR, Shape(name="sphere", body="sphere", size=(r, 0.0, 0.0))),
         pairs=(pair("floor", "sphere", p["mu"], law(p)),), gravity=field(p),
+    )  # fmt: skip
+
+
+def tossed_cube(p: Mapping[str, float]) -> Scene:
+    """Return a free cube over a level table."""
+    half = (0.5 * p["side"],) * 3
+    body = Body(name="cube", mass=p["mass"], inertia=(p["inertia"],) * 3 + (0.0,) * 3, position=(0.0, 0.0, half[2]))
+    return Scene(
+        bodies=(body,), joints=(Joint(name="free", body="cube", type="free"),),
+        shapes=(replace(FLOOR, name="table"), Shape(name="cube", body="cube", type="box", size=half)),
+        pairs=(pair("table", "cube", p["mu"], law(p)),), gravity=field(p),
+    )  # fmt: skip
+
+
+def gripper(p: Mapping[str, float]) -> Scene:
+    """Return a weight between two fingers that are pushed along x; its sides are planes with their y vertical."""
+    r, sides = p["radius"], (("left", -1.0), ("right", 1.0))
+    fingers = [Body(name=name, mass=FINGER, position=(way * (GRIP + r), 0.0, LIFTED)) for name, way in sides]
+    planes = [
+        Shape(name=f"side {name}", body="weight", type="plane", position=(way * GRIP, 0.0, 0.0),
+              orientation=(0.5, 0.5, 0.5 * way, 0.5 * way))
+        for name, way in sides
+    ]  # fmt: skip
+    return Scene(
+        bodies=(Body(name="weight", mass=MASS, position=(0.0, 0.0, LIFTED)), *fingers),
+        joints=(
+            *(Joint(name=name, body="weight", type="slide", axis=axis) for name, axis in SLIDES[::2]),
+            *(Joint(name=name, body=name, type="slide", axis=(1.0, 0.0, 0.0)) for name, _ in sides),
+        ),
+        shapes=(*planes, *(Shape(name=name, body=name, size=(r, 0.0, 0.0)) for name, _ in sides)),
+        pairs=tuple(pair(f"side {name}", name, p["mu"], law(p)) for name, _ in sides),
+        pushes=tuple(Push(name=f"on {name}", body=name) for name, _ in sides), gravity=field(p),
     )  # fmt: skip

@@ -1,11 +1,39 @@
 "use strict";
 // Theme, pages in one file, filters, tables as CSV. What plots and playback share stands in `crossbody`.
 const crossbody = (() => {
-  const listeners = { time: [], engines: [], theme: [], page: [] };
+  const listeners = { time: [], engines: [], theme: [], page: [], unfolded: [] };
   const on = (what, call) => listeners[what].push(call);
   const tell = (what, ...given) => listeners[what].forEach((call) => call(...given));
   const hidden = new Set();
-  return { on, tell, hidden, shown: (name) => !hidden.has(name) };
+  // For every element there is, and for those of pages that are unfolded later.
+  const each = (selector, call) => {
+    const look = (root) => root.querySelectorAll(selector).forEach(call);
+    look(document);
+    on("unfolded", look);
+  };
+  // What packing.py folded: a text, or a value whose arrays stand behind its JSON.
+  const inflated = (element) => {
+    const bytes = Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
+  };
+  const ARRAYS = { f4: [Float32Array, Uint32Array], f8: [Float64Array, BigUint64Array], i1: [Int8Array, Uint8Array], i2: [Int16Array, Uint16Array], i4: [Int32Array, Uint32Array] };
+  const numbers = (bytes, [place, kind, count, width]) => {
+    const [Array_, Whole] = ARRAYS[kind];
+    const [size, raw] = [Array_.BYTES_PER_ELEMENT, new Uint8Array(count * Array_.BYTES_PER_ELEMENT)];
+    for (let k = 0; k < size; k += 1) for (let i = 0; i < count; i += 1) raw[i * size + k] = bytes[place + k * count + i];
+    const whole = new Whole(raw.buffer);
+    for (let i = width; i < count; i += 1) whole[i] += whole[i - width];
+    return new Array_(raw.buffer);
+  };
+  const text = (element) => inflated(element).text();
+  const value = async (element) => {
+    const buffer = await inflated(element).arrayBuffer();
+    const end = 4 + new DataView(buffer).getUint32(0, true);
+    const bytes = new Uint8Array(buffer, end);
+    const read = (_, given) => (given && given.packed ? numbers(bytes, given.packed) : given);
+    return JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, end - 4)), read);
+  };
+  return { on, tell, each, text, value, hidden, shown: (name) => !hidden.has(name) };
 })();
 
 (() => {
@@ -23,12 +51,23 @@ const crossbody = (() => {
 (() => {
   // "#page--section~engine~metric": the page that holds the section is shown, and its verdicts are those of both.
   const pages = [...document.querySelectorAll("[data-page]")];
-  const go = () => {
-    const [id, engine, metric] = decodeURIComponent(location.hash.slice(1)).split("~");
+  const unfold = async (page) => {
+    const folded = page.querySelector("[data-packed]");
+    if (!folded) return;
+    folded.removeAttribute("data-packed");
+    page.innerHTML = await crossbody.text(folded);
+    crossbody.tell("unfolded", page);
+  };
+  const go = async () => {
+    const asked = location.hash;
+    const [id, engine, metric] = decodeURIComponent(asked.slice(1)).split("~");
+    const named = pages.filter((each) => id === each.id || id.startsWith(`${each.id}--`)).sort((a, b) => b.id.length - a.id.length)[0];
+    const page = named || pages[0];
+    await unfold(page);
+    if (asked !== location.hash) return; // somebody went on meanwhile
     const target = document.getElementById(id);
-    const page = target ? target.closest("[data-page]") : null;
-    if (pages.length > 1) pages.forEach((each) => { each.hidden = each !== (page || pages[0]); });
-    if (engine && page) {
+    if (pages.length > 1) pages.forEach((each) => { each.hidden = each !== page; });
+    if (engine && named) {
       const select = page.querySelector('select[data-filter="engine"]');
       if (select && [...select.options].some((option) => option.value === engine)) {
         select.value = engine;
@@ -56,7 +95,7 @@ const crossbody = (() => {
       row.hidden = !(wanted && mine && words.every((word) => row.textContent.toLowerCase().includes(word)));
     });
   };
-  document.querySelectorAll('[data-filter="verdict"]').forEach((select) => {
+  crossbody.each('[data-filter="verdict"]', (select) => {
     const section = select.closest("section");
     const filter = () => verdicts(section);
     section.querySelectorAll("[data-filter]").forEach((field) => {
@@ -66,7 +105,7 @@ const crossbody = (() => {
     crossbody.on("engines", filter);
     filter();
   });
-  document.querySelectorAll('[data-filter="lines"]').forEach((field) => field.addEventListener("input", () => {
+  crossbody.each('[data-filter="lines"]', (field) => field.addEventListener("input", () => {
     const word = field.value.toLowerCase();
     field.closest("section").querySelectorAll("tbody tr").forEach((row) => {
       row.hidden = !row.querySelector("th").textContent.toLowerCase().includes(word);
@@ -75,19 +114,19 @@ const crossbody = (() => {
 })();
 
 (() => {
-  const buttons = [...document.querySelectorAll("[data-show]")];
-  const tell = () => {
-    buttons.forEach((button) => button.setAttribute("aria-pressed", crossbody.shown(button.dataset.show)));
-    crossbody.tell("engines");
-  };
-  buttons.forEach((button) => button.addEventListener("click", () => {
-    const name = button.dataset.show;
-    if (!crossbody.hidden.delete(name)) crossbody.hidden.add(name);
-    tell();
-  }));
-  document.querySelectorAll("[data-show-all]").forEach((button) => button.addEventListener("click", () => {
+  const press = (button) => button.setAttribute("aria-pressed", crossbody.shown(button.dataset.show));
+  crossbody.on("engines", () => document.querySelectorAll("[data-show]").forEach(press));
+  crossbody.each("[data-show]", (button) => {
+    press(button);
+    button.addEventListener("click", () => {
+      const name = button.dataset.show;
+      if (!crossbody.hidden.delete(name)) crossbody.hidden.add(name);
+      crossbody.tell("engines");
+    });
+  });
+  crossbody.each("[data-show-all]", (button) => button.addEventListener("click", () => {
     crossbody.hidden.clear();
-    tell();
+    crossbody.tell("engines");
   }));
 })();
 
@@ -100,7 +139,7 @@ const crossbody = (() => {
     const rows = [...table.tBodies[0].rows].map((row) => [...row.cells].map(cell));
     return [heads, ...rows].map((row) => row.map(quoted).join(",")).join("\r\n") + "\r\n";
   };
-  document.querySelectorAll("table[data-csv]").forEach((table) => {
+  crossbody.each("table[data-csv]", (table) => {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "save";

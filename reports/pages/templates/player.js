@@ -1,28 +1,25 @@
 // Playback: every engine's motion on a canvas, over the clock that the plots share.
 (() => {
-  const floats = (text) => {
-    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-    return new Float32Array(bytes.buffer);
-  };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const nice = (x) => {
     const ten = 10 ** Math.floor(Math.log10(x) + 1e-9);
     return ten * [1, 2, 5, 10].find((k) => k * ten >= x * 0.999);
   };
+  const FAR = 4; // times its own size that a mechanism goes before it is followed
   const shortNumber = (x) => String(Number(x.toPrecision(3)));
 
-  const start = (root) => {
-    const scene = JSON.parse(root.querySelector("[data-scene]").textContent);
+  const start = async (root) => {
+    const scene = await crossbody.value(root.querySelector("[data-scene]"));
     const { stage, end } = scene;
     const fade = end / 25; // how long an impulse is seen
     const space = stage.dimensions === 3;
     const tracks = scene.tracks.map((track) => {
-      const [t, poses, arrows, struck, blows] = ["t", "poses", "arrows", "struck", "blows"].map((name) => floats(track[name]));
-      return { ...track, t, poses, arrows, struck, blows, width: poses.length / t.length, pushes: arrows.length / t.length };
+      const n = track.t.length;
+      return { ...track, width: track.poses.length / n, pushes: track.arrows.length / n };
     });
     const find = (name) => root.querySelector(`[data-${name}]`);
-    const [play, clock, readout, speed, view, forces, longer, axes, before, after, differences] =
-      ["play", "clock", "readout", "speed", "view", "forces", "longer", "axes", "before", "after", "differences"].map(find);
+    const [play, clock, readout, speed, view, forces, longer, axes, before, after, differences, follow] =
+      ["play", "clock", "readout", "speed", "view", "forces", "longer", "axes", "before", "after", "differences", "follow"].map(find);
     const canvas = root.querySelector("canvas");
     const g = canvas.getContext("2d");
     let [now, running, last, turn, tilt, zoom] = [0, false, 0, 0.6, 0.35, 1];
@@ -55,11 +52,24 @@
       for (const thread of stage.threads) add(thread.slice(0, 2));
       return values.map((each) => each.reduce(([a, b], x) => [Math.min(a, x), Math.max(b, x)], [Infinity, -Infinity]));
     };
-    const range = spans();
-    const middle = range.map(([a, b]) => (a + b) / 2);
-    const size = space ? Math.hypot(...range.map(([a, b]) => b - a)) * 0.8 : 0;
-
     const lead = tracks.find((track) => track.truth);
+    const across = (boxes) => Math.hypot(...boxes.map(([a, b]) => b - a)) * 0.8;
+    const centre = (boxes) => boxes.map(([a, b]) => (a + b) / 2);
+    const range = spans();
+    let [middle, size] = [centre(range), space ? across(range) : 0];
+    // What the bodies span at one instant: one that goes far is followed, or nobody would see it.
+    const standing = (t) => {
+      const pose = at(lead || tracks[0], t).pose;
+      const points = moving.flatMap((solid) => crossbody.solids.extent(pose, solid));
+      return [0, 1, 2].map((k) => points.reduce(([a, b], p) => [Math.min(a, p[k]), Math.max(b, p[k])], [Infinity, -Infinity]));
+    };
+    const [whole, wide] = [middle, size];
+    const aim = () => {
+      [middle, size] = [whole, wide];
+      if (!follow?.checked) return;
+      const boxes = standing(now);
+      [middle, size] = [centre(boxes), 1.3 * across(boxes)];
+    };
     const larger = () => (differences && lead ? Number(differences.value) : 1);
     // A pose with its difference to the truth's made larger: of bodies with shapes where they are, not how they are turned.
     const pose = (track, t) => {
@@ -222,6 +232,7 @@
       if (scene.impulse) measure(longest / scene.impulse, "N s");
     };
     const draw = () => {
+      aim();
       const box = canvas.getBoundingClientRect();
       const dpr = devicePixelRatio || 1;
       if (!box.width) return;
@@ -283,6 +294,7 @@
       if (go) requestAnimationFrame(frame);
     };
 
+    if (follow && moving.length) follow.checked = wide > FAR * across(standing(0));
     const usual = nice((end || 1) / 10);
     for (const factor of [0.01, 0.1, 0.2, 0.5, 1, 2, 5]) {
       const option = new Option(`${shortNumber(usual * factor)} × real time`, usual * factor, factor === 1, factor === 1);
@@ -294,7 +306,7 @@
     const step = (found) => { if (found !== undefined) { run(false); seek(found, true); } };
     before.addEventListener("click", () => step(scene.events.findLast((t) => t < now - close)));
     after.addEventListener("click", () => step(scene.events.find((t) => t > now + close)));
-    [view, forces, longer, axes, differences].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
+    [view, forces, longer, axes, differences, follow].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
     const look = (right, down, closer = 1) => {
       if (space) [turn, tilt] = [turn + right, Math.min(1.5, Math.max(-1.5, tilt + down))];
       zoom = Math.min(50, Math.max(0.2, zoom * closer));
@@ -324,11 +336,13 @@
     canvas.addEventListener("dblclick", () => { [turn, tilt, zoom] = [0.6, 0.35, 1]; redraw(); });
     const keys = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1],
       "+": [0, 0, 1.2], "=": [0, 0, 1.2], "-": [0, 0, 1 / 1.2] };
+    const does = { " ": () => run(!running), ",": () => before.click(), ".": () => after.click() };
     canvas.addEventListener("keydown", (event) => {
       const moved = keys[event.key];
-      if (!moved || (!space && moved.length < 3)) return;
+      if (!does[event.key] && (!moved || (!space && moved.length < 3))) return;
       event.preventDefault();
-      look(...moved);
+      if (moved) look(...moved);
+      else does[event.key]();
     });
     crossbody.on("time", (t, from) => { if (from !== root && root.closest("[data-page]").contains(from)) seek(t, false); });
     for (const what of ["engines", "page"]) crossbody.on(what, redraw);
@@ -336,5 +350,5 @@
     new ResizeObserver(redraw).observe(canvas);
     redraw();
   };
-  document.querySelectorAll(".player").forEach(start);
+  crossbody.each(".player", start);
 })();

@@ -1,7 +1,8 @@
 // Plots: drawn when they come near the screen, coloured by the theme, one cursor and one zoom over those that share time.
 (() => {
   const PAPER = 680; // width of a plot in print, pixels
-  const charts = new Map();
+  const charts = new Map(); // those that are drawn
+  const begun = new Map();
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const axes = (layout) => Object.keys(layout).filter((key) => /^[xy]axis\d*$/.test(key));
   const scheme = (layout) => {
@@ -14,7 +15,7 @@
     }
     return out;
   };
-  const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "sendChartToCloud"] };
   const themed = (layout) => {
     const out = structuredClone(layout);
     for (const [path, value] of Object.entries(scheme(layout))) {
@@ -70,23 +71,39 @@
     box.style.height = `${layout.height}px`;
   };
 
-  const draw = (box) => {
-    if (charts.has(box)) return charts.get(box).ready;
-    const figure = JSON.parse(document.querySelector(`script[data-plot="${CSS.escape(box.id)}"]`).textContent);
+  // In a single file the library is folded; the page's policy allows it by its hash.
+  const folded = document.querySelector("[data-plotly]");
+  const library = folded && crossbody.text(folded).then((text) => {
+    const script = document.createElement("script");
+    script.textContent = text;
+    document.head.append(script);
+  });
+  const known = new Map(); // figures that are unfolded: these are drawn at once, which a print does not wait for
+  const ready = new Map();
+  const prepare = (box) => {
+    const value = crossbody.value(document.querySelector(`script[data-plot="${CSS.escape(box.id)}"]`));
+    ready.set(box, Promise.all([value, library]).then(([figure]) => { known.set(box, figure); }));
+    watch.observe(box);
+  };
+  const make = (box) => {
+    const figure = known.get(box);
     narrow(box, figure);
     const mark = document.createElement("div");
     mark.className = "cursor";
     const shown = visible(figure.data);
     figure.data.forEach((trace, i) => { trace.visible = shown[i]; });
-    const ready = Plotly.newPlot(box, figure.data, themed(figure.layout), options).then(() => {
+    charts.set(box, { mark });
+    return Plotly.newPlot(box, figure.data, themed(figure.layout), options).then(() => {
       box.append(mark);
       box.dataset.drawn = "";
       if (figure.layout.xaxis?.range) box.dataset.range = JSON.stringify(figure.layout.xaxis.range);
       box.on("plotly_hover", (event) => { if (box.hasAttribute("data-time")) crossbody.tell("time", event.points[0].x, box); });
       box.on("plotly_relayout", (update) => zoom(box, update));
     });
-    charts.set(box, { mark, ready });
-    return ready;
+  };
+  const draw = (box) => {
+    if (!begun.has(box)) begun.set(box, known.has(box) ? make(box) : ready.get(box).then(() => make(box)));
+    return begun.get(box);
   };
   const watch = new IntersectionObserver((entries) => {
     for (const entry of entries) {
@@ -95,7 +112,7 @@
       draw(entry.target);
     }
   }, { rootMargin: "500px" });
-  document.querySelectorAll(".plot").forEach((box) => watch.observe(box));
+  crossbody.each(".plot", prepare);
   const sized = (size) => charts.forEach((_, box) => Plotly.relayout(box, size));
   addEventListener("beforeprint", () => {
     document.querySelectorAll(".plot").forEach(draw);

@@ -1,0 +1,87 @@
+"""Features of MJCF: gravity, and what acts at joints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases.files.conformance.arm import arm, mjcf
+from crossbody.cases.files.conformance.feature import Feature, written
+from crossbody.cases.files.conformance.joints import AXIS_RULE
+from crossbody.cases.scene import Actuator
+
+
+def features() -> list[Feature]:
+    """Return the features of gravity and what acts at joints."""
+
+    def elbow(
+        name: str,
+        attributes: str,
+        finds: str,
+        change: dict[str, Any],
+        about: str,
+        rule: str = "",
+        rewrite: str = "",
+        head: str = "",
+        tail: str = "",
+    ) -> Feature:
+        text = mjcf(head=head, elbow=f'<joint name="elbow" axis="1 0 0" {attributes}/>', tail=tail)
+        return written(name, text, arm(elbow=change), finds, rule, rewrite, (about,))
+
+    motor = '<actuator><motor name="m" joint="elbow"/></actuator>'
+    turn = np.pi / 180
+    return [
+        written("gravity", mjcf(head='<option gravity="1 -2 -3"/>'), arm(gravity=(1.0, -2.0, -3.0)),
+            "option[@gravity]", "Gravity is a vector of the option.", "Set gravity in the engine."),
+        written("gravity switched off", mjcf(head='<option><flag gravity="disable"/></option>'), arm(gravity=(0.0,
+            0.0, 0.0)), "option/flag[@gravity]", "The flag gravity switches it off.", "Set gravity in the engine."),
+        written("weight that is taken off", mjcf(lower='pos="0 .05 -.4" gravcomp=".5"'),
+            arm(lower={"weightless": 0.5}), ".//body[@gravcomp]", "gravcomp is a force against the weight.",
+            "Apply that force in the engine.", ("gravity",)),
+        elbow("armature", 'armature=".1"', ".//joint[@armature]", {"armature": 0.1}, "armature",
+            "Armature belongs to the joint, driven or not.", "Drive the joint by a motor, or set it in the engine."),
+        written("armature of a driven joint",
+            mjcf(elbow='<joint name="elbow" axis="1 0 0" armature=".1"/>', tail=motor),
+            arm(elbow={"armature": 0.1}, actuators=(Actuator(name="m", joint="elbow", gear=(1.0,)),)),
+            ".//joint[@armature]", "Armature belongs to the joint.", about=("armature",)),
+        written("armature of a class", mjcf(head='<default><joint armature=".1"/></default>'),
+            arm(shoulder={"armature": 0.1}, elbow={"armature": 0.1}), ".//default/joint[@armature]", AXIS_RULE,
+            "Write it at the joint itself.", ("armature",)),
+        elbow("damping", 'damping=".7"', ".//joint[@damping]", {"damping": (0.7, 0.0, 0.0)}, "damping"),
+        written("damping of a ball joint", mjcf(elbow='<joint name="elbow" type="ball" damping=".7"/>'),
+            arm(elbow={"type": "ball", "damping": (0.7, 0.0, 0.0)}), ".//joint[@type='ball'][@damping]",
+            about=("damping",)),
+        written("damping of a class", mjcf(head='<default><joint damping=".7"/></default>'),
+            arm(shoulder={"damping": (0.7, 0.0, 0.0)}, elbow={"damping": (0.7, 0.0, 0.0)}),
+            ".//default/joint[@damping]", AXIS_RULE, "Write it at the joint itself.", ("damping",)),
+        elbow("spring", 'stiffness="5"', ".//joint[@stiffness]", {"stiffness": (5.0, 0.0, 0.0)}, "springs",
+            "A joint's spring is at rest at springref.", "Apply the spring in the engine."),
+        elbow("rest of a spring", 'stiffness="5" springref="20"', ".//joint[@springref]", {"stiffness": (5.0, 0.0,
+            0.0), "rest": (20 * turn,)}, "springs", "springref is in the compiler's unit.",
+            "Apply the spring in the engine."),
+        elbow("dry friction", 'frictionloss=".3"', ".//joint[@frictionloss]", {"friction_loss": 0.3}, "friction"),
+        elbow("bounds in degrees", 'range="-30 60" limited="true"', ".//joint[@range]", {"range": (-30 * turn,
+            60 * turn)}, "limits", "Angles are in degrees unless the compiler says radian.",
+            'Write <compiler angle="radian"/> and radians.'),
+        elbow("bounds in radians", 'range="-.5 1" limited="true"', "compiler[@angle='radian']", {"range": (-0.5, 1.0)},
+            "limits", head='<compiler angle="radian"/>'),
+        elbow("bounds without limited", 'range="-30 60"', ".//joint[@range]", {"range": (-30 * turn, 60 * turn)},
+            "limits", "A joint with a range is bounded (autolimits).", 'Write limited="true".'),
+        elbow("range that is not in force", 'range="-30 60" limited="false"', ".//joint[@limited='false']", {},
+            "limits", 'limited="false" leaves the range without effect.', "Leave the range out."),
+        written("bounds of a slide",
+            mjcf(elbow='<joint name="elbow" type="slide" axis="1 0 0" range="-.2 .3" limited="true"/>'),
+            arm(elbow={"type": "slide", "range": (-0.2, 0.3)}), ".//joint[@type='slide'][@range]", about=("limits",)),
+        elbow("bounds beside a reference", 'range="-30 60" ref="20"', ".//joint[@ref][@range]",
+            {"range": (-30 * turn, 60 * turn), "reference": 20 * turn}, "limits",
+            "A range is that of the coordinate, which is ref at the pose of the file.", "Leave ref out."),
+        written("bounds of the class around a class",
+            mjcf(head='<default><default class="a"><joint range="-30 60"/><default class="b"><geom type="box"/>'
+            "</default></default></default>", elbow='<joint name="elbow" class="b" axis="1 0 0"/>'),
+            arm(elbow={"range": (-30 * turn, 60 * turn)}), ".//default/default/default!joint=", AXIS_RULE,
+            "Write it at the joint itself.", ("limits",)),
+        written("bounds of a class", mjcf(head='<default><joint range="-30 60"/></default>'),
+            arm(shoulder={"range": (-30 * turn, 60 * turn)}, elbow={"range": (-30 * turn, 60 * turn)}),
+            ".//default/joint[@range]", AXIS_RULE, "Write it at the joint itself.", ("limits",)),
+    ]  # fmt: skip

@@ -1,0 +1,62 @@
+"""Features of MJCF: equalities and actuators."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, arm, mjcf
+from crossbody.cases.files.conformance.feature import Feature, written
+from crossbody.cases.scene import Actuator, Loop, Tendon
+
+
+def features() -> list[Feature]:
+    """Return the features of equalities and actuators."""
+
+    def row(name: str, equality: str, loop: Loop, finds: str, before: str = "") -> Feature:
+        return written(
+            name,
+            mjcf(tail=f"<equality>{equality}</equality>", lower_inertial=LOWER_INERTIAL + before),
+            arm(loops=(loop,)),
+            finds,
+            about=("loops",),
+            rewrite="Add the row in the engine.",
+            rule="Equalities hold from the start.",
+        )
+
+    def driven(name: str, actuator: str, finds: str, **more: Any) -> Feature:
+        return written(
+            name,
+            mjcf(tail=f"<actuator>{actuator}</actuator>"),
+            arm(actuators=(Actuator(name="m", joint="elbow", gear=(1.0,), **more),)),
+            finds,
+            about=("actuators",),
+            rule="An actuator acts on a joint by its name.",
+            rewrite="Drive the joint in the engine.",
+        )
+
+    tendon = Tendon(name="t", joints=("shoulder", "elbow"), coefficients=(1.0, 2.0))
+    both = '<tendon><fixed name="t"><joint joint="shoulder" coef="1"/><joint joint="elbow" coef="2"/></fixed></tendon>'
+    return [
+        row("points of two bodies", '<connect name="c" body1="lower" body2="upper" anchor="0 0 -.3"/>', Loop(name="c",
+            type="connect", first="lower", second="upper", first_position=(0.0, 0.0, -0.3),
+            second_position=(0.0, 0.05, -0.7)), ".//connect[@body1]"),
+        row("point of the world", '<connect name="c" body1="lower" anchor="0 0 -.3"/>', Loop(name="c", type="connect",
+            first="lower", first_position=(0.0, 0.0, -0.3), second_position=(0.1, 0.25, 0.3)), ".//connect[@body1]"),
+        row("two frames", '<weld name="c" body1="lower" body2="upper"/>', Loop(name="c", type="weld", first="lower",
+            second="upper", first_position=(0.0, -0.05, 0.4)), ".//weld[@body1]"),
+        row("coupled joints", '<joint name="c" joint1="elbow" joint2="shoulder" polycoef="0 2 0 0 0"/>', Loop(name="c",
+            type="joint", first="elbow", second="shoulder", polynomial=(0.0, 2.0, 0.0, 0.0, 0.0)), "equality/joint"),
+        row("fixed joint by an equality", '<joint name="c" joint1="elbow"/>', Loop(name="c", type="joint",
+            first="elbow"), "equality/joint"),
+        driven("motor", '<motor name="m" joint="elbow"/>', ".//motor"),
+        driven("position servo", '<position name="m" joint="elbow" kp="10"/>', ".//position", gain=(10.0, 0.0, 0.0),
+            bias=(0.0, -10.0, 0.0)),
+        driven("velocity servo", '<velocity name="m" joint="elbow" kv="2"/>', ".//velocity", gain=(2.0, 0.0, 0.0),
+            bias=(0.0, 0.0, -2.0)),
+        driven("general actuator", '<general name="m" joint="elbow" gainprm="10"/>', ".//general",
+            gain=(10.0, 0.0, 0.0)),
+        written("actuator on a tendon", mjcf(tail=both + '<actuator><motor name="m" tendon="t"/></actuator>'),
+            arm(tendons=(tendon,), actuators=(Actuator(name="m", tendon="t", gear=(1.0,)),)),
+            ".//motor[@tendon] | .//general[@tendon]", about=("actuators",), rule="A fixed tendon is a sum of joints.",
+            rewrite="Drive the joints in the engine."),
+    ]  # fmt: skip

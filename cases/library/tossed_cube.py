@@ -1,0 +1,51 @@
+"""A cube is tossed on a table: eight corners touch it with friction, slide, hold and lift again.
+
+By default that of ContactNets (Pfrommer et al. 2020): 0.1048 m, 0.37 kg, coefficient of friction 0.18. A row is hit
+with the restitution of its law's constants, and pushes for some milliseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from crossbody.cases.case import Case, Parameter, Value
+from crossbody.cases.files.case import case_of
+from crossbody.cases.mechanisms.friction.limits import limits
+from crossbody.cases.mechanisms.friction.scene import NUMBERS, tossed_cube
+from crossbody.cases.mechanisms.friction.spheres import turned
+
+PARAMETERS = {
+    **NUMBERS,
+    "mu": Parameter(default=0.18, doc="coefficient of friction", low=0.0, open_low=True),
+    "a0": replace(NUMBERS["a0"], default=1e5),
+    "a1": replace(NUMBERS["a1"], default=640.0),
+    "t_end": Parameter(default=0.6, unit="s", doc="horizon", low=0.0, open_low=True),
+    "side": Parameter(default=0.1048, unit="m", doc="of the cube", low=0.0, open_low=True),
+    "mass": Parameter(default=0.37, unit="kg", doc="of the cube", low=0.0, open_low=True),
+    "inertia": Parameter(default=0.00081, unit="kg m^2", doc="moment of inertia", low=0.0, open_low=True),
+    "height": Parameter(default=0.15, unit="m", doc="of the centre at the start", low=0.0, open_low=True),
+}
+
+VARIANTS: dict[str, dict[str, Value]] = {"slides": {}, "tumbles": {"mu": 0.6}}
+
+_TITLES = {
+    "slides": "a cube is tossed on a table on which it slides",
+    "tumbles": "a cube is tossed on a table on which it rolls over its edges",
+}
+TURNED = np.array([[0.4, -0.3, 0.2]])
+"""Rotation vector at the start, rad."""
+THROWN = (0.8, -0.3, 0.0, 3.0, 2.0, -1.0)
+"""Velocities at the start, m/s and rad/s."""
+
+
+def build(variant: str, parameters: Mapping[str, Value]) -> Case:
+    """The scene; its motion has no closed form."""
+    p = {name: float(value) for name, value in parameters.items()}
+    made = case_of(
+        tossed_cube(p), name="tossed_cube", variant=variant, t_end=p["t_end"], parameters=parameters,
+        q0=[0.0, 0.0, p["height"], *turned(TURNED)[0]], v0=THROWN,
+    )  # fmt: skip
+    return limits(made, _TITLES[variant], PARAMETERS, None, p)

@@ -1,1 +1,0 @@
-"""The delta robot as engines of hinges see it."""

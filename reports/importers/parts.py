@@ -1,0 +1,136 @@
+"""Gaps of the parts of a robot: numbers of joints, tendons, loops and actuators."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases.arrays import Floats
+from crossbody.reports.importers.gap import Gap, apart, lacks, reach
+
+NUMBERS = {
+    "armature": ("armature",), "damping": ("damping", "damping v|v|", "damping v^3"),
+    "springs": ("stiffness", "stiffness x^2", "stiffness x^3", "rest"), "limits": ("lower", "upper"),
+    "friction": ("friction",),
+}  # fmt: skip
+"""Quantity -> numbers of joints that make it up."""
+USUAL = {"lower": -math.inf, "upper": math.inf}
+"""What such a number is where nothing is said; of others 0."""
+
+
+def numbers(quantity: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
+    """Every number of every joint that either has; one of an engine's stands for all velocities of a joint."""
+    told, some = [], False
+    for key in NUMBERS[quantity]:
+        usual = USUAL.get(key, 0.0)
+        for name, theirs in wanted[key].items():
+            mine = found.get(key, {}).get(name, [])
+            width = max(len(theirs), len(mine))
+            x, y = (list(part) if len(part) == width else [*part, usual][:1] * width for part in (theirs, mine))
+            some |= any(value != usual for value in (*x, *y))
+            off = [apart(a, b) for a, b in zip(x, y, strict=True)]
+            if k := [i for i, one in enumerate(off) if one == max(off)]:
+                i, what = k[0], name if key == quantity else f"{name}: {key}"
+                told.append(Gap(off[i], what, y[i], x[i], part=name, key=key, lacks=all(one == usual for one in y)))
+    return told if some else None
+
+
+def tendons(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
+    """Return a gap for every tendon: its numbers and its lengths."""
+    if not found["tendons"] and not wanted["tendons"]:
+        return None
+    told = [Gap(1.0, f"{name} is more", part=name, lacks=False) for name in found["tendons"].keys() - wanted["tendons"]]
+    for name, theirs in wanted["tendons"].items():
+        mine = found["tendons"].get(name)
+        if mine is None:
+            told.append(Gap(1.0, f"{name} is missing", part=name))
+            continue
+        pairs = list(zip(theirs, mine, strict=True))
+        for one, other in zip(wanted["states"], found["states"], strict=False):
+            pairs.append((one["tendons"][name], other["tendons"][name]))
+        x, y = max(pairs, key=lambda pair: apart(*pair))
+        told.append(Gap(apart(x, y), name, y, x, part=name, lacks=False))
+    return told
+
+
+def loops(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
+    """Each loop of the file beside the one of the same type that is nearest: what it holds together, or couples."""
+    mine, theirs = found["loops"], wanted["loops"]
+    if not mine and not theirs:
+        return None
+    told, left, counts = [], list(range(len(mine))), (len(mine), len(theirs))
+    blind = [i for i in left if not mine[i][0]]
+    for k, (kind, of, _) in enumerate(theirs):
+        named = f"{kind} {' and '.join(of)}".strip() if of else f"{kind} {k}"
+        same = {i: _held_apart(found, i, wanted, k) for i in left if mine[i][0] == kind}
+        if same:
+            i = min(same, key=lambda one: same[one])
+            left.remove(i)
+            told.append(Gap(same[i], f"what {named} holds" if same[i] else named, part=of[0] if of else ""))
+        elif blind:
+            left.remove(blind.pop())
+            told.append(Gap(1.0, "The engine tells the number of its loops alone.", unseen=True))
+        else:
+            told.append(Gap(1.0, f"{named} is missing", *counts, part=of[0] if of else ""))
+    return [*told, *(Gap(1.0, f"{mine[i][0] or 'one'} is more", *counts, lacks=False) for i in left)]
+
+
+def _held_apart(found: Mapping[str, Any], i: int, wanted: Mapping[str, Any], k: int) -> float:
+    """Return how far two loops of one type are from each other, of the reach of the robot or of their numbers."""
+    kind, of, numbers = wanted["loops"][k]
+    _, named, others = found["loops"][i]
+    if kind in ("joint", "tendon"):
+        size = max(map(abs, numbers)) or 1.0
+        return 1.0 if list(of) != list(named) else max(abs(a - b) for a, b in zip(numbers, others, strict=True)) / size
+    ends = [(a["ends"][i], b["ends"][k]) for a, b in zip(found["states"], wanted["states"], strict=False)]
+    turned = [_end_gap(kind, [(mine[::-1] if turn else mine, theirs) for mine, theirs in ends]) for turn in (0, 1)]
+    return min(turned) / reach(wanted["states"])
+
+
+def _end_gap(kind: str, ends: Sequence[tuple[Any, Any]]) -> float:
+    """Return how far two points are from two others, or what brings one frame to the other from what does for others.
+
+    Every frame that is fixed to a body may stand for a weld: X_1 X_2^-1 is the same for all of them.
+    """
+    worst = 0.0
+    for mine, theirs in ends:
+        if kind == "connect":
+            worst = max(
+                worst, *(float(np.abs(np.subtract(a[0], b[0])).max()) for a, b in zip(mine, theirs, strict=True))
+            )
+            continue
+        between = []
+        for (p, R), (p_2, R_2) in (mine, theirs):
+            turn = np.array(R) @ np.array(R_2).T
+            between.append(np.concatenate([np.array(p) - turn @ np.array(p_2), turn.ravel()]))
+        worst = max(worst, float(np.abs(between[0] - between[1]).max()))
+    return worst
+
+
+def actuators(found: Mapping[str, Any], wanted: Mapping[str, Any], names: Sequence[str]) -> list[Gap] | None:
+    """Which joints each moves, its force for one of control, and that of all of them at no control."""
+    mine, theirs = found["actuators"], wanted["actuators"]
+    if not mine and not theirs:
+        return None
+    counts = (len(mine), len(theirs))
+    told = [Gap(1.0, f"{name} is {'missing' if name not in mine else 'at other joints'}", *counts, part=name)
+            for name in theirs if sorted(mine.get(name, [""])) != sorted(theirs[name])]  # fmt: skip
+    told += [Gap(1.0, f"{name} is more", *counts, part=name, lacks=False) for name in mine if name not in theirs]
+    if told or lacks(found, "actuators") or not names:
+        return told
+    for name in theirs:
+        one, other = (np.array([state["driven"][name] for state in one["states"]]) for one in (found, wanted))
+        told += _of_forces(one, other, f"{name}: force of 1 at", names, name)
+    one, other = (np.array([state["held"] for state in one["states"]]) for one in (found, wanted))
+    return told + _of_forces(one, other, "no control at", names, "")
+
+
+def _of_forces(found: Floats, wanted: Floats, what: str, names: Sequence[str], part: str) -> list[Gap]:
+    size = float(np.abs(wanted).max(initial=0.0))
+    off = np.nan_to_num(np.abs(found - wanted), nan=math.inf)
+    k, i = map(int, np.unravel_index(int(np.argmax(off)), off.shape))
+    values = (float(found[k, i]), float(wanted[k, i]))
+    return [Gap(float(off[k, i]) / (size or 1.0), f"{what} {names[i]}", *values, part=part, lacks=False)]

@@ -1,0 +1,124 @@
+"""Friction of one contact: its force against the cone, and which way it slips and is pushed in the contact's plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases.arrays import Floats
+from crossbody.cases.scene_contacts import WAYS, Contact, contacts
+from crossbody.cases.scene_plain import scene_from
+from crossbody.reports.figures.section import Plot, Section
+from crossbody.reports.figures.styles import label, style
+from crossbody.reports.figures.values import coded, plain
+from crossbody.reports.pages.sheet import LEVEL
+from crossbody.reports.runs.store import Trace
+from crossbody.reports.scenes.scene import slip
+
+MOST = 1000
+"""Points of one engine's line."""
+TEXT = (
+    "Of the contact that is pressed the most. A contact that holds is inside the cone, one that slides on its edge; "
+    "what is outside breaks Coulomb's law. In the plane of the contact friction as a part of mu lam is a point of the "
+    "unit disc; where it slides it is against the slip."
+)
+
+
+def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
+    """The section, with a share of the usual points; nothing where no contact with friction is pressed."""
+    found = _pressed(traces)
+    if found is None:
+        return []
+    contact, place = found
+    name, most = contact.normals[place], max(int(share * MOST), 2)
+    lines: list[tuple[dict[str, Any], ...]] = [
+        (_line(trace, i, (rows[:, 0], across), most), _line(trace, i, parts, most))
+        for i, trace in enumerate(traces)
+        for rows, across, parts in (_forces(trace, contact, place),)
+    ]
+    top = max(float(np.nanmax(_forces(trace, contact, place)[0][:, 0], initial=0.0)) for trace in traces)
+    plots = [
+        _plot("cone", f"Friction over normal force, {name}", [one for one, _ in lines],
+              ("lam [N]", "|friction| [N]"), [_edge(contact.friction, top)]),
+        _plot("plane", f"Friction over mu lam in the plane, {name}", [one for _, one in lines],
+              ("friction t1 / (mu lam) [1]", "friction t2 / (mu lam) [1]"), [_disc()], square=True),
+    ]  # fmt: skip
+    if contact.first.type == "plane":
+        slips = [_line(trace, i, _slipping(trace, contact, place), most) for i, trace in enumerate(traces)]
+        plots.append(_plot("slip", f"Slip, {name}", slips, ("slip t1 [m/s]", "slip t2 [m/s]"), [], square=True))
+    return [Section(name="friction", title="Friction", text=TEXT, plots=plots)]
+
+
+def _pressed(traces: Sequence[Trace]) -> tuple[Contact, int] | None:
+    """The contact with friction, and which of its places, that carries most in the first motion that presses any."""
+    told = traces[0].about.get("scene") if traces else None
+    rubs = [one for one in contacts(scene_from(told)) if one.friction > 0.0] if told else []
+    places = [(one, k) for one in rubs for k in range(one.places)]
+    for trace in traces:
+        loads = [float(np.nanmax(_rows(trace, one, k)[:, 0], initial=0.0)) for one, k in places]
+        if loads and max(loads) > 0.0:
+            return places[int(np.argmax(loads))]
+    return None
+
+
+def _rows(trace: Trace, contact: Contact, place: int) -> Floats:
+    """Normal force and both of friction (n, 3), N."""
+    name, known = contact.normals[place], list(trace.about["contacts"])
+    found: Floats = trace.run.lam[:, [known.index(each) for each in (name, *(f"{name} {way}" for way in WAYS))]]
+    return found
+
+
+def _forces(trace: Trace, contact: Contact, place: int) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
+    """Rows (n, 3), size of friction (n,), N, and friction over mu lam (2, n) where it is pressed."""
+    rows = _rows(trace, contact, place)
+    pressed = rows[:, 0] > 0.0
+    bound = np.where(pressed, contact.friction * rows[:, 0], np.nan)
+    size = np.where(pressed, np.hypot(rows[:, 1], rows[:, 2]), np.nan)
+    return rows, size, (rows[:, 1] / bound, rows[:, 2] / bound)
+
+
+def _slipping(trace: Trace, contact: Contact, place: int) -> tuple[Floats, Floats]:
+    """Velocity of the second shape over the first where they are pressed (n,) along both ways, m/s."""
+    scene = scene_from(trace.about["scene"])
+    found = slip(scene, contact, place, trace.run.q, trace.run.v)
+    there = np.where(_rows(trace, contact, place)[:, :1] > 0.0, found, np.nan)
+    return there[:, 0], there[:, 1]
+
+
+def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dict[str, Any]:
+    """A line of one engine through evenly chosen samples and those beside its events."""
+    x, y = points
+    near = np.searchsorted(trace.run.t, [event.t for event in trace.run.events])[: most // 4]
+    at = np.unique(np.r_[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1])
+    at, look = at[(at >= 0) & (at < len(x))], style(trace, i)
+    return {
+        "type": "scatter", "mode": "lines+markers", "marker": {"size": 4}, "x": coded(x[at].astype(np.float32)),
+        "y": coded(y[at].astype(np.float32)), "name": plain(label(trace)), "meta": label(trace),
+        "line": {key: look[key] for key in ("color", "dash", "width")},
+    }  # fmt: skip
+
+
+def _plot(
+    name: str, title: str, lines: list[dict[str, Any]], axes: tuple[str, str], shapes: list[dict[str, Any]], *,
+    square: bool = False,
+) -> Plot:  # fmt: skip
+    x, y = axes
+    layout = {
+        "title": {"text": title}, "height": 420, "showlegend": False, "shapes": shapes,
+        "xaxis": {"title": {"text": x}, "exponentformat": "power"},
+        "yaxis": {"title": {"text": y}, "exponentformat": "power"} | ({"scaleanchor": "x"} if square else {}),
+    }  # fmt: skip
+    return Plot(name=f"plot-friction-{name}", figure={"data": lines, "layout": layout})
+
+
+def _edge(mu: float, top: float) -> dict[str, Any]:
+    text = {"text": f"mu lam, mu = {mu:g}", "font": {"size": 10, "color": LEVEL}}
+    line = {"color": LEVEL, "dash": "dash", "width": 1}
+    return {"type": "line", "x0": 0.0, "y0": 0.0, "x1": top, "y1": mu * top, "line": line, "label": text}
+
+
+def _disc() -> dict[str, Any]:
+    return {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0,
+            "line": {"color": LEVEL, "dash": "dash", "width": 1}}  # fmt: skip

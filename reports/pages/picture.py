@@ -1,0 +1,279 @@
+"""Pictures of a stored motion without a browser: one instant as SVG or PNG, all of it as an animated GIF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from crossbody.cases import InvalidValue
+from crossbody.cases.arrays import Floats
+from crossbody.reports import scenes
+from crossbody.reports.figures.styles import style
+from crossbody.reports.pages.filled import filled
+from crossbody.reports.runs.store import Trace
+
+WIDTH, HEIGHT = 800, 500
+INK, PAPER, SOFT, PUSH = "#1a1d21", "#ffffff", "#4f5660", "#b3261e"
+TURN, TILT = 0.6, 0.35
+"""Of the camera, rad: those with which a page begins."""
+ROUND = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 33)[:-1]) for f in (np.cos, np.sin)])
+FAR = 4.0
+"""Times its own size that a mechanism goes before it is followed."""
+FORCE = 0.28
+"""Part of the height that the largest force of a motion is as long as."""
+SUFFIXES = (".svg", ".png", ".gif")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stroke:
+    """A line of points (n, 2), pixels; closed and filled with a colour, or open."""
+
+    points: Floats
+    color: str
+    fill: str = ""
+    width: float = 1.5
+
+
+class Film:
+    """A motion that can be drawn at any instant.
+
+    Args:
+        trace: the motion.
+        i: its place among those of its case, which decides its colour.
+
+    Raises:
+        InvalidValue: if its mechanism has no picture.
+    """
+
+    def __init__(self, trace: Trace, i: int = 0) -> None:
+        name = str(trace.about.get("mechanism", ""))
+        if name not in scenes.names() or not len(trace.run.t):
+            raise InvalidValue(f"There is no picture of the mechanism {name or '(none is stored)'}.")
+        self.scene, self.run = scenes.load(name), trace.run
+        self.parameters = {**trace.about["parameters"], "scene": trace.about.get("scene")}
+        self.stage = self.scene.stage(self.parameters)
+        self.t, self.q = filled(trace.run, trace.quaternions)
+        self.color = style(trace, i)["color"]
+        self.force = float(np.max(np.abs(np.nan_to_num(trace.run.lam)), initial=0.0))
+        some = np.unique(np.linspace(0, len(self.q) - 1, 40).astype(int))
+        poses = self.scene.poses(self.q[some], self.parameters)
+        spans = [np.concatenate([*_points(self.stage, pose)]) for pose in poses]
+        self.to = _camera(self.stage, spans)
+        own, whole = (np.linalg.norm(np.ptp(points, axis=0)) for points in (spans[0], np.concatenate(spans)))
+        self.far = bool(self.stage.frames and whole > FAR * own)
+
+    def at(self, t: float) -> list[Stroke]:
+        """Everything that is drawn at an instant, s, from back to front."""
+        k = min(int(np.searchsorted(self.t, t, side="right")), len(self.t) - 1)
+        a, b = self.t[max(k - 1, 0)], self.t[k]
+        share = min(max((t - a) / (b - a), 0.0), 1.0) if b > a else 1.0
+        q = (1.0 - share) * self.q[max(k - 1, 0)] + share * self.q[k]
+        pose = self.scene.poses(q[None], self.parameters)[0]
+        if self.far:
+            self.to = _camera(self.stage, [*_points(self.stage, pose)])
+        row = max(int(np.searchsorted(self.run.t, t, side="right")) - 1, 0)  # what has been, as in the playback
+        lam = np.nan_to_num(self.run.lam[row : row + 1])
+        pushes = self.scene.arrows(q[None], lam, self.parameters)[0]
+        return [*self._still(), *self._bodies(pose), *self._arrows(pushes)]
+
+    def _still(self) -> Iterator[Stroke]:
+        for shape in self.stage.still:
+            yield Stroke(self.to(_outline(shape)), SOFT, width=1.2)
+        for solid in self.stage.solids:
+            if "plane" in solid:
+                origin, x, y = np.reshape(solid["plane"], (3, 3))
+                away, half = self.to.middle - origin, 0.45 * HEIGHT / self.to.scale
+                origin, x, y = origin + (away @ x) * x + (away @ y) * y, half * x, half * y
+                corners = [origin + a * x + b * y for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
+                yield Stroke(self.to(np.array(corners)), SOFT, width=0.8)
+
+    def _bodies(self, pose: Floats) -> Iterator[Stroke]:
+        if self.stage.frames:
+            yield from self._solids(pose)
+        elif self.stage.lines:
+            yield from (Stroke(self.to(pose[list(line)]), self.color, width=2.0) for line in self.stage.lines)
+        else:
+            for x, y, body in self.stage.threads:
+                yield Stroke(self.to(np.array([(x, y), pose[body, :2]])), self.color)
+            for shapes, stand in zip(self.stage.bodies, pose, strict=True):
+                for shape in shapes:
+                    closed = "circle" in shape or shape["closed"]
+                    points = self.to(_moved(_outline(shape), stand))
+                    yield Stroke(points, self.color, _pale(self.color) if closed else "")
+
+    def _solids(self, pose: Floats) -> Iterator[Stroke]:
+        """Outlines of the points that a sphere is swept over, those behind first."""
+        drawn = []
+        for solid in self.stage.solids:
+            if "plane" not in solid:
+                points = _placed(solid, pose)
+                flat = self.to(points)
+                ball = solid["radius"] * self.to.scale * ROUND
+                around = _hull((flat[:, None] + ball).reshape(-1, 2))
+                drawn.append((self.to.depth(points).mean(), around))
+        for _, around in sorted(drawn, key=lambda one: -one[0]):
+            yield Stroke(around, self.color, _pale(self.color))
+
+    def _arrows(self, pushes: Floats) -> Iterator[Stroke]:
+        n = self.stage.dimensions
+        for arrow in pushes if self.force else ():
+            length = FORCE * HEIGHT / self.force / self.to.scale
+            a, b = self.to(np.array([arrow[:n], arrow[:n] + length * arrow[n:]]))
+            along = b - a
+            size = float(np.hypot(*along))
+            if size >= 2.0:
+                yield Stroke(np.array([a, b]), PUSH, width=2.0)
+                u, head = along / size, min(8.0, 0.6 * size)
+                side = 0.45 * head * np.array([-u[1], u[0]])
+                yield Stroke(np.array([b, b - head * u + side, b - head * u - side]), PUSH, PUSH)
+
+
+class _Camera:
+    """From metres to pixels."""
+
+    def __init__(self, middle: Floats, scale: float, rows: Floats) -> None:
+        self.middle, self.scale, self.rows = middle, scale, rows
+
+    def __call__(self, points: Floats) -> Floats:
+        found: Floats = (points - self.middle) @ self.rows[:2].T * (self.scale, -self.scale) + (WIDTH / 2, HEIGHT / 2)
+        return found
+
+    def depth(self, points: Floats) -> Floats:
+        """How far behind the middle points are, m."""
+        found: Floats = (points - self.middle) @ self.rows[2]
+        return found
+
+
+def _camera(stage: scenes.Stage, points: Sequence[Floats]) -> _Camera:
+    """One that sees all of these points, and in the plane what stands still."""
+    still = [_outline(shape) for shape in stage.still]
+    every = np.concatenate([*points, *still])
+    low, high = every.min(axis=0), every.max(axis=0)
+    span = np.maximum(high - low, 1e-9)
+    if stage.dimensions == 2:
+        scale = 0.86 * float(min(WIDTH / span[0], HEIGHT / span[1]))
+        return _Camera((low + high) / 2.0, scale, np.eye(3, 2))
+    (ca, sa), (cb, sb), up = (np.cos(TURN), np.sin(TURN)), (np.cos(TILT), np.sin(TILT)), -1.0 if stage.down else 1.0
+    deep = np.array([sa, up * ca, 0.0])
+    rows = np.array([[ca, -up * sa, 0.0], sb * deep + (0.0, 0.0, cb * up), cb * deep - (0.0, 0.0, sb * up)])
+    return _Camera((low + high) / 2.0, 0.95 * HEIGHT / float(np.linalg.norm(span)), rows)
+
+
+def _points(stage: scenes.Stage, pose: Floats) -> Iterator[Floats]:
+    """What one instant spans."""
+    if stage.frames:
+        for solid in stage.solids:
+            if "plane" not in solid:
+                points = _placed(solid, pose)
+                yield from (points - solid["radius"], points + solid["radius"])
+    elif stage.lines:
+        yield pose
+    else:
+        for shapes, stand in zip(stage.bodies, pose, strict=True):
+            yield from (_moved(_outline(shape), stand) for shape in shapes)
+
+
+def _placed(solid: scenes.Shape, pose: Floats) -> Floats:
+    """Points of a solid in the world."""
+    points: Floats = np.asarray(solid["points"], dtype=np.float64)
+    if solid["body"] < 0:
+        return points
+    origin, x, y = pose[solid["body"]].reshape(3, 3)
+    found: Floats = origin + points @ np.array([x, y, np.cross(x, y)])
+    return found
+
+
+def _outline(shape: scenes.Shape) -> Floats:
+    if "circle" in shape:
+        x, y, r = shape["circle"]
+        around: Floats = np.array([x, y]) + r * ROUND
+        return around
+    points: Floats = np.asarray(shape["points"], dtype=np.float64)
+    return points
+
+
+def _moved(points: Floats, stand: Floats) -> Floats:
+    """Points of a planar body where it stands: x, y, angle."""
+    c, s = np.cos(stand[2]), np.sin(stand[2])
+    found: Floats = stand[:2] + points @ np.array([[c, s], [-s, c]])
+    return found
+
+
+def _hull(points: Floats) -> Floats:
+    try:
+        found: Floats = points[ConvexHull(points).vertices]
+        return found
+    except QhullError:  # all on one line
+        return points
+
+
+def _pale(color: str) -> str:
+    """The colour as a glass over paper."""
+    return "#" + "".join(f"{round(255 - 0.25 * (255 - int(color[i : i + 2], 16))):02x}" for i in (1, 3, 5))
+
+
+def svg(strokes: Sequence[Stroke]) -> str:
+    """An SVG of one instant."""
+    lines = []
+    for one in strokes:
+        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in one.points)
+        kind, fill = ("polygon", one.fill) if one.fill else ("polyline", "none")
+        lines.append(
+            f'<{kind} points="{points}" fill="{fill}" stroke="{one.color}" stroke-width="{one.width:g}" '
+            'stroke-linejoin="round" stroke-linecap="round"/>'
+        )
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">'
+    return "\n".join([head, f'<rect width="100%" height="100%" fill="{PAPER}"/>', *lines, "</svg>", ""])
+
+
+def raster(strokes: Sequence[Stroke]) -> Any:
+    """An image of Pillow of one instant, drawn twice as large and made smaller, so that edges are smooth.
+
+    Raises:
+        InvalidValue: if Pillow is not installed.
+    """
+    try:
+        from PIL import Image, ImageDraw
+    except ImportError:
+        raise InvalidValue("PNG and GIF need Pillow (pip install pillow); SVG needs nothing.") from None
+    image = Image.new("RGB", (2 * WIDTH, 2 * HEIGHT), PAPER)
+    draw = ImageDraw.Draw(image)
+    for one in strokes:
+        points = [(2.0 * float(x), 2.0 * float(y)) for x, y in one.points]
+        if one.fill:
+            draw.polygon(points, fill=one.fill)
+        draw.line([*points, *points[:1]] if one.fill else points, one.color, round(2 * one.width), joint="curve")
+    return image.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
+
+
+def write(film: Film, path: Path, t: float, fps: float, speed: float) -> None:
+    """Write a picture of one instant, or of a whole motion where the file is a GIF.
+
+    Args:
+        film: the motion.
+        path: .svg, .png or .gif.
+        t: instant, s.
+        fps: pictures a second of a GIF.
+        speed: seconds of the motion in one of a GIF.
+
+    Raises:
+        InvalidValue: for another kind of file, or an instant that the motion does not have.
+    """
+    end = float(film.t[-1])
+    if path.suffix not in SUFFIXES:
+        raise InvalidValue(f"{path.name} is no picture that is known; valid: {', '.join(SUFFIXES)}.")
+    if not 0.0 <= t <= end:
+        raise InvalidValue(f"There is no instant {t:g} s; the motion lasts from 0 to {end:g} s.")
+    if path.suffix == ".gif":
+        count = max(int(end / speed * fps), 1) + 1
+        first, *rest = (raster(film.at(float(one))) for one in np.linspace(0.0, end, count))
+        first.save(path, save_all=True, append_images=rest, duration=round(1000.0 / fps), loop=0)
+    elif path.suffix == ".png":
+        raster(film.at(t)).save(path)
+    else:
+        path.write_text(svg(film.at(t)), encoding="utf-8")

@@ -1,0 +1,74 @@
+"""Parameters identified from a log, with their intervals and what the data cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from crossbody.reports.figures.section import Column, Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
+
+TITLE = "Identification"
+ESTIMATES = columns(
+    name="Parameter", value=("Estimate", Kind.NUMBER), low=("95 % from", Kind.NUMBER), high=("to", Kind.NUMBER),
+    unit="Unit", start=("Start", Kind.NUMBER), identifiable="Identifiable",
+    first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
+)  # fmt: skip
+HELD = columns(
+    error="Error", fitted_before=("Fitted windows, start", Kind.NUMBER), fitted_after=("estimate", Kind.NUMBER),
+    held_before=("Held-out windows, start", Kind.NUMBER), held_after=("estimate", Kind.NUMBER),
+    change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
+)  # fmt: skip
+PROFILE = (
+    "The cost (sum of squares over that at the estimate) while one parameter is moved and all others follow it. A "
+    "parabola whose ends are at the same height says that intervals from derivatives can be trusted; a flat or "
+    "lopsided one says that they cannot. Estimates whose correlation is near 1 or -1 are told apart by little."
+)
+
+
+def sections(out: Path) -> tuple[Section, ...]:
+    """One section, if parameters were identified."""
+    if not (out / "identify.json").is_file():
+        return ()
+    from crossbody.reports.replay import figure
+
+    estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
+    told = read_json(out / "identify.json")["provenance"]["fit"]
+    tables = (
+        Table(title="Estimates", columns=ESTIMATES, rows=records(_only(estimates, ESTIMATES)), file="identify.csv"),
+        Table(title="Errors before and after", columns=HELD, rows=records(_only(held, HELD)), file="held_out.csv"),
+    )
+    drawn = {
+        name: pd.DataFrame(read_json(out / f"identify-{name}.json")["rows"])
+        for name in ("profile", "correlation")
+        if (out / f"identify-{name}.json").is_file()  # an earlier run has none
+    }
+    plots = []
+    if len(drawn.get("profile", ())):
+        plots.append(Plot(name="identify-profile", figure=figure.profile(drawn["profile"], estimates)))
+    if len(estimates) > 1 and len(drawn.get("correlation", ())):
+        plots.append(Plot(name="identify-correlation", figure=figure.together(drawn["correlation"])))
+    first = Section(name="identify", title="Identified parameters", text=_told(estimates, held, told), tables=tables)
+    if not plots:
+        return (first,)
+    return (first, Section(name="identify-plots", title="How well the data tell them", text=PROFILE, plots=plots))
+
+
+def _only(rows: pd.DataFrame, shown: Sequence[Column]) -> pd.DataFrame:
+    return rows.reindex(columns=[column.key for column in shown])
+
+
+def _told(estimates: pd.DataFrame, held: pd.DataFrame, told: Mapping[str, Any]) -> str:
+    """What is identified and whether it holds on other windows first, then how that is known."""
+    lost = [str(row["name"]) for row in records(estimates) if not row["identifiable"]]
+    text = f"{len(estimates) - len(lost)} of {len(estimates)} parameters are identified" + (
+        f"; not {', '.join(lost)}." if lost else "."
+    )
+    rmse = next((row for row in records(held) if row["error"] == "rmse"), None)
+    if rmse is not None and rmse["held_before"] is not None and rmse["held_after"] is not None:
+        text += f" On windows that were not fitted the rmse went from {rmse['held_before']:.4g} to "
+        text += f"{rmse['held_after']:.4g} ({rmse.get('verdict') or 'not judged'})."
+    return f"{text} {' '.join(told['warnings'])} Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."

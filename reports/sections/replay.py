@@ -1,0 +1,73 @@
+"""A log replayed: what each engine leaves over of the measurement, and whether that is noise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
+
+TITLE = "Replay"
+TEXT = (
+    "The model starts in each window from what was measured there and runs on recorded inputs, held between their "
+    "recorded times. Residuals are averaged over a twelfth of the motion's period; where what is left is noise, and an "
+    "error no larger than that of one sample, 99 of 100 correlations lie within the band. Grey bands are two standard "
+    "deviations of the measurement's noise; windows that an identification held out are shaded."
+)
+METRICS = columns(
+    who="Engine", metric="Metric", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
+    expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
+)  # fmt: skip
+FINDINGS = columns(
+    what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)
+)
+
+
+def sections(out: Path) -> tuple[Section, ...]:
+    """Verdicts, what was measured and predicted, and what the log's checks found, if a log was replayed."""
+    if not (out / "replay.json").is_file():
+        return ()
+    from crossbody.reports.replay import figure
+
+    metrics, found, left, correlated = (
+        pd.DataFrame(read_json(out / f"{name}.json")["rows"])
+        for name in ("replay", "findings", "residuals", "correlations")
+    )
+    metrics = metrics.reindex(columns=[column.key for column in METRICS])  # an earlier run judged nothing
+    told = read_json(out / "replay.json")["provenance"]
+    about, held = told["log"], told.get("fit", {}).get("held", ())
+    noise = {str(row["channel"]): float(row["value"]) for row in records(metrics) if row["metric"] == "noise"}
+    plots = []
+    if len(left):
+        seen = {"replay-motion": figure.motion} if "measured" in left else {}
+        for name, draw in (seen | {"replay-residual": figure.residual}).items():
+            plots.append(Plot(name=name, figure=draw(left, noise, held), time=True))
+    plots += [Plot(name="replay-correlation", figure=figure.correlation(correlated))] if len(correlated) else []
+    origin = "SYNTHETIC, no measurement." if about["synthetic"] else "A measurement."
+    text = f"{judged(metrics)} {origin} {about['file']}: {about['about']}"
+    table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")
+    shown = [
+        Section(name="replay", title="Log and model", text=text, tables=(table,)),
+        Section(name="replay-plots", title="Measured and predicted", text=TEXT, plots=plots),
+    ]
+    if len(found):
+        table = Table(title="Findings about the log", columns=FINDINGS, rows=records(found), file="findings.csv")
+        shown.append(Section(name="replay-log", title="The log itself", tables=(table,)))
+    return tuple(shown)
+
+
+def judged(metrics: pd.DataFrame) -> str:
+    """What all verdicts say together, first what is outside."""
+    rows = metrics.fillna({"verdict": ""})
+    rows = rows[rows["verdict"].isin(["within", "outside"])]
+    if rows.empty:
+        return "No limit was given, so nothing is judged (--limit fit=90 would)."
+    off = rows[rows["verdict"] == "outside"]
+    named = [
+        f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g} {row.unit}" for row in off.itertuples()
+    ]
+    return f"{len(rows) - len(off)} of {len(rows)} limits are kept." + (
+        f" Outside: {', '.join(named)}." if named else ""
+    )

@@ -1,0 +1,62 @@
+"""Friction on a page: its slip is that of the equations of motion, and its force stands against the cone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from unpacked import numbers
+
+from crossbody.cases import Mode, load
+from crossbody.cases.scene_contacts import contacts
+from crossbody.engines import load as load_engine
+from crossbody.reports.measuring.friction import rubbing
+from crossbody.reports.pages.friction import friction
+from crossbody.reports.runs import study
+from crossbody.reports.runs.store import Trace
+from crossbody.reports.scenes.scene import slip
+
+CASES = (("sliding_block", "askew"), ("sliding_block", "flat"), ("rolling_sphere", ""), ("rocking_block", ""))
+
+
+@pytest.fixture(scope="module", params=CASES, ids=lambda one: one[0])
+def trace(request: pytest.FixtureRequest) -> Trace:
+    name, variant = request.param
+    case = load(name, variant) if variant else load(name)
+    run = load_engine("reference").prepare(case, "compiled").run()
+    return Trace(about=study._about(case, "reference", "compiled") | {"profile": "compiled"}, run=run)
+
+
+def test_slip_is_that_of_the_equations(trace: Trace) -> None:
+    case = load(trace.about["case"], trace.about["variant"])
+    found = rubbing(trace.run, case)
+    assert found is not None
+    assert case.scene is not None
+    places = [(one, k) for one in contacts(case.scene) if one.friction > 0.0 for k in range(one.places)]
+    for m, (contact, place) in enumerate(places):
+        drawn = slip(case.scene, contact, place, trace.run.q, trace.run.v)
+        assert np.abs(drawn - found.slip[:, m]).max() <= 1e-8 * max(1.0, np.abs(found.slip).max())
+
+
+def test_what_slides_is_on_the_edge_and_against_its_slip(trace: Trace) -> None:
+    (section,) = friction([trace])
+    cone, plane, slips = (plot.figure for plot in section.plots)
+    edge = cone["layout"]["shapes"][0]
+    mu = edge["y1"] / edge["x1"]
+    (line,) = cone["data"]
+    normal, size = numbers(line["x"]), numbers(line["y"])
+    pressed = np.isfinite(size)
+    assert pressed.sum() > 10
+    assert (size[pressed] <= mu * normal[pressed] * (1 + 1e-6) + 1e-9).all()
+    (disc,), (way,) = plane["data"], slips["data"]
+    force = np.array([numbers(disc[axis]) for axis in "xy"])
+    speed = np.array([numbers(way[axis]) for axis in "xy"])
+    fast = np.linalg.norm(speed, axis=0) > 1e-3 * np.nanmax(np.linalg.norm(speed, axis=0))
+    if (trace.run.mode == Mode.SLIP).any() and fast.sum() > 3:
+        against = np.sum(force * speed, axis=0)[fast] / np.linalg.norm(speed, axis=0)[fast]
+        assert np.median(against) == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_without_friction_there_is_no_such_section() -> None:
+    case = load("bouncing_ball", "linear")
+    run = load_engine("reference").prepare(case, "compiled").run()
+    assert friction([Trace(about=study._about(case, "reference", "compiled"), run=run)]) == []
