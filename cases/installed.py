@@ -109,7 +109,8 @@ def _check(path: Path, groups: list[str]) -> None:
         raise InvalidValue(f"The plug-in file {path} defines none. Public names of a plug-in, by its kind: {wanted}.")
     for group in groups:
         package = f"{group}.library" if group == "crossbody.cases" else group
-        if find_spec(f"{package}.{path.stem}") or path.stem in _entry_points(group):
+        taken = find_spec(f"{package}.{path.stem}") or path.stem in getattr(sys.modules[package], "OWN", ())
+        if taken or path.stem in _entry_points(group):
             raise InvalidValue(f"The {KINDS[group].name} {path.stem!r} is there already: rename the plug-in {path}.")
 
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
+from typing import Any, TypeVar
 
 from crossbody.cases import CrossbodyError, LogFormatError
 from crossbody.hw.budget import current
@@ -16,6 +17,7 @@ from crossbody.hw.budget import current
 LENGTH = 160  # of a library's own words
 LOGGERS = ("asammdf", "nptdms")
 
+_Found = TypeVar("_Found")
 _reserved = False  # whether Arrow's own allocator has its addresses
 
 
@@ -44,6 +46,26 @@ def parsing(path: Path, what: str, row: int | None = None, column: str = "") -> 
         raise
     except Exception as error:
         raise fault(path, what, error, row, column) from error
+
+
+def parsed(path: Path, what: str, found: Iterator[_Found]) -> Iterator[_Found]:
+    """What a generator yields that calls into a parser; errors as `parsing`."""
+    while True:
+        with parsing(path, what):
+            one = next(found, None)
+        if one is None:
+            return
+        yield one
+
+
+@contextmanager
+def closing(file: Any) -> Iterator[None]:
+    """Close a file where the block does not come to its end: a reader that was never made has nobody who would."""
+    try:
+        yield
+    except BaseException:
+        file.close()
+        raise
 
 
 def fault(path: Path, what: str, error: Exception, row: int | None = None, column: str = "") -> LogFormatError:

@@ -10,37 +10,21 @@ from __future__ import annotations
 import errno
 import json
 import os
-import shlex
 import sys
 import tempfile
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from functools import wraps
+from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from crossbody.cases import CrossbodyError, installed
-from crossbody.reports.commands.replay_options import identify, memory_option, replay
+from crossbody.reports.commands import options
 from crossbody.reports.runs.watch import stopping
 from crossbody.reports.voice import as_json, folded, quiet, speaks
-
-_Work = TypeVar("_Work", bound=Callable[..., int])
-
-DEFAULT_OUT = Path("out")
-
-
-class _Positive(click.FloatRange):
-    """A range in which NaN is no number."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read a number."""
-        found = super().convert(value, param, ctx)
-        if found != found:
-            self.fail(f"{value} is no number.", param, ctx)
-        return found
 
 
 def _plug(context: click.Context, _: click.Parameter, given: tuple[str, ...]) -> None:
@@ -83,87 +67,15 @@ def list_(name: str | None, plain: bool) -> None:
     click.echo(json.dumps({k.lower(): v for k, v in told.items()}, indent=1) if plain else described.text(told))
 
 
-def _parameters(command: _Work) -> _Work:
-    """Options that give parameters of the case; the command takes all of them as `pairs`, texts K=V."""
-
-    @wraps(command)
-    def gathered(
-        *given: Any, pairs: tuple[str, ...], t_end: float | None, law: str | None, ctrl: str | None,
-        control: str | None, tick: float | None, without: str | None, push: tuple[tuple[Any, ...], ...],
-        rank: int | None, **others: Any,
-    ) -> int:  # fmt: skip
-        if tick is not None and control is None and not any(pair.startswith("control=") for pair in pairs):
-            raise click.UsageError(
-                "--tick is the time between two calls of a controller, and none is given: --control."
-            )
-        pushes = "; ".join(" ".join(map(str, one)) for one in push) or None
-        named = {"t_end": t_end, "ctrl": ctrl, "control": control, "tick": tick, "without": without, "push": pushes}
-        named["rank"] = rank
-        own = [f"{name}={value}" for name, value in named.items() if value is not None]
-        return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **others)
-
-    options = (
-        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
-        click.option("--t-end", type=float, metavar="S", help="Horizon, s; as --set t_end=S."),
-        click.option("--law", metavar="a0=,a1=", help="Constants of the rows; as --set for each of them."),
-        click.option("--ctrl", metavar="FILE", help="Of a robot's file: table of controls (CSV, Parquet, NPZ)."),
-        click.option(
-            "--control",
-            metavar="FILE.py:NAME",
-            help="Of a robot's file: a callable (t, q, v) -> u of your own, or a class of such.",
-        ),
-        click.option("--tick", type=float, metavar="S", help="Between two calls of it, s; 1e-3 if not given."),
-        click.option(
-            "--push",
-            type=(str, *(float,) * 5),
-            multiple=True,
-            metavar="BODY FX FY FZ T0 T1",
-            help="Of a robot's file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
-        ),
-        click.option("--without", metavar="PARTS", help="Of a robot's file: parts to leave out of every engine."),
-        click.option("--rank", type=int, metavar="N", help="Of a robot's file: how many rows of its loops hold."),
-    )
-    told: Any = gathered
-    for option in reversed(options):
-        told = option(told)
-    taking: _Work = told
-    return taking
-
-
-def _shared(command: _Work) -> _Work:
-    """Options that say what is run."""
-    options = (
-        click.argument("names", metavar="[CASE]...", nargs=-1),
-        click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable."),
-        click.option(
-            "--variant", "--key", metavar="V", help="Variant of the case, keyframe of a robot's file; all if not given."
-        ),
-        _parameters,
-        click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR"),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
-_AGAINST = click.option(
-    "--against", type=click.Path(path_type=Path), metavar="BASE",
-    help="Folder of an earlier run: the index says what has changed.",
-)  # fmt: skip
-_WITH = click.option(
-    "--with", "others", type=click.Path(path_type=Path), metavar="DIR", multiple=True,
-    help="Folder of a study (bench, stress, gapmap, ...): its pages stand beside; repeatable.",
-)  # fmt: skip
-
-
-_LIMIT = click.option(
-    "--time-limit", "limit", type=_Positive(0.0, min_open=True), default=3660.0, show_default=True, metavar="S",
-    help="An engine that has not come back from a case by then is ended, s; compilation counts.",
-)  # fmt: skip
+def _do(where: str, *given: Any, **asked: Any) -> int:
+    """Import what does a command, MODULE.FUNCTION of `commands`, and do it."""
+    module, _, name = where.partition(".")
+    work: Callable[..., int] = getattr(import_module(f"crossbody.reports.commands.{module}"), name)
+    return work(*given, **asked)
 
 
 @cli.command()
-@_shared
+@options.cases
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option(
     "--set-engine", "settings", metavar="[E[:PROFILE].]K=V", multiple=True,
@@ -172,107 +84,67 @@ _LIMIT = click.option(
 @click.option("--dry-run", "dry", is_flag=True, help="Say what would be run, and run nothing.")
 @click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
 @click.option(
-    "--jobs",
-    type=click.IntRange(0, 1024),
-    default=1,
-    show_default=True,
-    metavar="J",
+    "--jobs", type=click.IntRange(0, 1024), default=1, show_default=True, metavar="J",
     help="Cases at once, in processes; 0: one a processor. Run times are then those beside each other.",
-)
-@_LIMIT
-@_AGAINST
-@_WITH
+)  # fmt: skip
+@options.engine_limit
+@options.against
+@options.others
 @speaks
-def run(
-    names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    rtol: float | None, settings: tuple[str, ...], strict: bool, limit: float, against: Path | None,
-    others: tuple[Path, ...], jobs: int, dry: bool,
-) -> int:  # fmt: skip
+def run(dry: bool, jobs: int, **asked: Any) -> int:
     """Run cases on engines, judge them, and write the report."""
     if dry:
-        from crossbody.reports.commands.planned import tell
-
-        return tell(names, wanted, variant, pairs, settings)
-    from crossbody.reports.commands.run import run as work
-
-    return work(
-        names,
-        wanted,
-        variant,
-        pairs,
-        out,
-        rtol,
-        settings,
-        _command(),
-        against,
-        others,
-        limit,
-        strict,
-        jobs or os.cpu_count() or 1,
-    )
+        words = ("names", "wanted", "variant", "pairs", "settings")
+        return _do("planned.tell", **{name: asked[name] for name in words})
+    return _do("run.run", **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
 
 
 @cli.command()
-@_shared
+@options.cases
 @click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
 @click.option("--full", is_flag=True, help="Every case, every rung of every ladder; without it some minutes.")
 @click.option("--minutes", type=click.FloatRange(0.1), help="About how long; ladders end earlier for it.")
-@click.option("--against", type=click.Path(path_type=Path), metavar="BASE", help="Folder of an earlier benchmark.")
+@click.option("--against", type=options.PATH, metavar="BASE", help="Folder of an earlier benchmark.")
 @click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
 @click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
-@_LIMIT
+@options.engine_limit
 @speaks
-def bench(
-    names: tuple[str, ...], wanted: tuple[str, ...], variant: str | None, pairs: tuple[str, ...], out: Path,
-    repeats: int | None, full: bool, minutes: float | None, against: Path | None, what: str | None, limit: float,
-) -> int:  # fmt: skip
+def bench(what: str | None, **asked: Any) -> int:
     """Time engines against their error over ladders of tolerances and steps.
 
     With --against the exit code is 1 if accuracy or a ratio of run times was lost.
     """
-    from crossbody.reports.commands import bench as work
-
-    if what is not None:
-        return work.alone(what, (names, wanted, variant, pairs, full, minutes, against), repeats, out, _command())
-    bound = float("inf") if minutes is None else minutes
-    return work.run(names, wanted, variant, pairs, out, repeats, full, against, _command(), limit, bound)
+    if what is None:
+        return _do("bench.run", **asked, command=options.command())
+    return _do("bench.alone", what, **asked, command=options.command())
 
 
 @cli.command()
 @click.option(
-    "--n",
-    "counts",
-    type=click.IntRange(2, 200),
-    multiple=True,
-    default=(3, 5),
-    show_default=True,
+    "--n", "counts", type=click.IntRange(2, 200), multiple=True, default=(3, 5), show_default=True,
     help="Number of balls; repeatable.",
-)
-@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+)  # fmt: skip
+@options.wanted
 @click.option("--points", type=click.IntRange(2, 10_000), default=61, show_default=True, help="Gaps from s = 0 to 3.")
-@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@options.out()
 @speaks
-def gapmap(counts: tuple[int, ...], wanted: tuple[str, ...], points: int, out: Path) -> int:
+def gapmap(**asked: Any) -> int:
     """Map energy created and pattern of Newton's cradle over the gap between its balls."""
-    from crossbody.reports.commands.maps import gap_map as work
-
-    return work(counts, wanted, points, out, _command())
+    return _do("maps.gap_map", **asked, command=options.command())
 
 
 @cli.command()
-@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
-@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@options.wanted
+@options.out()
 @speaks
-def stability(wanted: tuple[str, ...], out: Path) -> int:
+def stability(**asked: Any) -> int:
     """Map from which scenes the closed-loop ball maze still comes to its centre."""
-    from crossbody.reports.commands.maps import stability_map as work
-
-    return work(wanted, out, _command())
+    return _do("maps.stability_map", **asked, command=options.command())
 
 
 @cli.command()
 @click.argument("names", metavar="[SUITE]...", nargs=-1)
-@click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+@options.wanted
 @click.option("--runs", type=int, metavar="N", help="Runs of the first engine over all suites.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of every draw.")
 @click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one a processor.")
@@ -281,75 +153,58 @@ def stability(wanted: tuple[str, ...], out: Path) -> int:
 @click.option("--tls-cert", default="", metavar="FILE", help="Certificate (PEM) that is shown to a scheduler.")
 @click.option("--tls-key", default="", metavar="FILE", help="Its key, if it is not in the same file.")
 @click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("stress"), show_default=True, metavar="DIR")
-@_parameters
+@options.out("stress")
+@options.parameters
 @speaks
-def stress(
-    names: tuple[str, ...], wanted: tuple[str, ...], runs: int | None, seed: int, jobs: int, scheduler: str | None,
-    tls_ca: str, tls_cert: str, tls_key: str, resume: bool, out: Path, pairs: tuple[str, ...],
-) -> int:  # fmt: skip
+def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) -> int:
     """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
 
     A SUITE may be a case of your own or a robot's file: other laws of its rows, pushes on its bodies, other numbers.
     A sweep that was interrupted goes on where it stood when the same command is given again.
     """
     from crossbody.reports.commands.stress import Ask
-    from crossbody.reports.commands.stress import stress as work
     from crossbody.reports.sweep.pools import Tls
 
-    tls = Tls(ca=tls_ca, cert=tls_cert, key=tls_key)
-    asked = Ask(
-        names=names, wanted=wanted, runs=runs, seed=seed, jobs=jobs, scheduler=scheduler, tls=tls, resume=resume,
-        pairs=pairs,
-    )  # fmt: skip
-    return work(asked, out, _command())
+    ask = Ask(tls=Tls(ca=tls_ca, cert=tls_cert, key=tls_key), **asked)
+    return _do("stress.stress", ask, out, options.command())
 
 
 @cli.command()
 @click.argument("name", metavar="CASE")
-@_parameters
-@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@options.parameters
+@options.out()
 @speaks
-def bode(name: str, pairs: tuple[str, ...], out: Path) -> int:
+def bode(**asked: Any) -> int:
     """Frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
-    from crossbody.reports.commands.bode import bode as work
-
-    return work(name, pairs, out, _command())
+    return _do("analyse.bode", **asked, command=options.command())
 
 
 @cli.command()
 @click.argument("name", metavar="CASE")
 @click.option("--variant", "--key", metavar="V", help="Variant of the case; the first if not given.")
-@_parameters
+@options.parameters
 @click.option("--at", metavar="K=V", multiple=True, help="Where to look: x, y, z of the flange, m; repeatable.")
 @click.option("--bode", is_flag=True, help="Frequency responses too.")
 @click.option("--locus", metavar="PARAM=a..b", help="Poles over a parameter of the case.")
 @click.option("--map", "mapped", is_flag=True, help="Stability over the workspace.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for tables and figures.")
+@click.option("--out", type=options.PATH, metavar="DIR", help="Folder for tables and figures.")
 @speaks
-def analyse(
-    name: str, variant: str | None, pairs: tuple[str, ...], at: tuple[str, ...], bode: bool, locus: str | None,
-    mapped: bool, out: Path | None,
-) -> int:  # fmt: skip
+def analyse(**asked: Any) -> int:
     """Equilibria of a case, their linear models, poles, ranks, responses and maps."""
-    from crossbody.reports.commands.analyse import analyse as work
-
-    return work(
-        name, variant, pairs, at, bode=bode, locus=locus, mapped=mapped, out=out, command=_command()
-    )  # fmt: skip
+    return _do("analyse.analyse", **asked, command=options.command())
 
 
 @cli.command()
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR", type=options.PATH)
 @click.option("--single-file", is_flag=True, help="One file with all pages, to be sent.")
-@_AGAINST
-@_WITH
+@options.against
+@options.others
 @speaks
-def report(folder: Path, single_file: bool, against: Path | None, others: tuple[Path, ...]) -> int:
+def report(folder: Path, **asked: Any) -> int:
     """Make the pages of an earlier run again."""
     from crossbody.reports.pages import site
 
-    made = site.write(folder, single_file=single_file, against=against, others=others).absolute()
+    made = site.write(folder, **asked).absolute()
     if as_json():
         click.echo(json.dumps({"report": str(made)}))
     elif not quiet():
@@ -358,15 +213,13 @@ def report(folder: Path, single_file: bool, against: Path | None, others: tuple[
 
 
 @cli.command()
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.argument("out", metavar="FILE", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR", type=options.PATH)
+@click.argument("out", metavar="FILE", type=options.PATH)
 @click.option("--case", "case", metavar="CASE:V", default="", help="Which case; the first if not given.")
 @click.option("--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Whose motion.")
 @click.option("--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Instant, s.")
-@click.option("--fps", type=_Positive(0.0, min_open=True), default=25.0, show_default=True, help="Of a GIF.")
-@click.option(
-    "--speed", type=_Positive(0.0, min_open=True), default=1.0, show_default=True, help="Of a GIF, times real time."
-)
+@click.option("--fps", type=options.ABOVE_0, default=25.0, show_default=True, help="Of a GIF.")
+@click.option("--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Of a GIF, times real time.")
 @speaks
 def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps: float, speed: float) -> int:
     """Draw a motion of an earlier run: one instant (FILE.svg, FILE.png) or all of it (FILE.gif)."""
@@ -381,62 +234,64 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps
 
 
 @cli.command()
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
-@click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
+@click.argument("file", metavar="FILE", type=options.PATH)
+@options.readers
 @click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")
-@click.option(
-    "--time-limit",
-    "limit",
-    type=_Positive(0.0, min_open=True),
-    default=20.0,
-    show_default=True,
-    metavar="S",
-    help="A reader that has not come back by then is ended, s.",
-)
+@options.reader_limit
 @click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
-@click.option("--fix", type=click.Path(path_type=Path), metavar="OUT", help="Write FILE so that more readers agree.")
+@click.option("--fix", type=options.PATH, metavar="OUT", help="Write FILE so that more readers agree.")
 @click.option("--force", is_flag=True, help="Let files be written over that were not written so.")
-@click.option("--sarif", type=click.Path(path_type=Path), metavar="F", help="Write the findings as SARIF too.")
-@click.option("--markdown", type=click.Path(path_type=Path), metavar="F", help="Write a summary in Markdown too.")
+@click.option("--sarif", type=options.PATH, metavar="F", help="Write the findings as SARIF too.")
+@click.option("--markdown", type=options.PATH, metavar="F", help="Write a summary in Markdown too.")
 @speaks
-def audit(
-    file: Path, engines: tuple[str, ...], without: str, limit: float, explain: bool, fix: Path | None, force: bool,
-    sarif: Path | None, markdown: Path | None,
-) -> int:  # fmt: skip
+def audit(file: Path, limit: float, **asked: Any) -> int:
     """Say whether every engine's own reader makes the same robot of FILE (MJCF or URDF), where not, and why."""
     from crossbody.reports.commands.audit import Ask
-    from crossbody.reports.commands.audit import audit as work
 
-    asked = Ask(
-        path=file, engines=engines, without=without, seconds=limit, explain=explain, fix=fix, force=force, sarif=sarif,
-        markdown=markdown,
-    )  # fmt: skip
-    return work(asked)
+    return _do("audit.audit", Ask(path=file, seconds=limit, **asked))
 
 
 @cli.command()
-@click.option("--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given.")
+@options.readers
 @click.option("--feature", default="", metavar="TEXT", help="Features alone whose name has TEXT in it.")
-@click.option(
-    "--time-limit",
-    "limit",
-    type=_Positive(0.0, min_open=True),
-    default=20.0,
-    show_default=True,
-    metavar="S",
-    help="A reader that has not come back by then is ended, s.",
-)
-@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True, metavar="DIR")
+@options.reader_limit
+@options.out()
 @speaks
 def conformance(engines: tuple[str, ...], feature: str, limit: float, out: Path) -> int:
     """Show what every engine's own reader makes of each feature of robot files, by one small file a feature."""
-    from crossbody.reports.commands.conformance import conformance as work
-
-    return work(engines, feature, limit, out, _command())
+    return _do("conformance.conformance", engines, feature, limit, out, options.command())
 
 
-cli.add_command(replay)
-cli.add_command(identify)
+@cli.command()
+@options.replayed
+@options.wanted
+@options.time_limit("An engine that has not come back by then is ended, s.")
+@click.option("--closed-loop", is_flag=True, help="Recorded references through the model's controller.")
+@speaks
+def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, **log: Any) -> int:
+    """Replay LOG on a model and say how well it matches."""
+    from crossbody.reports.commands.replay import Ask, run_replay
+
+    kind = "closed_loop" if closed_loop else "forward"
+    return run_replay(Ask(**log), kind, wanted, out, options.command(), limit)
+
+
+@cli.command()
+@options.replayed
+@click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter, or delay; repeatable.")
+@click.option("--hold", type=int, default=2, show_default=True, help="Hold every N-th window out of the fit; 0: none.")
+@click.option("--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True)
+@click.option("--stride", type=int, default=1, show_default=True, help="Compare every N-th sample.")
+@click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time of the search, s.")
+@options.time_limit("All is stopped by then, with the best so far; a run that does not come back is ended, s.")
+@speaks
+def identify(
+    free: tuple[str, ...], hold: int, starts: str, stride: int, budget: float, limit: float, out: Path, **log: Any
+) -> int:
+    """Identify parameters of a model from LOG, with intervals, judged on windows that were held out."""
+    from crossbody.reports.commands.replay import Ask, run_identify
+
+    return run_identify(Ask(**log), free, hold, starts, stride, budget, out, options.command(), limit)
 
 
 @cli.group()
@@ -445,11 +300,11 @@ def log() -> None:
 
 
 @log.command("info")
-@click.argument("path", metavar="LOG", type=click.Path(path_type=Path))
+@click.argument("path", metavar="LOG", type=options.PATH)
 @click.option("--columns", metavar="MAP", help="Column map (TOML) to check it by.")
 @click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart.")
 @click.option("--draft", is_flag=True, help="Print a draft of a column map and nothing else.")
-@memory_option
+@options.memory
 @speaks
 def log_info(path: Path, columns: str | None, part: int | None, draft: bool, memory: int) -> int:
     """Show channels, rates, gaps and ranges of LOG, what is wrong with it, and a draft of a column map."""
@@ -462,9 +317,7 @@ def log_info(path: Path, columns: str | None, part: int | None, draft: bool, mem
 @speaks
 def warm() -> int:
     """Compile ahead what runs need, on all processors."""
-    from crossbody.reports.commands.warm import warm as work
-
-    return work()
+    return _do("cache.warm")
 
 
 @cli.group(invoke_without_command=True)
@@ -479,22 +332,14 @@ def cache(context: click.Context) -> None:
 @speaks
 def cache_show() -> int:
     """Show where compiled code is kept and how much it is."""
-    from crossbody.reports.commands.cache import show
-
-    return show()
+    return _do("cache.show")
 
 
 @cache.command("clear")
 @speaks
 def cache_clear() -> int:
     """Remove all compiled code; the next run compiles again."""
-    from crossbody.reports.commands.cache import clear
-
-    return clear()
-
-
-def _command() -> str:
-    return shlex.join(["crossbody", *sys.argv[1:]])
+    return _do("cache.clear")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -565,7 +410,7 @@ def _say(text: str, code: int = 2) -> int:
 
 def _crashed(error: Exception) -> int:
     """A fault of crossbody's own: one sentence, and the traceback in a file."""
-    text = f"{_command()}\n{sys.version}\n{''.join(traceback.format_exception(error))}"
+    text = f"{options.command()}\n{sys.version}\n{''.join(traceback.format_exception(error))}"
     try:
         handle, name = tempfile.mkstemp(prefix="crossbody-crash-", suffix=".txt")
         with os.fdopen(handle, "w", encoding="utf-8") as file:

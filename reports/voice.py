@@ -95,9 +95,14 @@ def told_as_json(tables: Mapping[str, pd.DataFrame]) -> bool:
 
 
 @contextmanager
-def progress(steps: int, hidden: bool = False) -> Iterator[Callable[[str], None]]:
-    """A bar on stderr with the time left, advanced each time it is told what is being done."""
-    if hidden or silent() or not sys.stderr.isatty():
+def progress(steps: int | None, done: int | None = None) -> Iterator[Callable[[str], None]]:
+    """Show a bar on stderr with the time left, advanced each time it is told what is being done, or was.
+
+    Args:
+        steps: how many in all; None where nobody knows.
+        done: how many are done already, where each is told of when it is done; else each is told of when it begins.
+    """
+    if silent() or not sys.stderr.isatty():
         yield lambda _text: None
         return
     from rich import progress as shown
@@ -108,12 +113,12 @@ def progress(steps: int, hidden: bool = False) -> Iterator[Callable[[str], None]
         shown.TimeRemainingColumn(), shown.TextColumn("{task.description}"),
     )  # fmt: skip
     with shown.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=steps)
-        told = 0
+        at = -1 if done is None else done
+        task = bar.add_task("", total=steps, completed=max(at, 0))
 
         def tell(text: str) -> None:
-            nonlocal told  # what is told of first is begun, not done
-            bar.update(task, description=text, completed=told)
-            told += 1
+            nonlocal at
+            at += 1
+            bar.update(task, description=text, completed=at)
 
         yield tell

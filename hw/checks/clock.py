@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from crossbody.cases.arrays import Floats
 from crossbody.hw.checks.finding import Finding
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 GAP = 1.5  # sample times: a longer step lacks samples

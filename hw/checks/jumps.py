@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.hw.checks.clock import Floats
+from crossbody.cases.arrays import Floats
 
 Indices = NDArray[np.int64]
 

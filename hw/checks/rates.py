@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.hw.checks.clock import Floats, Rows
+from crossbody.cases.arrays import Floats
+from crossbody.hw.checks.clock import Rows
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.checks.jumps import TURN
 from crossbody.hw.checks.smooth import JumpCheck

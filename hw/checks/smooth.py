@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.hw.checks.clock import First, Floats, Rows
+from crossbody.cases.arrays import Floats
+from crossbody.hw.checks.clock import First, Rows
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.checks.jumps import EDGE, SPANS, TURN, find_jumps
 

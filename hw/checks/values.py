@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.hw.checks.clock import First, Floats, Rows
+from crossbody.cases.arrays import Floats
+from crossbody.hw.checks.clock import First, Rows
 from crossbody.hw.checks.finding import Finding
 
 STUCK = 100  # samples without any change
@@ -55,7 +56,8 @@ class ValueCheck:
         """What is wrong with the channel."""
         found: list[Finding] = []
         if self._finite.count:
-            found.append(self._finite.told("finite", self._channel, self._say_finite(), fault=True))
+            text = f"the value is not a finite number ({self._finite.count} such rows)."
+            found.append(self._finite.told("finite", self._channel, text, fault=True))
         if self._outside.count and self._range is not None:
             text = (
                 f"{self._outside.count} values lie outside [{self._range[0]:.6g}, {self._range[1]:.6g}] {self._unit}; "
@@ -63,9 +65,6 @@ class ValueCheck:
             )
             found.append(self._outside.told("range", self._channel, text, fault=True))
         return found + (self._about_runs() if self._measured else [])
-
-    def _say_finite(self) -> str:
-        return f"the value is not a finite number ({self._finite.count} such rows)."
 
     def _about_runs(self) -> list[Finding]:
         runs, found = self.runs, []

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.covariance import Layout, scatter
 from crossbody.hw.fitting.fit import Agreement
 from crossbody.hw.fitting.information import WEIGHT, information
 
-Floats = NDArray[np.float64]
 DIFFERENT = 0.01
 """Probability, shared among all parameters, below which halves do not agree."""
 UNLIKE = 5.0

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from scipy import signal, stats
 from scipy.optimize import brentq
 
-Floats = NDArray[np.float64]
+from crossbody.cases.arrays import Floats
+
 LEVEL = 0.95
 PARTS = 16
 """Contributions that a variance is found from, at least: cosines of each window where there are fewer windows."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import UnknownName, Value
+from crossbody.cases.arrays import Floats
 from crossbody.engines.equations import system_of
 from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.deadline import Deadline
@@ -22,7 +23,6 @@ from crossbody.hw.windows.lift import check_measured, lift
 from crossbody.hw.windows.window import Window, overlap
 from crossbody.reference import System
 
-Floats = NDArray[np.float64]
 Array = NDArray[np.complex128]
 STEP = 1e-30
 DELAY = "delay"

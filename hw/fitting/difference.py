@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from crossbody.cases import InvalidValue, UnknownName, Value
+from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.derivative import apart
@@ -20,7 +21,6 @@ from crossbody.hw.models._contract import Model
 from crossbody.hw.windows.run import run_window
 from crossbody.hw.windows.window import Window, overlap
 
-Floats = NDArray[np.float64]
 STEP = 0.1
 """Step of a derivative, as a part of the parameter."""
 

@@ -6,10 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
+from crossbody.cases.arrays import Floats
 
-Floats = NDArray[np.float64]
 CONVERGED, UNCONVERGED, STOPPED = "converged", "unconverged", "stopped"
 
 

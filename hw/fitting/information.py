@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
-Floats = NDArray[np.float64]
+from crossbody.cases.arrays import Floats
+
 NULL = 1e-8
 """Singular value of the derivatives, columns of norm 1, over the largest, below which a direction has no effect."""
 BELONGS = 0.3

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Value
+from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Scatter, scatter
 from crossbody.hw.fitting.derivative import DELAY, Exact
@@ -20,7 +21,6 @@ from crossbody.hw.fitting.search import Found
 from crossbody.hw.fitting.start_noise import moves
 from crossbody.hw.models._contract import Model
 
-Floats = NDArray[np.float64]
 TOGETHER = 0.999
 """Correlation from which on two parameters are told apart by nothing but noise."""
 ERRORS = ("rmse", "end_median", "end_90")
@@ -214,16 +214,11 @@ def _errors(sides: Sequence[Any], x: Floats) -> dict[str, tuple[float, float]]:
             found.append((np.nan, np.nan, np.nan))
             continue
         r, owners = part.residual(x), part.layout.windows()
-        last = [np.max(np.abs(_ends(r[owners == w], part.k))) for w in np.unique(owners)]
+        last = [np.max(np.abs(r[owners == w].reshape(part.k, -1)[:, -1])) for w in np.unique(owners)]
         found.append(
             (float(np.sqrt(np.mean(r * r))), float(np.median(last)), float(np.percentile(last, 90.0)))
         )  # fmt: skip
     return {name: (found[0][i], found[1][i]) for i, name in enumerate(ERRORS)}
-
-
-def _ends(r: Floats, k: int) -> Floats:
-    """The last residual of every coordinate of one window."""
-    return np.asarray(r.reshape(k, -1)[:, -1])
 
 
 def _warnings(

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.deadline import TimeOver
 from crossbody.hw.fitting.information import information, to_keep, unseen_by
 
-Floats = NDArray[np.float64]
 NOISE = 1e-6
 """Of the sum of squares that one residual has in the mean: what the search still gains when it ends."""
 

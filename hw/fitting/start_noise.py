@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.covariance import scatter
 from crossbody.hw.fitting.derivative import Exact
 from crossbody.hw.fitting.information import WEIGHT, information
 
-Floats = NDArray[np.float64]
 UNLIKELY = 0.01
 """Probability, shared among all parameters, below which measured starts are refuted."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats._contract import Block, Column, Group
-from crossbody.hw.formats._names import WIDEST
+from crossbody.hw.formats._tables import WIDEST
 from crossbody.hw.guard import fault
 
 BLOCK_MESSAGES = 8192
@@ -78,15 +78,15 @@ def crowded(message: Any) -> str:
         if members is not None:
             count += 1
             left.extend(members.values())
-        elif isinstance(value, (list, tuple)) and value and _is_nested(value[0]):
+        elif (
+            isinstance(value, (list, tuple))
+            and value
+            and (isinstance(value[0], (list, tuple)) or _members(value[0]) is not None)
+        ):
             left.extend(value[: MOST_PARTS + 1])
         if count > MOST_PARTS or len(left) > 10 * MOST_PARTS:
             return f"has messages with more than {MOST_PARTS} messages inside; pictures and clouds are not read"
     return ""
-
-
-def _is_nested(value: Any) -> bool:
-    return isinstance(value, (list, tuple)) or _members(value) is not None
 
 
 def refuse_large(path: Path, topic: str, data: bytes) -> None:

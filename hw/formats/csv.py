@@ -15,7 +15,7 @@ from crossbody.cases import LogFormatError
 from crossbody.hw.budget import MOST_COLUMNS, current
 from crossbody.hw.formats._contract import Block, Column, Group
 from crossbody.hw.formats._csv_fault import find_fault
-from crossbody.hw.formats._names import header_unit
+from crossbody.hw.formats._tables import header_unit
 from crossbody.hw.guard import library, parsing, plain_allocator
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
@@ -137,7 +137,7 @@ class CsvReader:
 
         chosen = self._options
         types = {n: pa.int64() if self._types[n] == "int64" else pa.float64() for n in columns or ()}
-        width = None if chosen.header else _width(self._path, chosen, self._delimiter)
+        width = None if chosen.header else _first_line(self._path, chosen).count(self._delimiter) + 1
         return text.open_csv(
             self._path,
             text.ReadOptions(
@@ -203,10 +203,6 @@ def _units(path: Path, options: Options, delimiter: str) -> list[str]:
 def _delimiter(path: Path, options: Options) -> str:
     line = _first_line(path, options)
     return max(DELIMITERS, key=line.count)
-
-
-def _width(path: Path, options: Options, delimiter: str) -> int:
-    return _first_line(path, options).count(delimiter) + 1
 
 
 def _is_number(text: str) -> bool:

@@ -6,22 +6,19 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.budget import current
 from crossbody.hw.formats._contract import Block, Group
-from crossbody.hw.formats._grouping import HINT, Table, cut, grouped, layout, places
 from crossbody.hw.formats._mat_elements import described, starts, whole_variable
+from crossbody.hw.formats._tables import NoOptions as Options
+from crossbody.hw.formats._tables import Table, grouped, layout, places, sliced
 from crossbody.hw.guard import library, parsing
 
 SUFFIXES = (".mat",)
+HINT = "save plain arrays or structs instead (a timetable: its columns; an object: struct(object))"
 NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
-
-
-class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Nothing to choose."""
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -98,12 +95,12 @@ class MatReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`. A MAT variable can only be read whole, so the wanted ones are in memory together."""
-        wanted = {name: self._places[name] for name in columns}
-        loaded = self._load(table for table, _ in wanted.values())
-        arrays = {name: (self._inside(loaded, table), table, i) for name, (table, i) in wanted.items()}
-        yield from cut(arrays, group.rows or 0)
+        loaded = self._load(self._places[name][0] for name in columns)
+        arrays = {name: self._inside(loaded, *self._places[name]) for name in columns}
+        yield from sliced(self._path, "MAT file", group, columns, lambda name, start, stop: arrays[name][start:stop])
 
-    def _inside(self, loaded: dict[str, Any], table: Table) -> Any:
+    def _inside(self, loaded: dict[str, Any], table: Table, element: int | None) -> Any:
+        """One whole column."""
         value = loaded[table.key]
         for field in table.name.split(".")[1:]:
             value = value.flat[0][field]
@@ -111,7 +108,7 @@ class MatReader:
             value = value.reshape(-1)
         if len(value.reshape(-1)) < table.rows:
             raise LogFormatError(self._path, f"has {value.size} of {table.rows} numbers.", column=table.name)
-        return value
+        return np.moveaxis(value, table.axis, 0)[:, element or 0] if value.ndim == 2 else value
 
     def close(self) -> None:
         """See `Reader`."""

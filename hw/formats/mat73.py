@@ -5,17 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from crossbody.hw.formats._grouping import HINT
-from crossbody.hw.formats._hdf import SIGNATURE, HdfReader, text_of
+from crossbody.hw.formats._tables import NoOptions as Options
+from crossbody.hw.formats.hdf5 import SIGNATURE, HdfReader, text_of
+from crossbody.hw.formats.mat import HINT, NUMBERS
 
 SUFFIXES = (".mat",)
-NUMBERS = {"double", "single", "logical", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
-
-
-class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Nothing to choose."""
 
 
 def recognises(path: Path, head: bytes) -> bool:

@@ -14,11 +14,11 @@ import msgspec
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.budget import Budget, current
+from crossbody.hw.formats._bounded import Chunks, MeteredFile
 from crossbody.hw.formats._contract import Block, Group
 from crossbody.hw.formats._messages import Leaf, crowded, refuse_large, rows_of, too_large, topic_group
-from crossbody.hw.formats._metered import MeteredFile
-from crossbody.hw.formats._unfold import Chunks
-from crossbody.hw.guard import library, parsing
+from crossbody.hw.formats._tables import NoOptions as Options
+from crossbody.hw.guard import closing, library, parsed, parsing
 
 SUFFIXES = (".mcap",)
 MAGIC = b"\x89MCAP0\r\n"
@@ -34,10 +34,6 @@ SIZES = struct.Struct("<QQQ")  # first and last time of a chunk, and its size wh
 CHUNKED = struct.Struct("<QQQII")  # those, its checksum, and the length of the name of its compression
 FOOTER = struct.Struct("<BQQQI")  # as every record, then where summary and its offsets begin, and a checksum
 LARGEST_SCHEMA = 1 << 18  # bytes: a hundred thousand describe all messages of a robot
-
-
-class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Nothing to choose."""
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -67,12 +63,8 @@ class McapReader:
         self.refused: dict[str, str] = {}
         self._leaves: dict[str, Mapping[str, Leaf]] = {}
         self._file = MeteredFile(path, self._budget)
-        try:
-            with parsing(path, "MCAP file (cut off? `mcap recover` saves what is whole)"):
-                self.groups = tuple(self._topics())
-        except BaseException:
-            self._file.close()
-            raise
+        with closing(self._file), parsing(path, "MCAP file (cut off? `mcap recover` saves what is whole)"):
+            self.groups = tuple(self._topics())
         self._file.metered = False
 
     def _topics(self) -> Iterator[Group]:
@@ -199,12 +191,7 @@ class McapReader:
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`."""
         found = rows_of(self._path, WHAT, self._rows(group.name), group, self._leaves[group.name], columns)
-        while True:
-            with parsing(self._path, WHAT):
-                block = next(found, None)
-            if block is None:
-                return
-            yield block
+        return parsed(self._path, WHAT, found)
 
     def _rows(self, topic: str) -> Iterator[tuple[Mapping[str, int], Callable[[], Any]]]:
         for schema, channel, log_time, publish_time, data in self._messages(topic):

@@ -7,25 +7,21 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.budget import current
+from crossbody.hw.formats._bounded import MeteredFile
 from crossbody.hw.formats._contract import Block, Column, Group
-from crossbody.hw.formats._grouping import spans
-from crossbody.hw.formats._metered import MeteredFile
-from crossbody.hw.guard import library, parsing
+from crossbody.hw.formats._tables import NoOptions as Options
+from crossbody.hw.formats._tables import sliced
+from crossbody.hw.guard import closing, library, parsing
 
 SUFFIXES = (".mf4", ".mdf", ".dat")
 WHAT = "MDF file"
 LOOKS = 8  # blocks that are unfolded as fast as one block's numbers are read and checked
 DEEPEST = 8  # conversions that refer to conversions
-
-
-class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Nothing to choose."""
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -53,14 +49,10 @@ class MdfReader:
         self.refused: dict[str, str] = {}
         self._place: dict[str, tuple[int, int]] = {}
         self._raw = MeteredFile(path, self._budget)  # a file of our own is closed whatever happens in there
-        try:
-            with parsing(path, WHAT):
-                self._file = _opened(self._raw)
-                self._raw.metered = False
-                self.groups = tuple(g for i in range(len(self._file.groups)) if (g := self._group(i)).columns)
-        except BaseException:
-            self._raw.close()
-            raise
+        with closing(self._raw), parsing(path, WHAT):
+            self._file = _opened(self._raw)
+            self._raw.metered = False
+            self.groups = tuple(g for i in range(len(self._file.groups)) if (g := self._group(i)).columns)
 
     def _group(self, index: int) -> Group:
         group = self._file.groups[index]
@@ -113,15 +105,7 @@ class MdfReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`. A channel that the file marks invalid is NaN."""
-        for start, stop in spans(group.rows or 0):
-            block: Block = {}
-            for name in columns:
-                with parsing(self._path, WHAT, start, name):
-                    block[name] = self._get(name, start, stop)
-                if len(block[name]) != stop - start:
-                    at = start + len(block[name])
-                    raise LogFormatError(self._path, f"ends before its {group.rows} rows: cut off?", at, name)
-            yield block
+        return sliced(self._path, WHAT, group, columns, self._get)
 
     def close(self) -> None:
         """See `Reader`."""

@@ -6,20 +6,16 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group
-from crossbody.hw.formats._names import header_unit
+from crossbody.hw.formats._tables import NoOptions as Options
+from crossbody.hw.formats._tables import header_unit
 from crossbody.hw.guard import library, parsing, plain_allocator
 
 SUFFIXES = (".parquet", ".pq")
 BUFFER = 1 << 20  # bytes of a column chunk that are in memory at once
-
-
-class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Nothing to choose."""
 
 
 def recognises(path: Path, head: bytes) -> bool:

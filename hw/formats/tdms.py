@@ -6,22 +6,19 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError
 from crossbody.hw.budget import current
+from crossbody.hw.formats._bounded import MeteredFile
 from crossbody.hw.formats._contract import Block, Column, Group
-from crossbody.hw.formats._grouping import spans
-from crossbody.hw.formats._metered import MeteredFile
-from crossbody.hw.guard import library, parsing
+from crossbody.hw.formats._tables import NoOptions as Options
+from crossbody.hw.formats._tables import sliced
+from crossbody.hw.guard import closing, library, parsing
 
 SUFFIXES = (".tdms",)
 WHAT = "TDMS file"
-
-
-class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Nothing to choose."""
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -46,16 +43,12 @@ class TdmsReader:
         self.refused: dict[str, str] = {}
         self._channels: dict[str, Any] = {}
         self._raw = MeteredFile(path, self._budget)  # a file of our own is closed whatever happens in there
-        try:
-            with parsing(path, WHAT):
-                self._file = TdmsFile.open(self._raw)
-                self._raw.metered = False
-                if self._file.file_status.incomplete_final_segment:
-                    raise LogFormatError(path, "was cut off: its last segment is incomplete.")
-                self.groups = tuple(self._groups())
-        except BaseException:
-            self._raw.close()
-            raise
+        with closing(self._raw), parsing(path, WHAT):
+            self._file = TdmsFile.open(self._raw)
+            self._raw.metered = False
+            if self._file.file_status.incomplete_final_segment:
+                raise LogFormatError(path, "was cut off: its last segment is incomplete.")
+            self.groups = tuple(self._groups())
 
     def _groups(self) -> Iterator[Group]:
         """Channels of one TDMS group and one length; LabVIEW does not promise that they are equally long."""
@@ -83,16 +76,12 @@ class TdmsReader:
 
     def blocks(self, group: Group, columns: Sequence[str]) -> Iterator[Block]:
         """See `Reader`."""
-        for start, stop in spans(group.rows or 0):
-            block: Block = {}
-            for name in columns:
-                self._budget.spend(0)  # every chunk goes through all channels before this one
-                with parsing(self._path, WHAT, start, name):
-                    found = np.asarray(self._channels[name].read_data(start, stop - start))
-                block[name] = found.astype("datetime64[ns]").astype(np.int64) if found.dtype.kind == "M" else found
-                if len(found) != stop - start:
-                    raise LogFormatError(self._path, f"ends before its {group.rows} rows.", start + len(found), name)
-            yield block
+        return sliced(self._path, WHAT, group, columns, self._get)
+
+    def _get(self, name: str, start: int, stop: int) -> NDArray[Any]:
+        self._budget.spend(0)  # every chunk goes through all channels before this one
+        found = np.asarray(self._channels[name].read_data(start, stop - start))
+        return found.astype("datetime64[ns]").astype(np.int64) if found.dtype.kind == "M" else found
 
     def close(self) -> None:
         """See `Reader`."""

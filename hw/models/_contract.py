@@ -8,15 +8,14 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from crossbody.cases import Case, Coordinate, Limit, Parameter, SceneError, Trajectory, UnknownName, Value, arguments
+from crossbody.cases.arrays import Floats
 
 if TYPE_CHECKING:
     from crossbody.hw.reading.log import Log
 
-Floats = NDArray[np.float64]
 Numbers = Mapping[str, Value]
 
 

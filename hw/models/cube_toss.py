@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from crossbody import cases
 from crossbody.cases import Case, Coordinate, Trajectory
+from crossbody.cases.arrays import Floats
 from crossbody.cases.library.tossed_cube import PARAMETERS
-from crossbody.hw.models._contract import Floats, Model, Numbers, Segment
+from crossbody.hw.models._contract import Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
 
 PLACE = ("px", "py", "pz")

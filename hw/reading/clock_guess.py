@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import InvalidValue
+from crossbody.cases.arrays import Floats
 from crossbody.hw.formats import Block, Column
-from crossbody.hw.reading.rows import Floats
 from crossbody.hw.reading.units import is_time, to_si
 
 NAMES = ("t", "time", "stamp", "timestamp", "log_time", "times", "seconds", "sec", "elapsed", "clock", "publish_time")
@@ -53,15 +53,12 @@ def looks_like_time(name: str) -> bool:
 
 def guess_clock(columns: Sequence[Column], block: Block) -> ClockGuess | None:
     """The column of times, judged by names first and by the first block; None if none seems to be one."""
-    named = sorted((c for c in columns if looks_like_time(c.name)), key=lambda c: _rank(c.name))
+    named = [c for c in columns if looks_like_time(c.name)]
+    named.sort(key=lambda column: NAMES.index(SUFFIX.sub("", last_word(column.name))))
     for column in [*named, *(c for c in columns if c not in named and _is_time(c.unit))]:
         if block[column.name].dtype.kind in "iuf":
             return _guess(column, block[column.name])
     return None
-
-
-def _rank(name: str) -> int:
-    return NAMES.index(SUFFIX.sub("", last_word(name)))
 
 
 def _guess(column: Column, raw: NDArray[Any]) -> ClockGuess:

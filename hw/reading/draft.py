@@ -44,22 +44,18 @@ def draft(found: Survey) -> Columns:
 
 
 def _add(tables: dict[str, dict[str, Signal]], column: Column, group: GroupSurvey, own: bool) -> None:
-    role, unit = _role(column), _si(column)
+    unit, word = _si(column), last_word(column.name)
+    role = next((role for role, pattern in PATTERNS if re.fullmatch(pattern, word)), Role.SENSORS)
     if unit is not None and unit not in ADMITTED.get(role, (unit,)):
         role = Role.SENSORS
     table = tables[role.value]
-    name = safe_name(last_word(column.name) + "".join(re.findall(r"\[\d+\]$", column.name)))
+    name = safe_name(word + "".join(re.findall(r"\[\d+\]$", column.name)))
     if name in table:
         name = safe_name(column.name)
     while name in table:
         name += "_"
     clock = "" if own or group.clock is None else group.clock.column
     table[name] = Signal(column=column.name, unit=None if unit is not None else USUAL[role], time=clock)
-
-
-def _role(column: Column) -> Role:
-    word = last_word(column.name)
-    return next((role for role, pattern in PATTERNS if re.fullmatch(pattern, word)), Role.SENSORS)
 
 
 def _si(column: Column) -> str | None:

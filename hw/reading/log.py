@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import SceneError, UnknownName
+from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments, checked_fields
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading.columns import Role
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from crossbody.cases import InvalidValue, LogFormatError, UnknownName
+from crossbody.cases.arrays import Floats
 from crossbody.hw.formats import Column, Group, Reader
 from crossbody.hw.reading.columns import Columns, Role, Signal
-from crossbody.hw.reading.rows import Floats
 from crossbody.hw.reading.units import Conversion, to_si
 
 ROTATES, MOVES, PURE = "rad", "m", "1"

@@ -11,19 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from crossbody.cases import InvalidValue, LogFormatError, arguments
+from crossbody.cases.arrays import Floats
 from crossbody.hw import formats
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.reading import repair as _repair
 from crossbody.hw.reading import store as _store
 from crossbody.hw.reading.checks import Checks
-from crossbody.hw.reading.collect import collect
 from crossbody.hw.reading.columns import Columns, Role, dump_columns, load_columns
-from crossbody.hw.reading.hash import file_hash
-from crossbody.hw.reading.join import join
 from crossbody.hw.reading.log import Channel, Log, Provenance, Repair
 from crossbody.hw.reading.plan import ROTATES, Plan, Source, make_plan
-from crossbody.hw.reading.rows import Floats, Rows
-from crossbody.hw.reading.stream import Stream
+from crossbody.hw.reading.rows import Rows, join
+from crossbody.hw.reading.stream import Stream, collect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +147,7 @@ def read(
             block, filled, made = _repair.fill_dropped(block, [s.role for s in plan.sources], step)
             repairs += filled
     told = Provenance(
-        file=str(path), sha256=file_hash(Path(path)), format=found.format, library=found.library,
+        file=str(path), sha256=_store.file_hash(Path(path)), format=found.format, library=found.library,
         columns=dump_columns(plan.columns), part=part, rows=count, origin=found.stream.origin,
         join=plan.columns.join if plan.joined else "", repairs=repairs, synthetic=plan.columns.synthetic,
         about=plan.columns.about,

@@ -12,7 +12,7 @@ from crossbody.hw.checks.clock import GAP
 from crossbody.hw.checks.smooth import unwrapped
 from crossbody.hw.reading.columns import Role
 from crossbody.hw.reading.log import Repair
-from crossbody.hw.reading.rows import Floats, Rows
+from crossbody.hw.reading.rows import Rows
 
 REPAIRS = ("drop_duplicates", "fill_dropped", "unwrap")
 MOST = 10  # samples that are filled for each that is there
@@ -85,7 +85,7 @@ def fill_dropped(
     place = before + 1
     time = np.insert(block.time, place, block.time[before] + share * steps[before])
     values = tuple(
-        np.insert(v, place, _between(v, before, share) if role.measured else v[before])
+        np.insert(v, place, v[before] + share * (v[before + 1] - v[before]) if role.measured else v[before])
         for v, role in zip(block.values, roles, strict=True)
     )
     i = int(np.argmax(missing > 0))
@@ -93,7 +93,3 @@ def fill_dropped(
     rows = np.insert(block.rows, place, block.rows[before])
     made = place + np.arange(len(place))
     return Rows(rows=rows, time=time, values=values), (told,), made
-
-
-def _between(values: Floats, before: NDArray[np.int64], share: Floats) -> Floats:
-    return values[before] + share * (values[before + 1] - values[before])

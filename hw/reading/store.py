@@ -1,27 +1,30 @@
-"""The store: SI in Parquet, with where it came from and a hash of its numbers."""
+"""The store: SI in Parquet, with where it came from, the hash of those bytes and one of its numbers."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import msgspec
+import numpy as np
 
 from crossbody.cases import LogFormatError, OutputError, arguments
+from crossbody.cases.arrays import Floats
+from crossbody.cases.regular import open_regular
 from crossbody.hw.reading.columns import Columns, Role, Signal, Time
-from crossbody.hw.reading.hash import ContentHash
 from crossbody.hw.reading.log import Log, Provenance
 
 KEY = b"crossbody.log"
 VERSION = 1
 TIME = "time"
 ROW_GROUP = 1 << 18  # rows
+CHUNK = 1 << 20  # bytes that are hashed at a time
 
 
 class _Channel(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -65,17 +68,21 @@ def store(log: Log, path: str | Path) -> str:
     names = [TIME, *(f"{c.role.value}.{c.name}" for c in log.channels)]
     units = ["s", *(c.unit for c in log.channels)]
     columns = [log.time, *(c.values for c in log.channels)]
-    digest = _hash(names, units)
-    digest.see(columns)
+    digest = _hash(names, units, columns)
     fields = [pa.field(n, pa.float64(), metadata={b"unit": u.encode()}) for n, u in zip(names, units, strict=True)]
-    schema = pa.schema(fields, metadata={KEY: _encode(log, digest.hexdigest())})
+    schema = pa.schema(fields, metadata={KEY: _encode(log, digest)})
     with _replacing(Path(path)) as made:
         pq.write_table(pa.table(columns, schema=schema), made, row_group_size=ROW_GROUP, compression="zstd")
-    return digest.hexdigest()
+    return digest
 
 
-def _hash(names: list[str], units: list[str]) -> ContentHash:
-    return ContentHash(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
+def _hash(names: Iterable[str], units: Iterable[str], columns: Iterable[Floats]) -> str:
+    """SHA-256 of columns of float64 with their names and units; how they are compressed does not matter."""
+    whole = hashlib.sha256()
+    for name, unit, values in zip(names, units, columns, strict=True):
+        digest = hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").data).digest()
+        whole.update(f"{name} [{unit}]".encode() + b"\0" + digest)
+    return whole.hexdigest()
 
 
 def _encode(log: Log, content: str) -> bytes:
@@ -161,18 +168,30 @@ def verified(log: Log, stored: _About) -> Log:
     Raises:
         LogFormatError: if a number, a name or a unit has changed since.
     """
-    digest = _hash([TIME, *(c.column for c in log.channels)], ["s", *(c.unit for c in log.channels)])
-    digest.see([log.time, *(c.values for c in log.channels)])
-    if digest.hexdigest() != stored.content:
+    names, units = [TIME, *(c.column for c in log.channels)], ["s", *(c.unit for c in log.channels)]
+    if _hash(names, units, [log.time, *(c.values for c in log.channels)]) != stored.content:
         raise LogFormatError(
             log.provenance.file, "has changed since it was stored: its numbers do not have their hash."
         )
     source = {(c.role, c.name): c.column for c in stored.channels}
     channels = tuple(replace(c, column=source[c.role, c.name]) for c in log.channels)
-    return replace(log, channels=channels, provenance=stored.provenance, filled=_indices(stored.filled))
+    return replace(log, channels=channels, provenance=stored.provenance, filled=np.array(stored.filled, np.int64))
 
 
-def _indices(rows: list[int]) -> Any:
-    import numpy as np
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file, or of the names and contents of a folder's files in the order of their names.
 
-    return np.array(rows, dtype=np.int64)
+    Raises:
+        LogFormatError: if it cannot be read.
+    """
+    digest = hashlib.sha256()
+    try:
+        for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:
+            if path.is_dir():
+                digest.update(file.relative_to(path).as_posix().encode() + b"\0")
+            with open_regular(file) as stream:
+                while chunk := stream.read(CHUNK):
+                    digest.update(chunk)
+    except OSError as error:
+        raise LogFormatError(path, f"cannot be read: {error.strerror}.") from None
+    return digest.hexdigest()

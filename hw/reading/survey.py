@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import LogFormatError, arguments
+from crossbody.cases.arrays import Floats
 from crossbody.hw import formats
 from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.checks.finding import Finding
@@ -18,7 +19,6 @@ from crossbody.hw.checks.values import ValueCheck
 from crossbody.hw.formats import Column, Group, Reader
 from crossbody.hw.reading.clock_guess import ClockGuess, guess_clock
 from crossbody.hw.reading.columns import Columns, load_columns
-from crossbody.hw.reading.rows import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

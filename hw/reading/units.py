@@ -8,13 +8,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from crossbody.cases import InvalidValue
+from crossbody.cases.arrays import Floats
 from crossbody.hw.formats import unavailable
-
-Floats = NDArray[np.float64]
 
 # What a file calls a unit reaches pint only if it is one by this grammar, which is bounded in every direction: pint
 # computes powers as they stand, and `m^9^9^9` would never end. No text is two tokens, so that nothing backtracks.
@@ -126,10 +122,6 @@ def _name(base: Any) -> str:
     if base.dimensionless and not base._units:
         return "1"
     for name in PREFERRED:
-        if _registry().Unit(name.replace(" ", "*")).is_compatible_with(base) and _angles(base) == 0:
+        if _registry().Unit(name.replace(" ", "*")).is_compatible_with(base) and not base._units.get("radian", 0):
             return name
     return f"{base:~C}".replace("**", "^").replace("*", " ")
-
-
-def _angles(base: Any) -> int:
-    return int(base._units.get("radian", 0))

@@ -19,16 +19,21 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crossbody.cases import SceneError, Value, arguments
+from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.engines.equations import system_of
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
-from crossbody.hw.replaying.rank import conditions
 from crossbody.hw.windows.lift import check_measured, closed_by, lift, rows_at
-from crossbody.hw.windows.rates import DEGREE, HALF, Floats, Rows, derivatives, felt
+from crossbody.hw.windows.rates import DEGREE, HALF, Rows, derivatives, felt
 from crossbody.hw.windows.window import recorded_inputs
 from crossbody.reference import System
+
+SINGULAR = 1e9
+"""Condition from which on a combination of inputs is lost in rounding."""
+PART = 0.1
+"""Of the largest weight of a direction: what belongs to it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -204,3 +209,49 @@ def noise_of(t: Floats, y: Floats, half: int, degree: int) -> Floats:
     # The residual at the middle of a polynomial has the variance 1 - gain^2 of the noise.
     left = (y[rows] - value) / np.sqrt(1.0 - gain[:, :1] ** 2)
     return np.asarray(np.sqrt(np.mean(left**2, axis=0)))
+
+
+def conditions(t: Floats, B: Floats, rows: tuple[str, ...], names: tuple[str, ...], model: str) -> Floats:
+    """Conditions (n,) of B (n, k, m), inputs of size 1 each, which must be square and regular.
+
+    Args:
+        t: times (n,), s.
+        B: forces in the k measured coordinates by m inputs.
+        rows: names of the coordinates.
+        names: of the inputs.
+        model: whose they are.
+
+    Raises:
+        SceneError: naming inputs that cannot be told apart, coordinates that none of them moves, rank and condition.
+    """
+    k, m = B.shape[1:]
+    if not m:
+        raise SceneError(f"{model} has no inputs: nothing acts on {', '.join(rows)} that could be told.")
+    size = np.linalg.norm(B, axis=1, keepdims=True)
+    U, s, Vt = np.linalg.svd(B / np.where(size > 0.0, size, 1.0))
+    with np.errstate(divide="ignore"):
+        condition: Floats = s[:, 0] / s[:, -1]
+    rank = np.sum(s > s[:, :1] / SINGULAR, axis=1)
+    bad = np.flatnonzero(rank < max(k, m))
+    if not len(bad):
+        return condition
+    at = int(bad[0])
+    r = int(rank[at])
+    where = "everywhere" if len(bad) == len(t) else f"at {len(bad)} of {len(t)} instants, first at t = {t[at]:.6g} s"
+    apart, idle = _named(Vt[at, r:], names), _named(U[at, :, r:].T, rows)
+    told = [f"they cannot tell {' from '.join(apart)} (only a combination of them shows)"] if len(apart) > 1 else []
+    told += [f"{apart[0]} does nothing"] if len(apart) == 1 else []
+    told += [f"no input balances {', '.join(idle)}"] if idle else []
+    raise SceneError(
+        f"{model}: {m} inputs ({', '.join(names)}) and {k} measured coordinates ({', '.join(rows)}), rank {r} {where}, "
+        f"condition {condition[at]:.2g}: {'; '.join(told)}. What is needed is one input for each coordinate, away from "
+        "singular poses."
+    )
+
+
+def _named(directions: Floats, names: tuple[str, ...]) -> list[str]:
+    """Names of what belongs to any of some directions."""
+    if not len(directions):
+        return []
+    weight = np.max(np.abs(directions), axis=0)
+    return [name for name, w in zip(names, weight, strict=True) if w > PART * np.max(weight)]

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.hw.windows.whiteness import noise_level
+from crossbody.cases.arrays import Floats
+from crossbody.hw.windows.whiteness import noise_level, products
 
-Floats = NDArray[np.float64]
 REACH = 0.25
 """Largest lag that is looked at, as a part of a window."""
 RIVAL = 0.9
@@ -141,8 +141,7 @@ def _lagged(a: Sequence[Floats], b: Sequence[Floats], most: int) -> tuple[NDArra
     cross, size_a, size_b = (np.zeros(len(lags)) for _ in range(3))
     for x, y in zip(a, b, strict=True):
         n = len(x)
-        size = 1 << (2 * n - 1).bit_length()
-        cross += np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)[lags]
+        cross += products(x, y, lags)
         energy_x, energy_y = (np.concatenate(([0.0], np.cumsum(z * z))) for z in (x, y))
         after, before = np.maximum(lags, 0), np.maximum(-lags, 0)
         both = n - after - before

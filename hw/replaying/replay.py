@@ -18,13 +18,13 @@ from crossbody.cases import (
     UnknownName,
     Value,
 )
+from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.hw import models
 from crossbody.hw.models._contract import Model
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.comparison import Comparison, Prediction
 from crossbody.hw.replaying.starts import fitted_starts
-from crossbody.hw.windows.rates import Floats
 from crossbody.hw.windows.run import run_window
 from crossbody.hw.windows.window import Window, windows
 

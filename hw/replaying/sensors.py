@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from crossbody.cases import InvalidValue
-from crossbody.cases.arrays import frozen
+from crossbody.cases.arrays import Floats, frozen
 from crossbody.cases.entry_points import checked_arguments, checked_fields
-
-Floats = NDArray[np.float64]
 
 
 @checked_fields

@@ -12,13 +12,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from crossbody.cases import Value
+from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.engines.equations import system_of
 from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.inverse import Inferred, noise_of, pushed, shift_of
 from crossbody.hw.windows.lift import check_measured
-from crossbody.hw.windows.rates import DEGREE, HALF, Floats, derivatives
+from crossbody.hw.windows.rates import DEGREE, HALF, derivatives
 from crossbody.hw.windows.window import recorded_inputs
 from crossbody.reference.linear import Unknown, filtered
 

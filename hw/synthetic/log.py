@@ -16,13 +16,14 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import lfilter
 
 from crossbody.cases import InvalidValue
+from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments, checked_fields
 from crossbody.hw.formats import Group
 from crossbody.hw.reading.checks import Checks
 from crossbody.hw.reading.columns import Role, Signal
 from crossbody.hw.reading.log import Channel, Log, Provenance
 from crossbody.hw.reading.plan import Source
-from crossbody.hw.reading.rows import Floats, Rows
+from crossbody.hw.reading.rows import Rows
 from crossbody.hw.reading.units import to_si
 from crossbody.hw.synthetic.plant import Plant
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Inputs, InvalidValue, SceneError, Trajectory
+from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments, checked_fields
-from crossbody.hw.reading.rows import Floats
 from crossbody.reference.delta import scene
 
 NAMES = ("torque 1 [N m]", "torque 2 [N m]", "torque 3 [N m]", "force x [N]", "force y [N]", "force z [N]")

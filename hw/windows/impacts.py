@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from crossbody.cases.arrays import Floats
+
 PART = 0.25
 """Of the largest acceleration of the measurement: what is smaller is no impact."""
 CLEAR = 6.0

@@ -30,13 +30,10 @@ def rows_at(system: System, q: Array, v: Array, p: Array) -> tuple[Array, Array,
     """H (nc, n), h and H' v (nc,) of all rows, in complex arithmetic."""
     nc, n = system.nc, system.n
     H, h, drift, w = (np.zeros(s, np.complex128) for s in ((nc, n), nc, nc, system.scratch))
-    system.dynamics(0.0, q, v, np.zeros(system.inputs, np.complex128), p, *_unused(system), w)
+    M, f, u = (np.zeros(s, np.complex128) for s in ((n, system.mass_block), n, system.inputs))
+    system.dynamics(0.0, q, v, u, p, M, f, w)
     system.rows(0.0, q, v, p, w, np.arange(nc), nc, H, h, drift)
     return H, h, drift
-
-
-def _unused(system: System) -> tuple[Array, Array]:
-    return np.zeros((system.n, system.mass_block), np.complex128), np.zeros(system.n, np.complex128)
 
 
 def closed_by(H: NDArray[Any], others: NDArray[np.int64], right: NDArray[Any]) -> NDArray[Any]:

@@ -1,27 +1,94 @@
-"""Rates and accelerations of sampled coordinates, by a polynomial through the samples around each instant."""
+"""Rates and accelerations of sampled coordinates, by polynomials through the samples around each instant.
+
+A polynomial across an impact gives neither the rate before nor the one behind. So at the starts of windows, of all
+stretches of samples that contain an instant, the longest is taken whose polynomial leaves no more than the noise (a
+choice of the width by the data, after Lepski 1991, and of the side as in the edge-preserving smoothing of McDonald and
+Owen 1986).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from crossbody.cases import InvalidValue
-from crossbody.hw.windows.smooth_rates import smooth_rates
+from crossbody.cases.arrays import Floats
+from crossbody.hw.windows.whiteness import noise_level
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 HALF = 25
 """Samples on each side."""
 CHUNK = 2000
 DEGREE = 3
+WIDTHS = ((51, 3), (37, 3), (25, 3), (17, 3), (11, 2), (7, 2), (5, 1), (3, 1))
+"""Samples of a stretch, and the degree of its polynomial."""
+PLACES = 8
+"""Places of an instant in a stretch, beside its middle."""
+LEVEL = 1e-3
+"""Probability that noise alone refuses a stretch by its sum of squares."""
+WORST = 5.0
+"""Times the noise that a single sample may be off."""
+SMALLEST = 1e-12
+"""Noise, as a part of the largest value: rounding of what a simulation writes."""
 
 
 def rates_by_fit(t: Floats, y: Floats, rows: Rows | None = None) -> Floats:
     """Rates (m, k) of samples y (n, k) at times t (n,), at some rows or at all, by polynomials that cross no impact.
 
-    Zeros for a record too short.
+    Zeros where there is one sample alone.
     """
-    return smooth_rates(t, y, np.arange(len(t)) if rows is None else rows)
+    rows = np.arange(len(t)) if rows is None else rows
+    found = np.zeros((len(rows), y.shape[1]))
+    noise = np.array([noise_level(column) for column in y.T])
+    noise = np.maximum(noise, SMALLEST * np.maximum(np.max(np.abs(y), axis=0), 1e-300))
+    left = np.full(len(rows), np.inf)
+    for width, degree in WIDTHS:
+        if width > len(t):
+            continue
+        limit = stats.chi2.isf(LEVEL, max(width - degree - 1, 1)) / max(width - degree - 1, 1)
+        for place in _places(width):
+            open_ = np.flatnonzero(left > 1.0)
+            for part in np.array_split(open_, max(1, -(-len(open_) // (2 * CHUNK)))):
+                if not len(part):
+                    continue
+                rate, off = _fitted(t, y, rows[part], width, degree, place, noise, float(limit))
+                better = off < left[part]
+                found[part[better]], left[part[better]] = rate[better], off[better]
+    return found
+
+
+def _places(width: int) -> Rows:
+    """Where in a stretch the instant may stand: the middle first, then ever nearer to the ends."""
+    at = np.unique(np.round(np.linspace(0, width - 1, PLACES + 1)).astype(np.int64))
+    return np.asarray(at[np.argsort(np.abs(at - (width - 1) / 2), kind="stable")])
+
+
+def _fitted(
+    t: Floats, y: Floats, rows: Rows, width: int, degree: int, place: int, noise: Floats, limit: float
+) -> tuple[Floats, Floats]:
+    """Rates (m, k) of polynomials, and how much more than noise they leave (m,): at most 1 if they explain it."""
+    at, span, powers, inverse, which = _polynomials(t, rows, place, width, degree)
+    coefficients = np.einsum("nij,njk->nik", inverse[which], y[at])
+    off = (y[at] - np.einsum("nji,nik->njk", powers[which], coefficients)) / noise
+    free = max(width - degree - 1, 1)
+    large = np.max(np.sum(off**2, axis=1) / free, axis=1) / limit
+    return coefficients[:, 1] / span[:, None], np.maximum(large, np.max(np.abs(off), axis=(1, 2)) / WORST)
+
+
+def _polynomials(
+    t: Floats, rows: Rows, place: int, width: int, degree: int
+) -> tuple[Rows, Floats, Floats, Floats, Rows]:
+    """Samples of the polynomial of every row (m, w) and their span (m,), s; powers, their inverses, and whose they are.
+
+    Equidistant samples have few different windows: those at the ends and one for all between.
+    """
+    at: Rows = np.clip(rows - place, 0, len(t) - width)[:, None] + np.arange(width)
+    span: Floats = t[at[:, -1]] - t[at[:, 0]]
+    kinds, which = np.unique(np.round((t[at] - t[rows, None]) / span[:, None], 9), axis=0, return_inverse=True)
+    powers: Floats = kinds[:, :, None] ** np.arange(degree + 1)
+    inverse: Floats = np.asarray(np.linalg.pinv(powers), np.float64)
+    return at, span, powers, inverse, np.asarray(which.ravel(), np.int64)
 
 
 def derivatives(
@@ -59,15 +126,8 @@ def derivatives(
 
 def _weights(t: Floats, half: int, degree: int, rows: Rows) -> tuple[Rows, Floats, Floats]:
     """Samples of every polynomial (m, w), their span (m,), s, and what makes coefficients of them (m, 3, w)."""
-    width = 2 * half + 1
-    first = np.clip(rows - half, 0, len(t) - width)
-    at = first[:, None] + np.arange(width)
-    span = t[at[:, -1]] - t[at[:, 0]]
-    x = (t[at] - t[rows, None]) / span[:, None]
-    # Equidistant samples have few different windows: those at the ends and one for all between.
-    kinds, which = np.unique(np.round(x, 9), axis=0, return_inverse=True)
-    weights = np.linalg.pinv(kinds[:, :, None] ** np.arange(degree + 1))[:, :3, :][which.ravel()]
-    return at, span, weights
+    at, span, _, inverse, which = _polynomials(t, rows, half, 2 * half + 1, degree)
+    return at, span, inverse[:, :3, :][which]
 
 
 def felt(t: Floats, u: Floats, delay: float, half: int, degree: int, rows: Rows) -> Floats:

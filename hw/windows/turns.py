@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Floats = NDArray[np.float64]
+from crossbody.cases.arrays import Floats
 
 
 def difference(y: Floats, yhat: Floats, turns: Sequence[int] = ()) -> Floats:

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from crossbody.cases.arrays import Floats
+
 BAND = 2.5758293035489004
 """Quantile of the normal distribution for 99 %, two-sided."""
 LAGS = 25
@@ -155,12 +156,18 @@ def _correlation(a: Sequence[Floats], b: Sequence[Floats], most: int) -> Correla
     mean_a, mean_b = (float(np.mean(np.concatenate(x))) for x in (a, b))
     lags, cross, norm_a, norm_b = np.arange(-most, most + 1), np.zeros(2 * most + 1), 0.0, 0.0
     for x, y in ((x - mean_a, y - mean_b) for x, y in zip(a, b, strict=True)):
-        size = 1 << (2 * max(len(x), most + 1) - 1).bit_length()
-        cross += np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)[lags]
+        cross += products(x, y, lags)
         norm_a, norm_b = norm_a + float(x @ x), norm_b + float(y @ y)
     norm = float(np.sqrt(norm_a * norm_b))
     values = cross / norm if norm > 0.0 else np.zeros(len(lags))
     return Correlation(lags=lags, values=values, band=BAND / np.sqrt(n))
+
+
+def products(x: Floats, y: Floats, lags: NDArray[np.int64]) -> Floats:
+    """Sums of x[i + lag] y[i] at lags, by FFT; 0 where they do not overlap."""
+    size = 1 << (2 * max(len(x), int(np.max(np.abs(lags))) + 1) - 1).bit_length()
+    found: Floats = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)[lags]
+    return found
 
 
 def _whitener(pieces: Sequence[Floats], order: int = ORDER) -> Floats:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import InvalidValue, SceneError, arguments
-from crossbody.hw.models._contract import Floats, Model, Segment
+from crossbody.cases.arrays import Floats
+from crossbody.hw.models._contract import Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.windows.impacts import impacts, least_of
 from crossbody.hw.windows.rates import rates_by_fit

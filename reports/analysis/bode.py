@@ -22,7 +22,9 @@ from crossbody.reference.linear import LinearModel, linearise
 CASE = "soft_contact"
 GAINS = (0.0, 20.0)
 """k* of the curves, cm/(s N)."""
-LOWEST, HIGHEST, POINTS = 1e-2, 1e4, 601
+POINTS = 601
+FREQUENCIES = np.geomspace(1e-2, 1e4, POINTS)
+"""Of the figure, rad/s: 100 a decade."""
 OUTPUTS = ("force", "block velocity")
 UNITS = {"force": "N/(m/s)", "block velocity": "1"}
 """Contact force, lam_L - lam_R, and velocity of the block, each over the velocity of the fingers."""
@@ -66,11 +68,6 @@ def soft_contact(kstar: float, mode: str = "grasp", **parameters: Value) -> Curv
     weights[0, model.outputs.index("lam[0]")], weights[0, model.outputs.index("lam[1]")] = 1.0, -1.0
     weights[1, model.outputs.index("b'")] = 1.0
     return Curve(mode=mode, kstar=kstar, model=model.combined(weights, OUTPUTS).without_idle())
-
-
-def frequencies() -> ArrayLike:
-    """The frequencies of the figure (m,), rad/s: 100 a decade."""
-    return np.geomspace(LOWEST, HIGHEST, POINTS)
 
 
 def table(curves: Sequence[Curve], omega: ArrayLike) -> pd.DataFrame:

@@ -7,6 +7,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from crossbody.reports.analysis.bode import OUTPUTS, UNITS
 from crossbody.reports.figures.styles import COLOURS, DASHES
 
 RESPONDING = 1e-12
@@ -52,24 +53,48 @@ def response_figure(rows: pd.DataFrame) -> go.Figure:
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     floor = RESPONDING * float(rows["magnitude"].max())
     for i, (key, line) in enumerate(rows.groupby(["place", "input", "output"], sort=False)):
-        if not line["magnitude"].max() > floor:
-            continue
-        style = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.6}
-        for row, value in enumerate(("magnitude", "phase"), start=1):
-            figure.add_trace(
-                go.Scatter(
-                    x=line["omega"], y=line[value], name=f"{key[0]}: {key[1]} to {key[2]}", legendgroup=str(key),
-                    showlegend=row == 1, mode="lines", line=style,
-                ), row=row, col=1,
-            )  # fmt: skip
-    figure.update_xaxes(type="log", exponentformat="power")
-    figure.update_xaxes(title_text="frequency [rad/s]", row=2, col=1)
-    figure.update_yaxes(
-        type="log", exponentformat="power", title_text="magnitude [SI unit of output / of input]", row=1, col=1
-    )
-    figure.update_yaxes(title_text="phase [deg]", row=2, col=1)
+        if line["magnitude"].max() > floor:
+            _response(figure, line, f"{key[0]}: {key[1]} to {key[2]}", i)
+    _frequencies(figure, "SI unit of output / of input")
     figure.update_layout(title_text="Frequency responses", height=680)
     return figure
+
+
+def bode_figure(rows: pd.DataFrame) -> go.Figure:
+    """What a hand that moves the soft fingers feels: a column an output, a line a gain of the tactile feedback.
+
+    Args:
+        rows: as `crossbody.reports.analysis.bode.table` gives them.
+    """
+    names = [f"finger velocity to {name}" for name in OUTPUTS]
+    figure = make_subplots(rows=2, cols=len(OUTPUTS), shared_xaxes=True, vertical_spacing=0.06, column_titles=names)
+    for i, (kstar, lines) in enumerate(rows.groupby("kstar", sort=True)):
+        for column, output in enumerate(OUTPUTS, start=1):
+            _response(figure, lines[lines["output"] == output], f"k* = {kstar:g} cm/(s N)", i, column)
+    for column, output in enumerate(OUTPUTS, start=1):
+        _frequencies(figure, UNITS[output], column)
+    figure.update_layout(title_text="Block held by two soft fingers, linearised in the grasp", height=620)
+    return figure
+
+
+def _response(figure: go.Figure, line: pd.DataFrame, name: str, i: int, column: int = 1) -> None:
+    """Add magnitude over phase of one response; the first column names it."""
+    style = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.8}
+    for row, value in enumerate(("magnitude", "phase"), start=1):
+        figure.add_trace(
+            go.Scatter(
+                x=line["omega"], y=line[value], name=name, legendgroup=name, showlegend=row == column == 1,
+                mode="lines", line=style,
+            ), row=row, col=column,
+        )  # fmt: skip
+
+
+def _frequencies(figure: go.Figure, unit: str, column: int = 1) -> None:
+    """Name the axes of one column of responses."""
+    figure.update_xaxes(type="log", exponentformat="power")
+    figure.update_xaxes(title_text="frequency [rad/s]", row=2, col=column)
+    figure.update_yaxes(type="log", exponentformat="power", title_text=f"magnitude [{unit}]", row=1, col=column)
+    figure.update_yaxes(title_text="phase [deg]", row=2, col=column)
 
 
 def map_figure(rows: pd.DataFrame) -> go.Figure:

@@ -53,13 +53,9 @@ def orders(rows: pd.DataFrame) -> pd.DataFrame:
         best = order if math.isnan(early) else max(order, early)
         found.append(
             {"case": case, "engine": engine, "profile": profile, "knob": knob, "order": best, "promised": promised,
-             "says": "exact at every setting" if _exact(errors) else says(best, promised)}
+             "says": "exact at every setting" if all(x <= EXACT for x in errors) else says(best, promised)}
         )  # fmt: skip
     return pd.DataFrame(found, columns=COLUMNS)
-
-
-def _exact(errors: Sequence[float]) -> bool:
-    return bool(np.all(np.asarray(errors, dtype=np.float64) <= EXACT))
 
 
 def says(order: float, promised: float) -> str:

@@ -17,27 +17,26 @@ from crossbody.reference import Options, System, prepare
 COLUMNS = ["what", "value", "unit", "limit", "held", "beside", "how"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Lever:
-    """One thing that is left out.
+Row = dict[str, Any]
 
-    Attributes:
+
+def ratio(
+    what: str, value: float, limit: float | None, beside: str, how: str, unit: str = "1", least: bool = False
+) -> Row:
+    """A row of a table of ratios and counts.
+
+    Args:
         what: in words.
-        limit: largest value; None where it is only stated.
-        how: what leaves it out.
+        value: what it is.
+        limit: largest value, or least; None where it is only stated.
+        beside: the numbers that the value is made of.
+        how: what leaves it out, or makes it quick.
+        unit: of the value.
+        least: whether the limit is the least value.
     """
-
-    what: str
-    limit: float | None
-    how: str
-
-    def row(self, value: float, unit: str, beside: str) -> dict[str, Any]:
-        """A row of the table; `beside` are the numbers that the value is made of."""
-        limit = np.nan if self.limit is None else self.limit
-        return {
-            "what": self.what, "value": value, "unit": unit, "limit": limit, "held": not value > limit,
-            "beside": beside, "how": self.how,
-        }  # fmt: skip
+    held = limit is None or (value >= limit if least else not value > limit)
+    given = np.nan if limit is None else limit
+    return {"what": what, "value": value, "unit": unit, "limit": given, "held": held, "beside": beside, "how": how}
 
 
 def _run(case: Case, **options: Any) -> Any:
@@ -61,29 +60,29 @@ def _seconds(runs: Mapping[str, Any], repeats: int) -> dict[str, float]:
     return found
 
 
-def _rings(repeats: int) -> Iterator[dict[str, Any]]:
-    lever = Lever(what="50 rings over 5", limit=1.2, how="rings that the ball cannot reach are bounded away")
+def _rings(repeats: int) -> Iterator[Row]:
     runs = {str(n): _run(cases.load("ball_maze", "solve", rings=n)) for n in (5, 50)}
     took = _seconds(runs, repeats)
-    yield lever.row(took["50"] / took["5"], "1", _beside(took, 1e3, "ms"))
+    how = "rings that the ball cannot reach are bounded away"
+    yield ratio("50 rings over 5", took["50"] / took["5"], 1.2, _beside(took, 1e3, "ms"), how)
 
 
-def _idle_balls(repeats: int) -> Iterator[dict[str, Any]]:
+def _idle_balls(repeats: int) -> Iterator[Row]:
     """Sliders that strike one after another: each ball waits until its turn comes."""
-    lever = Lever(
-        what="a collision among 200 balls over one among 5", limit=3.0,
-        how="guards of far neighbours are bounded away; a chain of rows is banded; masses are diagonal",
-    )  # fmt: skip
     runs, per = {}, {}
     for n in (5, 200):
         runs[str(n)] = run = _run(cases.load("newtons_cradle", "sliders", n=n, gap=1e-3), samples=())
         run.go()
         per[str(n)] = int(run.trajectory(Outcome.FINISHED, 0.0).counts["collisions"])
     took = {n: wall / per[n] for n, wall in _seconds(runs, repeats).items()}
-    yield lever.row(took["200"] / took["5"], "1", _beside(took, 1e6, "us a collision"))
+    yield ratio(
+        "a collision among 200 balls over one among 5", took["200"] / took["5"], 3.0,
+        _beside(took, 1e6, "us a collision"),
+        "guards of far neighbours are bounded away; a chain of rows is banded; masses are diagonal",
+    )  # fmt: skip
 
 
-def _recording(repeats: int) -> Iterator[dict[str, Any]]:
+def _recording(repeats: int) -> Iterator[Row]:
     case = cases.load("delta_impulse", "light")
     runs = {
         "end alone": _run(case, samples=[case.t_end], events=False), "every step": _run(case),
@@ -92,39 +91,34 @@ def _recording(repeats: int) -> Iterator[dict[str, Any]]:
     took = _seconds(runs, repeats)
     lean = took.pop("end alone")
     for name, wall in took.items():
-        lever = Lever(what=f"recording {name} over the end alone", limit=None, how="what nobody asked for is not kept")
-        yield lever.row(wall / lean, "1", _beside({"end alone": lean, name: wall}, 1e3, "ms"))
+        beside = _beside({"end alone": lean, name: wall}, 1e3, "ms")
+        what = f"recording {name} over the end alone"
+        yield ratio(what, wall / lean, None, beside, "what nobody asked for is not kept")
 
 
-def _counted(_repeats: int) -> Iterator[dict[str, Any]]:
+def _counted(_repeats: int) -> Iterator[Row]:
     """Counts of one run each: they are the same every time."""
     flight = cases.load("bouncing_ball", "listing", height=1e3, t_end=5.0)
-    linear = cases.load("bouncing_ball", "linear")
-    loops = cases.load("delta_impulse", "light")
-    bare = _counts(flight, rows=False)
-    closed = _counts(loops)
-    yield Lever(what="guard evaluations of a scene without rows", limit=0.0, how="no contacts, no guards").row(
-        float(bare["guards"]), "count", f"{bare['steps']} steps"
-    )
-    lever = Lever(
-        what="guard evaluations beside the gaps of each step, where no row opens", limit=0.0, how="no contact, no guard"
-    )
-    yield lever.row(float(closed["guards"] - closed["steps"] - 1), "count", f"{closed['steps']} steps")
-    for case, count, limit, what, how in (
-        (flight, "rhs", 20.0, "right-hand sides of 5 s in free flight", "free flight in closed form"),
-        (linear, "rhs", None, "right-hand sides of a ball on a linear floor", "closed form where a scene is affine"),
-        (
-            linear,
-            "exact_steps",
-            None,
-            "closed-form steps of a ball on a linear floor",
-            "one contact, scalar multiplier",
-        ),
-    ):
-        counts = _counts(case)
-        yield Lever(what=what, limit=limit, how=how).row(
-            float(counts[count]), "count", f"{counts['steps']} steps, {counts['exact_steps']} of them in closed form"
-        )
+    linear, loops = cases.load("bouncing_ball", "linear"), cases.load("delta_impulse", "light")
+    resolved = cases.load("newtons_cradle", "sliders", collisions="resolved", gap=1e-3)
+    bare, closed, masses = _counts(flight, rows=False), _counts(loops), _counts(resolved)
+    flown, bounced = _counts(flight), _counts(linear)
+    past = closed["guards"] - closed["steps"] - 1
+    in_form = [f"{one['steps']} steps, {one['exact_steps']} of them in closed form" for one in (flown, bounced)]
+    for what, count, limit, beside, how in (
+        ("guard evaluations of a scene without rows", bare["guards"], 0.0, f"{bare['steps']} steps",
+         "no contacts, no guards"),
+        ("guard evaluations beside the gaps of each step, where no row opens", past, 0.0, f"{closed['steps']} steps",
+         "no contact, no guard"),
+        ("right-hand sides of 5 s in free flight", flown["rhs"], 20.0, in_form[0], "free flight in closed form"),
+        ("right-hand sides of a ball on a linear floor", bounced["rhs"], None, in_form[1],
+         "closed form where a scene is affine"),
+        ("closed-form steps of a ball on a linear floor", bounced["exact_steps"], None, in_form[1],
+         "one contact, scalar multiplier"),
+        ("factorisations of a constant mass matrix", masses["factorisations"], 1.0, f"{masses['rhs']} right-hand sides",
+         "factorised once, before the run"),
+    ):  # fmt: skip
+        yield ratio(what, float(count), limit, beside, how, "count")
 
 
 def _counts(case: Case, rows: bool = True) -> dict[str, int]:
@@ -139,18 +133,11 @@ def _counts(case: Case, rows: bool = True) -> dict[str, int]:
     return {"steps": found.steps, **found.counts}
 
 
-def _factorised(_repeats: int) -> Iterator[dict[str, Any]]:
-    case = cases.load("newtons_cradle", "sliders", collisions="resolved", gap=1e-3)
-    counts = _counts(case)
-    lever = Lever(what="factorisations of a constant mass matrix", limit=1.0, how="factorised once, before the run")
-    yield lever.row(float(counts["factorisations"]), "count", f"{counts['rhs']} right-hand sides")
-
-
-def _shortcut(repeats: int) -> Iterator[dict[str, Any]]:
+def _shortcut(repeats: int) -> Iterator[Row]:
     case = cases.load("bouncing_ball", "linear")
     took = _seconds({name: _run(case, shortcuts=name == "on") for name in ("on", "off")}, repeats)
-    lever = Lever(what="closed forms over integration, linear floor", limit=1.0, how="affine arcs in closed form")
-    yield lever.row(took["on"] / took["off"], "1", _beside(took, 1e6, "us"))
+    what, beside = "closed forms over integration, linear floor", _beside(took, 1e6, "us")
+    yield ratio(what, took["on"] / took["off"], 1.0, beside, "affine arcs in closed form")
 
 
 def endless(bounces: int) -> Any:
@@ -177,30 +164,27 @@ class Again:
         return done[-1][0], sum(wall for _, wall in done)
 
 
-def _bounces(_repeats: int) -> Iterator[dict[str, Any]]:
+def _bounces(_repeats: int) -> Iterator[Row]:
     """A million bounces beside ten times a hundred thousand: both last as long, on an uneven machine."""
     few, many = endless(100_000), endless(1_000_000)
     took = _seconds({"1e5": Again(few, 10), "1e6": many}, 3)
-    held = {name: _bytes(run) for name, run in (("few", few), ("many", many))}
+    held = [sum(a.nbytes for of in (run.buffers, run.work) for a in of.values()) for run in (few, many)]
     per = {name: wall / 1e6 for name, wall in took.items()}
-    lever = Lever(what="time of a bounce, 1e6 over 1e5 of them", limit=1.2, how="a step costs the same at any time")
-    yield lever.row(per["1e6"] / per["1e5"], "1", _beside(per, 1e6, "us a bounce"))
-    lever = Lever(what="memory that 1e6 bounces take and 1e5 do not", limit=0.0, how="events counted, not kept")
-    yield lever.row(float(held["many"] - held["few"]), "B", f"{held['many']} B in all")
-
-
-def _bytes(run: Any) -> int:
-    """What a run holds, B."""
-    return sum(array.nbytes for arrays in (run.buffers, run.work) for array in arrays.values())
+    yield ratio(
+        "time of a bounce, 1e6 over 1e5 of them", per["1e6"] / per["1e5"], 1.2, _beside(per, 1e6, "us a bounce"),
+        "a step costs the same at any time",
+    )  # fmt: skip
+    yield ratio(
+        "memory that 1e6 bounces take and 1e5 do not", float(held[1] - held[0]), 0.0,
+        f"{held[1]} B in all", "events counted, not kept", "B",
+    )  # fmt: skip
 
 
 def _beside(took: Mapping[str, float], factor: float, unit: str) -> str:
     return ", ".join(f"{name}: {factor * wall:.3g} {unit}" for name, wall in took.items())
 
 
-LEVERS: tuple[Callable[[int], Iterator[dict[str, Any]]], ...] = (
-    _rings, _idle_balls, _recording, _counted, _factorised, _shortcut, _bounces,
-)  # fmt: skip
+LEVERS: tuple[Callable[[int], Iterator[Row]], ...] = (_rings, _idle_balls, _recording, _counted, _shortcut, _bounces)
 
 
 def measure(repeats: int) -> pd.DataFrame:

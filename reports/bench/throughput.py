@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numba
 import numpy as np
@@ -19,8 +18,8 @@ from crossbody import cases, engines
 from crossbody.cases import EngineUnavailable, Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.reference import ensemble
+from crossbody.reports.bench.skip import COLUMNS, Row, ratio
 
-COLUMNS = ["what", "value", "unit", "limit", "held", "beside", "how"]
 RTOL = 1e-9
 STEP = 1e-3
 """Of MuJoCo, s."""
@@ -114,14 +113,7 @@ def best_pair(
     return b / a, a, b, cores
 
 
-def _row(
-    what: str, value: float, limit: float, held: bool, beside: Sequence[tuple[str, float]], how: str
-) -> dict[str, Any]:
-    told = ", ".join(f"{name}: {rate:.4g} runs/s" for name, rate in beside)
-    return {"what": what, "value": value, "unit": "1", "limit": limit, "held": held, "beside": told, "how": how}
-
-
-def against_mujoco(repeats: int, integrator: str) -> dict[str, Any]:
+def against_mujoco(repeats: int, integrator: str) -> Row:
     """Median of the interleaved ratios.
 
     Raises:
@@ -129,32 +121,32 @@ def against_mujoco(repeats: int, integrator: str) -> dict[str, Any]:
     """
     cores = len(os.sched_getaffinity(0))
     pairs = [(reference(RUNS, cores), mujoco(BATCH, cores, integrator)) for _ in range(repeats)]
-    ratio = statistics.median(a / b for a, b in pairs)
     a, b = (statistics.median(side) for side in zip(*pairs, strict=True))
-    return _row(
+    return ratio(
         f"runs of `listing` at {RTOL:g} over MuJoCo's batch, {integrator} at {1e3 * STEP:g} ms, {cores} threads",
-        ratio, LEAST_RATIO, ratio >= LEAST_RATIO, (("reference", a), ("MuJoCo", b)),
-        "compiled, in threads without the interpreter",
+        statistics.median(a / b for a, b in pairs), LEAST_RATIO, f"reference: {a:.4g} runs/s, MuJoCo: {b:.4g} runs/s",
+        "compiled, in threads without the interpreter", least=True,
     )  # fmt: skip
 
 
-def two_cores(repeats: int) -> dict[str, Any]:
+def two_cores(repeats: int) -> Row:
     """The best of interleaved pairs; not judged where the machine does not give two cores."""
     on_one, on_two = (partial(reference, PAIR_RUNS, threads) for threads in (1, 2))
-    ratio, one, two, given = best_pair(on_one, on_two, PAIRS * repeats)
-    reached, how = ratio >= LEAST_TWO, f"two spinning threads are given {given:.2f} cores"
-    unable = not reached and given < SPINNING
-    return _row(
-        "runs on two threads over one", ratio, LEAST_TWO, reached or unable, (("one", one), ("two", two)),
-        f"not judged: {how}" if unable else how,
-    )  # fmt: skip
+    found, one, two, given = best_pair(on_one, on_two, PAIRS * repeats)
+    how, beside = f"two spinning threads are given {given:.2f} cores", f"one: {one:.4g} runs/s, two: {two:.4g} runs/s"
+    unable = found < LEAST_TWO and given < SPINNING
+    row = ratio(
+        "runs on two threads over one", found, LEAST_TWO, beside, f"not judged: {how}" if unable else how, least=True
+    )
+    return row | {"held": row["held"] or unable}
 
 
 def measure(repeats: int) -> pd.DataFrame:
     """One row a ratio; those over MuJoCo are not measured where it is not installed."""
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     try:
         rows += [against_mujoco(repeats, integrator) for integrator in ("Euler", "RK4")]
     except EngineUnavailable as error:
-        rows.append(_row("runs over MuJoCo's batch", float("nan"), LEAST_RATIO, True, (), f"skipped: {error}"))
+        row = ratio("runs over MuJoCo's batch", float("nan"), LEAST_RATIO, "", f"skipped: {error}", least=True)
+        rows.append(row | {"held": True})
     return pd.DataFrame([*rows, two_cores(repeats)], columns=COLUMNS)

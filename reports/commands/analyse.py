@@ -1,4 +1,4 @@
-"""What `crossbody analyse` does: find the equilibria, linearise, show tables, write them with their figures."""
+"""What `crossbody analyse` and `bode` do: find equilibria, linearise, show tables, write them with their figures."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ import pandas as pd
 from crossbody import cases
 from crossbody.cases import InvalidValue
 from crossbody.reports import voice
+from crossbody.reports.analysis import bode as curves
 from crossbody.reports.analysis import numbers as work
 from crossbody.reports.analysis.counterparts import counterparts
 from crossbody.reports.analysis.loci import Family, limits, root_locus
 from crossbody.reports.analysis.places import places
+from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
-from crossbody.reports.pages import site as page
-from crossbody.reports.runs import jobs, output, study
+from crossbody.reports.runs import jobs, output
 from crossbody.reports.runs.provenance import provenance
-from crossbody.reports.sections.analysis import PREFIX
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 OMEGA = np.geomspace(1e-2, 1e4, 301)
 LOCUS_POINTS = 61
+PREFIX = "analysis-"
+"""How the names of the tables begin."""
 SHOWN = 40
 """Rows of a table that are printed."""
 BESIDE = ["place", "engine", "way", "slope", "poles", "verdict"]
@@ -105,23 +107,41 @@ def analyse(
     if mapped:
         tables["map"] = work.workspace(case)
     if out is not None:
-        _write(out, tables, command)
+        output.check(out, "analyse")
+        publish(out, "analyse", {f"{PREFIX}{key}": rows for key, rows in tables.items()}, provenance(command))
     if not voice.told_as_json(tables) and not voice.quiet():
         _show(case.label, tables)
         if out is not None:
-            print(f"Report: {(out / page.PAGE).absolute()}")
+            where(out)
     return exit_code(engines["verdict"])
 
 
-def _write(out: Path, tables: Mapping[str, pd.DataFrame], command: str) -> None:
-    """Every table, and the page."""
-    told = provenance(command)
-    output.check(out, "analyse")
-    with output.folder(out, "analyse") as made:
-        study.write(made, [], study.judge([], {}), told)
-        for key, rows in tables.items():
-            study.write_table(made / f"{PREFIX}{key}", rows, told)
-        page.write(made)
+def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
+    """Frequency responses in the grasp, poles in every mode set.
+
+    Args:
+        name: of the case.
+        pairs: K=V, parameters of the case to change; k* is the figure's own.
+        out: folder to write.
+        command: what was typed, for provenance.
+
+    Raises:
+        CrossbodyError: for wrong use, before anything is written.
+    """
+    curves.check(name)
+    parameters = jobs.parse_settings(pairs)
+    if "kstar" in parameters:
+        raise InvalidValue(f"kstar is what the curves differ in: {', '.join(f'{k:g}' for k in curves.GAINS)}.")
+    output.check(out, "bode")
+    found = [curves.soft_contact(k, mode, **parameters) for mode in curves.MODES for k in curves.GAINS]
+    held = [curve for curve in found if curve.mode == "grasp"]
+    tables = {"bode": curves.table(held, curves.FREQUENCIES), "poles": curves.poles(found)}
+    publish(out, "bode", tables, provenance(command))
+    growths = curves.growths(tables["poles"])
+    if not voice.told_as_json(tables | {"growths": growths}):
+        print_rows(growths)
+        where(out)
+    return 0
 
 
 def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:

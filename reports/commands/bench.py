@@ -14,9 +14,8 @@ from crossbody.reports import voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
-from crossbody.reports.commands.shared import identity, key, where
-from crossbody.reports.pages import site as page
-from crossbody.reports.runs import files, jobs, output, study
+from crossbody.reports.commands.shared import identity, key, publish, where
+from crossbody.reports.runs import files, jobs, output
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -34,7 +33,7 @@ SHOWN = {
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
     repeats: int | None, full: bool, against: Path | None, command: str, limit: float = LIMIT,
-    minutes: float = math.inf,
+    minutes: float | None = None,
 ) -> int:  # fmt: skip
     """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code.
 
@@ -45,7 +44,7 @@ def run(
     base = None if against is None else bench_against.read(against)
     if base is not None:
         bench_against.check_common(base[0], [case.label for case in cases])
-    each = 60.0 * minutes / max(1, len(cases) * len(picks))
+    each = math.inf if minutes is None else 60.0 * minutes / max(1, len(cases) * len(picks))
     effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats, each=each)
     output.check(out, "bench")
     with Parts(out, command, identity("bench", cases, names, picks=picks, effort=effort)) as parts:
@@ -57,10 +56,11 @@ def run(
         done = [parts.part(key(i, case)) for i, case in enumerate(cases) if parts.has(key(i, case))]
         rows, orders = measure.joined([_part(path) for path in done])
         if not len(rows):
-            raise InvalidValue(_nothing(picks))
+            absent = " ".join(pick.skipped for pick in picks if pick.skipped)
+            raise InvalidValue(f"No engine asked for can run a case asked for. {absent}".strip())
         tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
         losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
-        write(out, tables | losses, provenance(command, repeats=effort.repeats))
+        publish(out, "bench", tables | losses, provenance(command, repeats=effort.repeats))
     show(tables | (losses if voice.as_json() else {}), out)
     return tell_losses(losses["lost"], against) if losses else 0
 
@@ -72,20 +72,6 @@ def _part(path: Path) -> pd.DataFrame:
             return pd.read_parquet(file)[list(measure.COLUMNS)]
     except (OSError, ValueError, KeyError, ArrowException):
         raise OutputError(f"{path} is no part of a benchmark; remove {path.parent}.") from None
-
-
-def _nothing(picks: Sequence[jobs.Pick]) -> str:
-    absent = " ".join(pick.skipped for pick in picks if pick.skipped)
-    return f"No engine asked for can run a case asked for. {absent}".strip()
-
-
-def write(out: Path, tables: Mapping[str, pd.DataFrame], told: Mapping[str, object]) -> None:
-    """Tables (Parquet, CSV, JSON) and the page, all or nothing; the first table names the study."""
-    with output.folder(out, next(iter(tables))) as made:
-        study.write(made, [], study.judge([], {}), told)
-        for name, table in tables.items():
-            study.write_table(made / name, table, told)
-        page.write(made)
 
 
 def show(tables: Mapping[str, pd.DataFrame], out: Path) -> None:
@@ -110,20 +96,20 @@ def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequen
     """Write and show one table of its own; 1 if something in it failed."""
     if not len(rows):
         raise CrossbodyError(f"The table {name} has no rows.")
-    write(out, {name: rows}, provenance(command))
+    publish(out, name, {name: rows}, provenance(command))
     show({name: rows}, out)
     for line in failed if not voice.as_json() else ():
         print(f"outside: {line}")
     return int(bool(failed))
 
 
-def alone(what: str, asked: tuple[object, ...], repeats: int | None, out: Path, command: str) -> int:
+def alone(what: str, repeats: int | None, out: Path, command: str, limit: float = LIMIT, **asked: object) -> int:
     """The table of what is skipped, or of the throughput of many runs; the exit code.
 
     Raises:
         InvalidValue: if something was asked for that these do not have: they have their own scenes.
     """
-    if any(asked):
+    if any(asked.values()):
         raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
     output.check(out, what)
     rows = (skip if what == "skip" else throughput).measure(repeats or 5)

@@ -1,11 +1,46 @@
-"""The command `crossbody cache`: where compiled code is kept, how much it is, and how it is removed."""
+"""The commands `crossbody warm` and `cache`: code that is compiled ahead; where it is kept, and how it is removed."""
 
 from __future__ import annotations
 
 import json
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
 
-from crossbody.reference import code_store
+import click
+
+from crossbody import cases, engines
+from crossbody.reference import ahead, code_store
 from crossbody.reports import voice
+
+
+def warm() -> int:
+    """Compile what is the same for all mechanisms, then the kernels of every case; the exit code."""
+    began = time.perf_counter()
+    steps = len(ahead.PIECES) + len(cases.names())
+    with voice.progress(steps) as tell, ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+        _each(pool, ahead.compile_piece, tuple(ahead.PIECES), tell)
+        _each(pool, compile_case, cases.names(), tell)
+    if not voice.silent():
+        click.echo(f"Compiled in {time.perf_counter() - began:.0f} s; kept in {code_store.base()}.")
+    return 0
+
+
+def _each(
+    pool: ProcessPoolExecutor, work: Callable[[str], None], names: Sequence[str], tell: Callable[[str], None]
+) -> None:
+    for done in as_completed(found := {pool.submit(work, name): name for name in names}):
+        done.result()
+        tell(found[done])
+        voice.note(f"{found[done]} is compiled")
+
+
+def compile_case(name: str) -> None:
+    """Compile the kernels of a case, in all its variants."""
+    for variant in cases.variants(name):
+        engines.load("reference").prepare(cases.load(name, variant), "compiled").run()
 
 
 def show() -> int:

@@ -24,6 +24,8 @@ MANY = 4
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
 COLOURS = {"within": "green", "known": "yellow", "outside": "red"}
+EMPTY = {"-", "0", ""}
+"""Cells that say nothing."""
 LEFT_OUT = ("in all [s]", "importer", "within", "step", "model", "known", "time [ms]")
 """Columns that go, in this order, where the table is too wide."""
 
@@ -37,7 +39,8 @@ def show(rows: Sequence[Row], times: Times) -> None:
     """Print who is off and by how much, a line a run, every row that is wrong, and what could not run."""
     runs = runs_of(rows)
     if not voice.quiet():
-        click.echo(f"{sentence(runs)}\n\n{table(runs, times, _width())}\n\n{counted(rows)}")
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
+        click.echo(f"{sentence(runs)}\n\n{table(runs, times, width)}\n\n{counted(rows)}")
     for run in runs:
         for row in run.wrong:
             click.echo(_wrong(run, row))
@@ -46,10 +49,6 @@ def show(rows: Sequence[Row], times: Times) -> None:
             click.echo(_lost(run, row))
     if not voice.quiet():
         click.echo("".join(f"{text}\n" for text in _absent(runs)), nl=False)
-
-
-def _width() -> int:
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
 
 
 def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
@@ -61,7 +60,7 @@ def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
     columns["in all [s]"] = [_number(whole) for _, whole in walls]
     for name, word in (("within", Word.WITHIN), ("known", Word.EXPECTED), ("outside", Word.OUTSIDE)):
         columns[name] = [str(sum(row["verdict"] == word for row in run.rows)) for run in runs]
-    columns = {name: cells for name, cells in columns.items() if name == "outside" or any(map(_says, cells))}
+    columns = {name: cells for name, cells in columns.items() if name == "outside" or set(cells) - EMPTY}
     first = max((len(run.who) for run in runs), default=0) + 2
     for name in LEFT_OUT:
         if first + sum(2 + _wide(head, cells) for head, cells in columns.items()) <= width:
@@ -73,10 +72,6 @@ def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
             lines.append(click.style(run.label, bold=True))
         lines.append(f"  {run.who:<{first - 2}}" + "".join(_cell(head, cells, i) for head, cells in columns.items()))
     return "\n".join(lines)
-
-
-def _says(cell: str) -> bool:
-    return cell not in ("-", "0", "")
 
 
 def _wide(head: str, cells: Sequence[str]) -> int:

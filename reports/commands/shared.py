@@ -1,17 +1,21 @@
-"""What commands share: what decides their result, and where their report is."""
+"""What commands share: what decides their result, how their tables are written and shown, and where their report is."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import Case, installed
 from crossbody.cases.files.reading import SUFFIXES
 from crossbody.reports import voice
 from crossbody.reports.pages import site
+from crossbody.reports.runs import output, study
 from crossbody.reports.runs.provenance import code
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 OF_USERS = (".py", *SUFFIXES)
 """How names of files end that are cases."""
@@ -34,6 +38,28 @@ def _acting(cases: Sequence[Case]) -> list[str]:
 def key(number: int, case: Case) -> str:
     """What tells the part of a case from those of the others, which may have its name."""
     return f"{number} {case.label}"
+
+
+def publish(out: Path, name: str, tables: Mapping[str, pd.DataFrame], told: Mapping[str, Any]) -> None:
+    """Write the tables of a study without verdicts (Parquet, CSV, JSON) and its page, all or nothing.
+
+    Args:
+        out: the output folder.
+        name: of the study.
+        tables: stem of the files -> rows.
+        told: provenance.
+    """
+    with output.folder(out, name) as made:
+        study.write(made, [], study.judge([], {}), told)
+        for stem, rows in tables.items():
+            study.write_table(made / stem, rows, told)
+        site.write(made)
+
+
+def print_rows(rows: pd.DataFrame, digits: int = 4) -> None:
+    """Print a table, unless nothing but what is wrong is to be said."""
+    if not voice.quiet():
+        print(rows.to_string(index=False, float_format=lambda x: f"{x:.{digits}g}"))
 
 
 def where(out: Path) -> None:

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
 from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports import suites, voice
+from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
-from crossbody.reports.pages import site as page
-from crossbody.reports.runs import jobs, output, study, watch
+from crossbody.reports.runs import jobs, watch
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.suites._contract import Suite
 from crossbody.reports.sweep import draw, pools
-from crossbody.reports.sweep.map import STABILITY, stability_map, summary
+from crossbody.reports.sweep.map import stability_map, summary
 from crossbody.reports.sweep.minimise import failures, reproducers
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.store import STRESS, SWEEP, Store, identity
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 LEAST, MOST, CHUNKS = 4, 100, 400
 """Runs in a chunk, and how many chunks a sweep is cut into if they allow it; not a matter of the number of workers."""
@@ -61,11 +57,13 @@ def stress(ask: Ask, out: Path, command: str) -> int:
     with _client(ask.scheduler, ask.tls) as client:
         store = Store(out, identity(specs, chunk, {"seed": ask.seed}))
         watch.resumable(f"What is complete is kept in {out}; the same command goes on with it.")
-        sweep(store, specs, chunk, Pool(count=ask.jobs, client=client), quiet=voice.silent())
+        sweep(store, specs, chunk, Pool(count=ask.jobs, client=client))
     rows, times = store.table()
-    with _bar(None, quiet=voice.silent()) as tell:
+    with voice.progress(None, done=0) as tell:
         small = reproducers(rows, specs, _processes(ask.jobs), tell)
-    _finish(store, rows, times, small, provenance(command, seed=ask.seed))
+    tables = {"stress": rows, "stress_times": times, "reproducers": small, "stress_map": stability_map(rows)}
+    tables["stress_summary"] = summary(rows, times)
+    publish(store.path, STRESS, tables, provenance(command, seed=ask.seed))
     if voice.as_json():
         print(voice.rows_as_json(small))
     else:
@@ -114,13 +112,13 @@ def _client(address: str | None, tls: pools.Tls) -> Iterator[Any]:
         client.close(timeout=pools.ANSWER)
 
 
-def sweep(store: Store, specs: Sequence[Spec], chunk: int, pool: Pool, quiet: bool) -> None:
+def sweep(store: Store, specs: Sequence[Spec], chunk: int, pool: Pool) -> None:
     """Execute what is missing; every chunk is on disk as soon as it is there."""
     parts = [specs[i : i + chunk] for i in range(0, len(specs), chunk)]
     left = [(i, parts[i]) for i in store.missing(len(parts))]
     if not left:
         return
-    with _bar(len(parts), quiet, done=len(parts) - len(left)) as tell:
+    with voice.progress(len(parts), done=len(parts) - len(left)) as tell:
         for number, rows in _executed(left, pool):
             store.put(number, rows)
             tell(f"{rows[0]['suite']}: {len(rows)} runs")
@@ -137,52 +135,14 @@ def _executed(left: Sequence[pools.Chunk], pool: Pool) -> Iterable[tuple[int, po
     return pools.surviving(pools.work, left, 1) if count == 1 else pools.processes(left, count)
 
 
-def _finish(store: Store, rows: pd.DataFrame, times: pd.DataFrame, small: pd.DataFrame, told: dict[str, Any]) -> None:
-    """Tables and page into the sweep's folder, all or nothing."""
-    tables = {"stress": rows, "stress_times": times, "reproducers": small, "stress_map": stability_map(rows)}
-    tables["stress_summary"] = summary(rows, times)
-    with output.folder(store.path, STRESS) as made:
-        study.write(made, [], study.judge([], {}), told)
-        for stem, table in tables.items():
-            study.write_table(made / stem, table, told)
-        page.write(made)
-
-
-@contextmanager
-def _bar(steps: int | None, quiet: bool, done: int = 0) -> Iterator[Callable[[str], None]]:
-    """A bar on stderr with the time left; where it is no terminal, nothing."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda _text: None
-        return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
-    text = TextColumn("{task.description}")
-    with Progress(*columns, text, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=steps, completed=done)
-        yield lambda said: bar.update(task, description=said, advance=1)
-
-
 def _show(rows: pd.DataFrame, small: pd.DataFrame, out: Path) -> None:
     """One line a suite and engine, the reproducers, and where the page is."""
+    print_rows(summary(rows), digits=2)
     if not voice.quiet():
-        print(summary(rows).to_string(index=False, float_format=lambda x: f"{x:.2g}"))
         print(f"{len(rows)} runs, {len(failures(rows))} ended before their horizon or are outside")
     for line in small.head(SHOWN).to_dict(orient="records"):
         print(f"{line['verdict']}: {line['outcome']} ({line['count']}x): {line['command']}")
         print(f"    {line['why'][:300]}")
     if len(small) > SHOWN:
         print(f"and {len(small) - SHOWN} more kinds in {out / 'reproducers.csv'}")
-    if not voice.quiet():
-        print(f"Report: {(out / page.PAGE).absolute()}")
-
-
-__all__ = ["STABILITY", "Ask", "plan", "stress", "sweep"]
+    where(out)

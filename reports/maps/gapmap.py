@@ -181,7 +181,8 @@ def summary(rows: pd.DataFrame, ideal: float = 1e-3) -> pd.DataFrame:
         about = {"n": n, "engine": engine, "profile": profile, "machine": machine}
         done = group[group["outcome"] == "finished"].sort_values("s")
         failed = int((group["outcome"] != "finished").sum())
-        found.append(about | _line_summary(done, ideal) | {"failed": failed, "why": _first(group["why"])})
+        why = next((str(text) for text in group["why"] if isinstance(text, str) and text), "")
+        found.append(about | _line_summary(done, ideal) | {"failed": failed, "why": why})
     columns = ["n", "engine", "profile", "machine", "most", "at_s", "at_touch", "ideal_from", "failed", "why"]
     return pd.DataFrame(found, columns=columns)
 
@@ -197,7 +198,3 @@ def _line_summary(done: pd.DataFrame, ideal: float) -> dict[str, Any]:
         "most": float(peak["energy_created"]), "at_s": float(peak["s"]), "at_touch": "".join(touching),
         "ideal_from": float(later.min()) if len(later) else math.nan,
     }  # fmt: skip
-
-
-def _first(texts: pd.Series[Any]) -> str:
-    return next((str(text) for text in texts if isinstance(text, str) and text), "")

@@ -156,15 +156,13 @@ def log_about(found: Comparison) -> dict[str, Any]:
 def save_motions(folder: Path, found: Comparison) -> None:
     """The measurement as the truth, and every prediction beside it, into an empty folder."""
     measured = found.measurement()
-    save(folder / "0000.parquet", Trace(about=_about(found, TRUTH, "") | _source(found.log), run=measured))
+    origin = found.log.provenance
+    source = {"tier": tier(found.log), "source": f"{origin.file}. {origin.about}".strip()}
+    save(folder / "0000.parquet", Trace(about=_about(found, TRUTH, "") | source, run=measured))
     for i, prediction in enumerate(found.predictions, start=1):
         about = _about(found, prediction.engine, prediction.profile) | {"settings": dict(prediction.settings)}
         run = found.trajectory(prediction)
         save(folder / f"{i:04d}.parquet", Trace(about=about, run=run, truth=measured))
-
-
-def _source(log: Log) -> dict[str, Any]:
-    return {"tier": tier(log), "source": f"{log.provenance.file}. {log.provenance.about}".strip()}
 
 
 def _about(found: Comparison, engine: str, profile: str) -> dict[str, Any]:

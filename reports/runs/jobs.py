@@ -189,7 +189,8 @@ def run_case(
         raise CaseUnsupported(f"{case.label}: {truth.trajectory.message}")
     if math.isfinite(truth.tight):
         case = replace(case, tight=truth.tight)
-    reference = _reference_audit(case)
+    known = "reference" in engines.names()
+    reference = engines.load("reference").prepare(case, "compiled").audit() if known else {}
     entries = []
     for pick in (of_case(one, case) for one in wanted):
         label = f"{case.label}: {pick.engine}:{pick.profile}"
@@ -200,7 +201,7 @@ def run_case(
         entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine)
         entries.append(replace(entry, took_s=perf_counter() - began))
     watch.unlimited()
-    _check_known(settings or {}, entries)
+    check_known(settings or {}, [(one.engine, one.profile, one.settings) for one in entries if one.run is not None])
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
 
 
@@ -232,11 +233,6 @@ def of_pick(settings: Mapping[str, Value], pick: Pick) -> dict[str, Value]:
     for who in (pick.engine, f"{pick.engine}:{pick.profile}"):
         found |= {name.removeprefix(f"{who}."): value for name, value in settings.items() if name.startswith(f"{who}.")}
     return found
-
-
-def _check_known(settings: Mapping[str, Value], entries: Sequence[Entry]) -> None:
-    ran = [(one.engine, one.profile, one.settings) for one in entries if one.run is not None]
-    check_known(settings, ran)
 
 
 def check_known(settings: Mapping[str, Value], ran: Sequence[tuple[str, str, Mapping[str, Any]]]) -> None:
@@ -273,12 +269,6 @@ def check_asked(settings: Mapping[str, Value], wanted: Sequence[Pick]) -> None:
             raise UnknownName("engine (of a setting)", name, known)
         if profile is not None and profile not in engines.load(name).profiles:
             raise UnknownName(f"profile of {name}", profile, engines.load(name).profiles)
-
-
-def _reference_audit(case: Case) -> Mapping[str, Any]:
-    if "reference" not in engines.names():
-        return {}
-    return engines.load("reference").prepare(case, "compiled").audit()
 
 
 def _entry(

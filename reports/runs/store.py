@@ -71,7 +71,7 @@ def save(path: Path, trace: Trace) -> None:
         "counts": dict(run.counts), "control_s": run.control_s,
     }  # fmt: skip
     columns = {name: _column(values) for name, values in data.items()}
-    table = pa.table(columns, metadata={_KEY: json.dumps(about, default=_plain).encode()})
+    table = pa.table(columns, metadata={_KEY: json.dumps(about, default=as_plain).encode()})
     pq.write_table(table, path, compression="zstd")
 
 
@@ -81,7 +81,8 @@ def _column(values: Floats) -> pa.Array:
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, held])
 
 
-def _plain(value: Any) -> Any:
+def as_plain(value: Any) -> Any:
+    """A value of NumPy as JSON knows it; else its text."""
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
 
 

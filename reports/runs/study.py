@@ -15,7 +15,6 @@ from pyarrow.csv import ConvertOptions, ParseOptions, read_csv
 
 from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import contacts
 from crossbody.cases.scene_plain import plain
 from crossbody.reports.judging.comparison import Entry, judged
@@ -25,7 +24,7 @@ from crossbody.reports.measuring.truth import TRUTH, Truth
 from crossbody.reports.metrics.position import scale_of
 from crossbody.reports.runs import files
 from crossbody.reports.runs.jobs import CaseResult
-from crossbody.reports.runs.store import Trace, save
+from crossbody.reports.runs.store import Trace, as_plain, save
 from crossbody.reports.runs.thin import keep
 from crossbody.reports.voice import finite
 
@@ -65,7 +64,7 @@ def write_case(made: Path, result: CaseResult, command: str) -> list[Row]:
     """Write the verdicts, audit and motions of one case into a folder of their own; the verdicts."""
     judged = judge([result], {result.case.label: command})
     told = {"verdicts": judged, "audit": _audit([result])}
-    (made / CASE).write_text(json.dumps(told, default=_plain), encoding="utf-8")
+    (made / CASE).write_text(json.dumps(told, default=as_plain), encoding="utf-8")
     _save_traces(made, traces(result))
     return judged
 
@@ -89,10 +88,6 @@ def _read_case(part: Path) -> dict[str, list[dict[str, Any]]]:
         return {name: [dict(row) for row in told[name]] for name in ("verdicts", "audit")}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise OutputError(f"{part} is no part of a run; remove {part.parent}.") from None
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
 
 
 def _save_traces(out: Path, traces: Sequence[Trace]) -> None:
@@ -152,13 +147,11 @@ def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
         "coordinates": [{"name": c.name, "unit": c.unit} for c in case.coordinates],
         "contacts": list(case.contacts), "parameters": dict(case.parameters), "units": dict(case.units),
     }  # fmt: skip
-    return found if case.scene is None or not case.general else found | {"scene": plain(_drawn(case.scene))}
-
-
-def _drawn(scene: Scene) -> Scene:
-    """Return what a picture of a scene needs."""
-    met = tuple(contact.pair for contact in contacts(scene))
-    return scene.replace(pairs=met, actuators=(), pushes=())
+    if case.scene is None or not case.general:
+        return found
+    met = tuple(contact.pair for contact in contacts(case.scene))
+    drawn = case.scene.replace(pairs=met, actuators=(), pushes=())  # what a picture of it needs
+    return found | {"scene": plain(drawn)}
 
 
 def traces(result: CaseResult) -> list[Trace]:

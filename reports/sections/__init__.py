@@ -1,6 +1,7 @@
-"""Studies beside the verdicts of cases: a module here turns the tables of a folder into sections of a page.
+"""Studies beside the verdicts of cases: what turns the tables of a folder into sections of a page.
 
-A module has a docstring whose first line says what it shows, and the public names
+Ours are in `_own`; those of logs, and any of a user's own, are a module each, with a docstring whose first line says
+what it shows, and the public names
 
     TITLE                           heading of its page and of the link to it
     sections(out)                   tuple of `Section`; empty where the folder has no such data
@@ -16,45 +17,35 @@ from __future__ import annotations
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import Protocol, cast
+from typing import cast
 
 from crossbody.cases.registry import Registry
 from crossbody.reports.figures.section import Section
+from crossbody.reports.sections._own import STUDIES, Study
 
-
-class Study(Protocol):
-    """What every module offers."""
-
-    TITLE: str
-
-    def sections(self, out: Path) -> tuple[Section, ...]:
-        """The sections of a folder's page."""
-        ...
-
-
+OWN = tuple(STUDIES)
+"""Names that no plug-in can take."""
 _REGISTRY = Registry("study", __name__)
 
 
 def names(out: Path | None = None) -> tuple[str, ...]:
-    """Names of all studies; imports none of them.
+    """Names of all studies.
 
     Args:
         out: leave out those of ours that have no table in this folder: its name begins with that of its study.
     """
-    known = _REGISTRY.names()
-    if out is None:
-        return known
-    own = _REGISTRY.own()
-    return tuple(name for name in known if name not in own or any(out.glob(f"{name}*.json")))
+    known = {*STUDIES, *_REGISTRY.names()}
+    absent = [name for name in (*STUDIES, *_REGISTRY.own()) if out is not None and not any(out.glob(f"{name}*.json"))]
+    return tuple(sorted(known.difference(absent)))
 
 
 def load(name: str) -> Study:
-    """Import a study.
+    """Return a study.
 
     Raises:
         UnknownName: if there is no such study; the message lists the names.
     """
-    return cast("Study", _REGISTRY.load(name))
+    return STUDIES[name] if name in STUDIES else cast("Study", _REGISTRY.load(name))
 
 
 def shown(name: str, out: Path) -> tuple[Section, ...]:

@@ -1,6 +1,6 @@
-"""Stress suites: which scenes are run, as data; a module here is a suite, found by its name.
+"""Stress suites: which scenes are run, as data. Ours are a table; one of a user's own is a file.
 
-A suite is a module with a docstring whose first line says what it stresses, and one public name, `SUITE`.
+Such a file has a docstring whose first line says what it stresses, and one public name, `SUITE`.
 """
 
 from __future__ import annotations
@@ -9,26 +9,28 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from crossbody.cases import InvalidValue, SceneError
+from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases.own_file import from_file
 from crossbody.cases.registry import Registry
+from crossbody.reports.suites._contract import Suite
+from crossbody.reports.suites._own import SUITES
 
 if TYPE_CHECKING:
     from crossbody.cases import Value
-    from crossbody.reports.suites._contract import Suite
 
-
+OWN = tuple(SUITES)
+"""Names that no plug-in can take."""
 _REGISTRY = Registry("suite", __name__)
 
 
 def names() -> tuple[str, ...]:
-    """Names of all suites; imports none of them."""
-    return _REGISTRY.names()
+    """Names of all suites."""
+    return tuple(sorted({*SUITES, *_REGISTRY.names()}))
 
 
 def summary(name: str) -> str:
-    """What a suite stresses, in one line; imports nothing."""
-    return _REGISTRY.summary(name)
+    """What a suite stresses, in one line."""
+    return SUITES[name].about if name in SUITES else _REGISTRY.summary(name)
 
 
 def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
@@ -44,7 +46,6 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
         SceneError: if a file defines neither SUITE nor a case.
     """
     from crossbody.cases.files.reading import SUFFIXES
-    from crossbody.reports.suites._contract import Suite
 
     own = name.endswith(".py")
     module = from_file("suite", Path(name), names()) if own else None
@@ -54,6 +55,10 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
         return suite_of(name, fixed or {})
     if fixed:
         raise InvalidValue(f"The suite {name!r} has parameters of its own: {', '.join(fixed)} cannot be given.")
+    if name in SUITES:
+        return SUITES[name]
+    if module is None and name not in _REGISTRY.names():
+        raise UnknownName("suite", name, names())
     module = module or _REGISTRY.load(name)
     found = getattr(module, "SUITE", None)
     if not isinstance(found, Suite):

@@ -4,41 +4,42 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from crossbody.cases import InvalidValue, Value
+from crossbody.cases import InvalidValue
+
+if TYPE_CHECKING:
+    from crossbody.cases import Value
 
 
-def _ordered(what: str, low: float, high: float) -> None:
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise InvalidValue(f"{what}({low:g}, {high:g}) is empty; its low end must be finite and below its high end.")
-
-
-@dataclass(frozen=True, slots=True)
-class Linear:
-    """A number between low and high, evenly."""
+@dataclass(frozen=True)
+class _Range:
+    """A number between low and high."""
 
     low: float
     high: float
 
     def __post_init__(self) -> None:
         """Check the ends."""
-        _ordered("Linear", self.low, self.high)
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            what = f"{type(self).__name__}({self.low:g}, {self.high:g})"
+            raise InvalidValue(f"{what} is empty; its low end must be finite and below its high end.")
+
+
+class Linear(_Range):
+    """A number between low and high, evenly."""
 
     def at(self, u: float) -> Value:
         """The value at u in [0, 1)."""
         return self.low + (self.high - self.low) * u
 
 
-@dataclass(frozen=True, slots=True)
-class Log:
+class Log(_Range):
     """A number between low and high, even in its logarithm."""
-
-    low: float
-    high: float
 
     def __post_init__(self) -> None:
         """Check the ends."""
-        _ordered("Log", self.low, self.high)
+        super().__post_init__()
         if self.low <= 0.0:
             raise InvalidValue(f"Log({self.low:g}, {self.high:g}) begins at or below 0; use Linear.")
 
@@ -47,16 +48,12 @@ class Log:
         return float(self.low * (self.high / self.low) ** u)
 
 
-@dataclass(frozen=True, slots=True)
-class Whole:
+@dataclass(frozen=True)
+class Whole(_Range):
     """A whole number from low to high, both included."""
 
     low: int
     high: int
-
-    def __post_init__(self) -> None:
-        """Check the ends."""
-        _ordered("Whole", self.low, self.high)
 
     def at(self, u: float) -> Value:
         """The value at u in [0, 1)."""

@@ -6,14 +6,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
+from typing import TYPE_CHECKING, TypeAlias
 
-import numpy as np
-
-from crossbody.cases import InvalidValue, Value
+from crossbody.cases import InvalidValue
 from crossbody.reports.suites._axis import Axis, Levels
 
-Drawn = Mapping[str, Value]
-Scene = Callable[[Drawn, np.random.Generator], Drawn]
+if TYPE_CHECKING:
+    import numpy as np
+
+    from crossbody.cases import Value
+
+Drawn: TypeAlias = "Mapping[str, Value]"
+Scene: TypeAlias = "Callable[[Drawn, np.random.Generator], Drawn]"
 
 
 def as_drawn(drawn: Drawn, _rng: np.random.Generator) -> Drawn:
@@ -115,11 +119,13 @@ class Suite:
         families: they share the runs, each by its own `share`.
         engines: what runs it unless the user says otherwise; the first makes every run, the others a share.
         runs: of the first engine if nothing is said; also its share in a number for several suites: cheap scenes more.
+        about: what it stresses, in one line; of a suite in a file of its own that is the first of its docstring.
     """
 
     families: tuple[Family, ...]
     engines: tuple[str, ...] = ("reference:compiled", "mujoco:matched", "pinocchio:law")
     runs: int = 200
+    about: str = ""
 
     def __post_init__(self) -> None:
         """Check that something is run.

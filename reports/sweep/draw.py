@@ -74,7 +74,8 @@ def scenes(name: str, family: Family, place: int, runs: int, seed: int) -> Itera
     order, scramble, runs_root = root.spawn(3)
     total = runs if family.axes else min(runs, family.points)
     points = np.random.default_rng(order).permutation(family.points)
-    uniform = _uniform(len(family.axes), total, scramble)
+    halton = qmc.Halton(max(len(family.axes), 1), rng=np.random.default_rng(scramble)).random(total)
+    uniform = halton[:, : len(family.axes)]
     for i, child in enumerate(runs_root.spawn(total)):
         rng = np.random.default_rng(child)
         drawn = {key: axis.at(float(u)) for (key, axis), u in zip(family.axes.items(), uniform[i], strict=True)}
@@ -82,12 +83,6 @@ def scenes(name: str, family: Family, place: int, runs: int, seed: int) -> Itera
         parameters = {**family.fixed, **family.scene({**family.fixed, **drawn, **grid}, rng)}
         second = family.second > 0 and i % family.second == 0
         yield Scene(draw=i, parameters=parameters, rung=rung, seed=int(child.generate_state(1)[0]), second=second)
-
-
-def _uniform(d: int, n: int, seed: np.random.SeedSequence) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    if d == 0:
-        return np.zeros((n, 0))
-    return np.asarray(qmc.Halton(d, rng=np.random.default_rng(seed)).random(n))
 
 
 def _grid(family: Family, point: int) -> tuple[dict[str, Value], int]:
@@ -124,14 +119,11 @@ def specs(
         for place, family in enumerate(suite.families):
             drawn = list(scenes(name, family, place, -(-own * family.share // parts), seed))
             for i, pick in enumerate(engines[name]):
-                kept = _share(family, len(drawn)) if share and i > 0 else len(drawn)
+                # Of a ladder the others make all: that is the stability map.
+                least = max(family.points if family.ladder is not None else LEAST, -(-len(drawn) // SHARE))
+                kept = min(len(drawn), least) if share and i > 0 else len(drawn)
                 found += [_spec(name, family, place, scene, pick, next(number)) for scene in drawn[:kept]]
     return found
-
-
-def _share(family: Family, runs: int) -> int:
-    """How many of the runs the other engines make: all of a ladder, because that is the stability map."""
-    return min(runs, max(family.points if family.ladder is not None else LEAST, -(-runs // SHARE)))
 
 
 def _spec(suite: str, family: Family, place: int, scene: Scene, pick: Pick, index: int) -> Spec:

@@ -13,11 +13,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from crossbody.reports.testing._agreement import assert_agrees
     from crossbody.reports.testing._baseline import Baseline
-    from crossbody.reports.testing._energy import assert_energy
+    from crossbody.reports.testing._motions import assert_agrees, assert_energy
 
-_LAZY = {"assert_agrees": "_agreement", "assert_energy": "_energy", "Baseline": "_baseline"}
+_LAZY = {"assert_agrees": "_motions", "assert_energy": "_motions", "Baseline": "_baseline"}
 
 __all__ = ["Baseline", "assert_agrees", "assert_energy"]
 

@@ -15,8 +15,7 @@ from crossbody.engines import importers
 from crossbody.reports.importers.audit import audited
 from crossbody.reports.importers.compare import NONE, OK, QUANTITIES, UNSUPPORTED, Row
 from crossbody.reports.importers.told import sentence
-from crossbody.reports.testing import plugin
-from crossbody.reports.testing._items import Outside
+from crossbody.reports.testing._items import Judged, Outside
 
 
 @dataclass(frozen=True)
@@ -60,13 +59,12 @@ class Audits(pytest.Collector):
                     yield OneQuantity.from_parent(self, name=name, file=file, engine=engine, quantity=quantity)
 
 
-class OneQuantity(pytest.Item):
+class OneQuantity(Judged):
     """One quantity that one importer makes of a file."""
 
     def __init__(self, *, file: Audited, engine: str, quantity: str, **more: Any) -> None:
-        super().__init__(nodeid=f"{more['parent'].nodeid}::{more['name']}", **more)
+        super().__init__(**more)
         self.file, self.engine, self.quantity = file, engine, quantity
-        self.add_marker(plugin.MARKER)
 
     def runtest(self) -> None:
         """Pass where it is what the file says; what the engine says that it leaves out is an xfail."""
@@ -81,13 +79,3 @@ class OneQuantity(pytest.Item):
             pytest.xfail(sentence(row))
         if row.verdict != OK:
             raise Outside(f"{sentence(row)}\ncrossbody audit {self.file.path} -e {self.engine} --explain")
-
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any, **more: Any) -> Any:
-        """A difference, or a file that is none, is told in its own sentence."""
-        if isinstance(excinfo.value, (Outside, CrossbodyError)):
-            return str(excinfo.value)
-        return super().repr_failure(excinfo, *args, **more)
-
-    def reportinfo(self) -> tuple[str, None, str]:
-        """Where the test stands and what it is called."""
-        return plugin.MARKER, None, self.nodeid

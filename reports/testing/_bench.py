@@ -66,7 +66,10 @@ class Bench:
 
     def entry(self, scene: Scene, pick: Pick) -> Entry:
         """The run, with the audit and the finer run beside it."""
-        return self._kept(("entry", scene, pick), lambda: self._run(scene, pick))
+        return self._kept(
+            ("entry", scene, pick),
+            lambda: jobs.run_case(self.case(scene), [pick], truth=self.truth(scene)).entries[0],
+        )
 
     def verdicts(self, scene: Scene, pick: Pick) -> Mapping[str, Verdict]:
         """Metric -> verdict; "run" alone, with its sentence, where there is no run."""
@@ -78,9 +81,6 @@ class Bench:
                 rows += truth_row(*asked)
             self._verdicts[scene, pick] = {row.metric: row for row in rows}
         return self._verdicts[scene, pick]
-
-    def _run(self, scene: Scene, pick: Pick) -> Entry:
-        return jobs.run_case(self.case(scene), [pick], truth=self.truth(scene)).entries[0]
 
     def _kept(self, key: Hashable, make: Callable[[], _Made]) -> _Made:
         if key not in self._recent:

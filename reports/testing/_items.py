@@ -25,6 +25,26 @@ class Outside(Exception):  # noqa: N818 - a verdict, no error
     """A number that is outside its limit."""
 
 
+class Judged(pytest.Item):
+    """One test that crossbody makes; what is off is told in its own sentence."""
+
+    where = plugin.MARKER
+
+    def __init__(self, **more: Any) -> None:
+        super().__init__(nodeid=f"{more['parent'].nodeid}::{more['name']}", **more)
+        self.add_marker(plugin.MARKER)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any, **more: Any) -> Any:
+        """A verdict, or wrong use, is told in its own sentence; anything else with its traceback."""
+        if isinstance(excinfo.value, (Outside, CrossbodyError)):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, *args, **more)
+
+    def reportinfo(self) -> tuple[str, None, str]:
+        """Where the test stands and what it is called."""
+        return self.where, None, self.nodeid
+
+
 class Cases(pytest.Collector):
     """All cases asked for."""
 
@@ -68,13 +88,13 @@ def judged(case: Case, pick: Pick) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*ALWAYS, *(claim.metric for claim in case.claims), *limited)))
 
 
-class OneLimit(pytest.Item):
+class OneLimit(Judged):
     """One number of one run against its limit."""
 
     def __init__(self, *, scene: Scene, named: Named, metric: str, **more: Any) -> None:
-        super().__init__(nodeid=f"{more['parent'].nodeid}::{more['name']}", **more)
+        super().__init__(**more)
         self.scene, self.pick, self.metric = scene, named.pick, metric
-        self.add_marker(plugin.MARKER)
+        self.where = scene.name if scene.name.endswith(".py") else plugin.MARKER
 
     def runtest(self) -> None:
         """Judge; within passes, a known deviation is an xfail, what there is not is a skip."""
@@ -97,16 +117,6 @@ class OneLimit(pytest.Item):
         if rows.get("audit") is not None and rows["audit"].verdict == Word.OUTSIDE:
             pytest.skip(rows["audit"].why)
         pytest.skip(f"{self.metric}: this run has no such number.")
-
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any, **more: Any) -> Any:
-        """A verdict, or wrong use, is told in its own sentence; anything else with its traceback."""
-        if isinstance(excinfo.value, (Outside, CrossbodyError)):
-            return str(excinfo.value)
-        return super().repr_failure(excinfo, *args, **more)
-
-    def reportinfo(self) -> tuple[str, None, str]:
-        """Where the test stands and what it is called."""
-        return self.scene.name if self.scene.name.endswith(".py") else plugin.MARKER, None, self.nodeid
 
 
 def _number(row: Verdict) -> str:

@@ -199,10 +199,10 @@ def test_a_chunk_is_decoded_once(kind: str, tmp_path: Path, monkeypatch: pytest.
 
 def test_chunks_of_messages_are_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mcap")
-    from crossbody.hw.formats import _unfold
+    from crossbody.hw.formats import _bounded
 
     count: list[int] = []
-    monkeypatch.setitem(_unfold.UNFOLD, "zstd", lambda raw, most, was=_unfold.zstd: count.append(1) or was(raw, most))
+    monkeypatch.setitem(_bounded.UNFOLD, "zstd", lambda raw, most, was=_bounded.zstd: count.append(1) or was(raw, most))
     path = log_files.write("mcap", tmp_path, log_files.table(3000))
     hw.survey(path)
     import mcap.reader

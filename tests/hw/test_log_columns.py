@@ -14,8 +14,7 @@ from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import ColumnMapError, InvalidValue
-from crossbody.hw.reading.join import join
-from crossbody.hw.reading.rows import Rows
+from crossbody.hw.reading.rows import Rows, join
 from crossbody.hw.reading.units import to_si
 
 GOOD = """[time]

@@ -98,7 +98,7 @@ def test_a_synthetic_log_is_called_so_everywhere(tmp_path: Path, capsys: pytest.
     rows = json.loads((out / "verdicts.json").read_text(encoding="utf-8"))["rows"]
     assert {row["tier"] for row in rows} == {"SYNTHETIC, no measurement"}
     assert all("synthetic" in row["variant"] for row in rows)
-    assert "SYNTHETIC" in (out / "replay.html").read_text(encoding="utf-8")
+    assert "SYNTHETIC" in (out / "index.html").read_text(encoding="utf-8")
 
 
 @needs_pendulum

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from crossbody import hw
 from crossbody.cases import SceneError
 from crossbody.hw.replaying import measures
-from crossbody.hw.replaying.rank import conditions
+from crossbody.hw.replaying.inverse import conditions
 from crossbody.hw.windows.lift import closed_by
 from crossbody.hw.windows.rates import rates_by_fit
 from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way

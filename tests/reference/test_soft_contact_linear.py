@@ -167,7 +167,7 @@ def test_linear_stability_does_not_show_a_stable_approach():
 
 
 def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
-    from crossbody.reports.commands.bode import bode as command
+    from crossbody.reports.commands.analyse import bode as command
 
     out = tmp_path / "out"
     assert command("soft_contact", ["ks=50"], out, "crossbody bode soft_contact") == 0

@@ -19,7 +19,8 @@ METRIC = (
 )
 FILES = {
     "mine.py": ENGINE, "ending.py": METRIC, "raises.py": "x = 1\ny = x / 0\n", "nothing.py": "UNIT = 'm'\n",
-    "mujoco.py": ENGINE, "position.py": METRIC, "lacks.py": "import no_such_package\n", "ends.py": "raise SystemExit",
+    "mujoco.py": ENGINE, "position.py": METRIC, "balls.py": "SUITE = 1",
+    "lacks.py": "import no_such_package\n", "ends.py": "raise SystemExit",
     "two words.py": ENGINE, "text.txt": "", "other/mine.py": ENGINE,
 }  # fmt: skip
 
@@ -55,6 +56,7 @@ def ended(*words: str) -> int:
         ("nothing.py", "defines none. Public names of a plug-in, by its kind: case: PARAMETERS, VARIANTS, build; "),
         ("mujoco.py", "The engine 'mujoco' is there already: rename the plug-in "),
         ("position.py", "The metric 'position' is there already: rename the plug-in "),
+        ("balls.py", "The suite 'balls' is there already: rename the plug-in "),
         ("other/mine.py", "have one name: rename one of the files."),
     ],
 )  # fmt: skip

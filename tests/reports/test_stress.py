@@ -592,7 +592,7 @@ def test_the_map_has_a_cell_for_every_stiffness_and_rung_with_the_worst_of_each(
 
 def test_a_map_of_engines_that_fail_has_crosses_without_a_colour(tmp_path: Path) -> None:
     """As it is read back from the folder, where an error that is not known is none."""
-    from crossbody.reports.sweep.figure import stress_map
+    from crossbody.reports.maps.figure import stress_map
 
     cells = pd.DataFrame(
         [("mujoco", "matched", "dt", 1e-3, a0, 4, finished, error, math.nan, "diverged 2")
@@ -609,7 +609,7 @@ def test_a_map_of_engines_that_fail_has_crosses_without_a_colour(tmp_path: Path)
 
 
 def test_the_colour_of_an_error_ends_where_the_scale_does() -> None:
-    from crossbody.reports.sweep.figure import BEST, WORST, stress_map
+    from crossbody.reports.maps.figure import BEST, WORST, stress_map
 
     cells = pd.DataFrame(
         [("reference", "compiled", "rtol", 1e-9, a0, 4, 4, error, 0.0, "")

@@ -317,7 +317,7 @@ def cluster() -> Iterator[Any]:
 def test_a_worker_killed_in_a_cluster_loses_no_result(cluster: Any, tmp_path: Path) -> None:
     specs = plan(Ask(names=("speed",), runs=800, wanted=("reference:compiled",)))
     stores = {name: Store(tmp_path / name, identity(specs, 20, {"seed": 0})) for name in ("here", "there")}
-    sweep(stores["here"], specs, 20, Pool(count=1), quiet=True)
+    sweep(stores["here"], specs, 20, Pool(count=1))
     client = pools.connect(cluster.scheduler_address)
     pids = list(client.run(os.getpid).values())
     struck = False

@@ -1,9 +1,10 @@
-"""Whether two motions are the same, told by the first instant at which they are not."""
+"""Assertions about motions, each told by the first instant that offends: two are the same, one keeps its account."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +14,53 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import Truth, from_run
-from crossbody.reports.testing._offence import Signal, fail_if_any
 
 if TYPE_CHECKING:
     from crossbody.engines import Run
 
 SIGNALS = ("q", "v", "gap", "lam", "energy")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signal:
+    """One signal beside what it should be.
+
+    Attributes:
+        name: for the sentence, with its index.
+        t (n,): instants, s.
+        found, wanted (n,): values.
+        allowed: largest difference that is fine, in the signal's own unit.
+        basis: where `allowed` comes from, in words.
+    """
+
+    name: str
+    t: Floats
+    found: Floats
+    wanted: Floats
+    allowed: float
+    basis: str
+
+    def offence(self) -> str:
+        """The sentence; empty where the signal stays within. What is NaN on one side only is off."""
+        off = np.abs(self.found - self.wanted)
+        both = np.isnan(self.found) & np.isnan(self.wanted)
+        bad = ~(off <= self.allowed) & ~both
+        if not bad.any():
+            return ""
+        first, worst = int(np.argmax(bad)), int(np.argmax(np.where(bad, np.where(np.isnan(off), np.inf, off), -1.0)))
+        return (
+            f"{self.name} is off first at t = {self.t[first]:.9g} s: {self.found[first]:.9g} where "
+            f"{self.wanted[first]:.9g} is expected, a difference of {off[first]:.3g} where {self.allowed:.3g} is "
+            f"allowed ({self.basis}); the worst is {off[worst]:.3g} at t = {self.t[worst]:.9g} s, and "
+            f"{int(bad.sum())} of {len(bad)} samples are off."
+        )
+
+
+def fail_if_any(sentences: list[str]) -> None:
+    """Raise AssertionError with all sentences that are not empty."""
+    told = [text for text in sentences if text]
+    if told:
+        raise AssertionError("\n".join(told))
 
 
 def assert_agrees(
@@ -109,3 +151,42 @@ def _signals(run: Trajectory, truth: Truth, of: Sequence[str], rtol: float, atol
                 allowed=atol + rtol * float(np.nan_to_num(largest[i])),
                 basis=f"rtol {rtol:g} of {largest[i]:.3g}" + (f", atol {atol:g}" if atol else ""),
             )  # fmt: skip
+
+
+def assert_energy(run: Trajectory | Run, *, rtol: float = 1e-6, conserved: bool = False) -> None:
+    """Assert that the integrator neither made nor lost energy.
+
+    E(t) - E(0) must be the work of the inputs, less what damping took, plus the work of every multiplier: what the
+    contact law itself makes is no error of the integrator.
+
+    Args:
+        run: what is tested; a prepared run of an engine is run.
+        rtol: of the largest kinetic energy.
+        conserved: hold E(t) against E(0) alone, for a scene in which nothing does work; needs no account.
+
+    Raises:
+        AssertionError: naming the first offending instant, the energy there, and what is allowed.
+        InvalidValue: for a run without an account, unless `conserved`.
+    """
+    motion = _motion(run)
+    change = motion.total_energy - motion.total_energy[0]
+    wanted = np.zeros_like(change) if conserved else _account(motion)
+    largest = float(np.max(motion.energy[:, 0], initial=0.0))
+    word = "E(t) - E(0) [J]" if conserved else "E(t) - E(0) against the account of inputs, damping and contacts [J]"
+    signal = Signal(
+        name=word, t=motion.t, found=change, wanted=wanted, allowed=rtol * largest,
+        basis=f"rtol {rtol:g} of the largest kinetic energy, {largest:.3g} J",
+    )  # fmt: skip
+    fail_if_any([signal.offence()])
+
+
+def _account(run: Trajectory) -> Floats:
+    """Energy that everything outside the integrator has brought since the start (n,), J."""
+    if run.ledger is None:
+        raise InvalidValue(
+            "The run keeps no energy account: prepare it with ledger=True where the engine has that setting, or hold "
+            "it against its start with conserved=True."
+        )
+    book: Floats = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
+    brought: Floats = book - book[0]
+    return brought

@@ -1,18 +1,32 @@
-"""Arrays of one file as groups: those of equal length belong together."""
+"""What readers of tables share: names and groups of columns, blocks of rows; arrays of equal length belong together."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-import numpy as np
+import msgspec
 from numpy.typing import NDArray
 
+from crossbody.cases import LogFormatError
 from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group
-from crossbody.hw.formats._names import WIDEST, elements
+from crossbody.hw.guard import parsing
 
-HINT = "save plain arrays or structs instead (a timetable: its columns; an object: struct(object))"  # of MATLAB
+HEADER_UNIT = re.compile(r"[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*?)\s*[\])]\s*$")
+WIDEST = 64  # elements of a vector that are columns; wider ones are pictures or clouds
+
+
+class NoOptions(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Nothing to choose."""
+
+
+def header_unit(name: str) -> str:
+    """The unit in a header like `angle [deg]` or `force (N)`; empty if there is none."""
+    found = HEADER_UNIT.search(name)
+    return found.group(1) if found else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +56,7 @@ class Table:
     @property
     def columns(self) -> tuple[Column, ...]:
         """The columns that it gives."""
-        names = [self.name] if self.width is None else elements(self.name, self.width)
+        names = [self.name] if self.width is None else [f"{self.name}[{i}]" for i in range(self.width)]
         return tuple(Column(name=name, type=self.type, unit=self.unit) for name in names)
 
 
@@ -85,14 +99,27 @@ def spans(rows: int) -> Iterator[tuple[int, int]]:
     return ((a, min(a + BLOCK_ROWS, rows)) for a in range(0, rows, BLOCK_ROWS))
 
 
-def pick(array: NDArray[Any], table: Table, element: int | None, start: int, stop: int) -> NDArray[Any]:
-    """Rows of one column out of a whole array in memory."""
-    if array.ndim == 2:
-        array = np.moveaxis(array, table.axis, 0)[:, element or 0]
-    return array[start:stop]
+def sliced(
+    path: Path, what: str, group: Group, columns: Sequence[str], get: Callable[[str, int, int], NDArray[Any]]
+) -> Iterator[Block]:
+    """Blocks whose columns are read one by one.
 
+    Args:
+        path: the log.
+        what: what its parser takes it for.
+        group: whose rows.
+        columns: the wanted ones.
+        get: (name, start, stop) -> those rows of a column.
 
-def cut(arrays: dict[str, tuple[NDArray[Any], Table, int | None]], rows: int) -> Iterator[Block]:
-    """Blocks out of whole arrays in memory."""
-    for start, stop in spans(rows):
-        yield {name: pick(array, table, i, start, stop) for name, (array, table, i) in arrays.items()}
+    Raises:
+        LogFormatError: for what the parser raises, or a column that ends before its rows do.
+    """
+    for start, stop in spans(group.rows or 0):
+        block: Block = {}
+        for name in columns:
+            with parsing(path, what, start, name):
+                block[name] = get(name, start, stop)
+            if len(block[name]) != stop - start:
+                at = start + len(block[name])
+                raise LogFormatError(path, f"ends before its {group.rows} rows: cut off?", at, name)
+        yield block

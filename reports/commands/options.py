@@ -1,0 +1,144 @@
+"""Options that several commands have; nothing heavy is imported to read a command line."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+_Work = TypeVar("_Work", bound=Callable[..., int])
+PATH = click.Path(path_type=Path)
+
+
+def command() -> str:
+    """What was typed."""
+    return shlex.join(["crossbody", *sys.argv[1:]])
+
+
+def together(command: _Work, *options: Any) -> _Work:
+    """Give a command several options, which its help shows in this order."""
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+class _Positive(click.FloatRange):
+    """A range in which NaN is no number."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read a number."""
+        found = super().convert(value, param, ctx)
+        if math.isnan(found):
+            self.fail(f"{value} is no number.", param, ctx)
+        return found
+
+
+ABOVE_0 = _Positive(0.0, min_open=True)
+
+
+def time_limit(text: str, seconds: float = 3660.0) -> Callable[[_Work], _Work]:
+    """--time-limit, as `limit`, with what happens then."""
+    return click.option(
+        "--time-limit", "limit", type=ABOVE_0, default=seconds, show_default=True, metavar="S",
+        help=text,
+    )  # fmt: skip
+
+
+def out(folder: str = "out") -> Callable[[_Work], _Work]:
+    """--out, with the folder that is written if nothing is said."""
+    return click.option("--out", type=PATH, default=Path(folder), show_default=True, metavar="DIR")
+
+
+wanted = click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+readers = click.option(
+    "--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given."
+)
+variant = click.option(
+    "--variant", "--key", metavar="V", help="Variant of the case, keyframe of a robot's file; all if not given."
+)
+against = click.option(
+    "--against", type=PATH, metavar="BASE", help="Folder of an earlier run: the index says what has changed."
+)
+others = click.option(
+    "--with", "others", type=PATH, metavar="DIR", multiple=True,
+    help="Folder of a study (bench, stress, gapmap, ...): its pages stand beside; repeatable.",
+)  # fmt: skip
+reader_limit = time_limit("A reader that has not come back by then is ended, s.", 20.0)
+engine_limit = time_limit("An engine that has not come back from a case by then is ended, s; compilation counts.")
+memory = click.option(
+    "--memory", type=click.IntRange(1), default=1000, show_default=True, metavar="MB",
+    help="That reading LOG may take over its own size; a file that unfolds to more is refused.",
+)  # fmt: skip
+
+
+def parameters(command: _Work) -> _Work:
+    """Options that give parameters of the case; the command takes all of them as `pairs`, texts K=V."""
+
+    @wraps(command)
+    def gathered(
+        *given: Any, pairs: tuple[str, ...], law: str | None, push: tuple[tuple[Any, ...], ...], **asked: Any
+    ) -> int:
+        named = {name: asked.pop(name) for name in ("t_end", "ctrl", "control", "tick", "without")}
+        if named["tick"] is not None and named["control"] is None and not any(p.startswith("control=") for p in pairs):
+            raise click.UsageError(
+                "--tick is the time between two calls of a controller, and none is given: --control."
+            )
+        named |= {"push": "; ".join(" ".join(map(str, one)) for one in push) or None, "rank": asked.pop("rank")}
+        own = [f"{name}={value}" for name, value in named.items() if value is not None]
+        return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **asked)
+
+    taking: Any = gathered
+    found: _Work = together(
+        taking,
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
+        click.option("--t-end", type=float, metavar="S", help="Horizon, s; as --set t_end=S."),
+        click.option("--law", metavar="a0=,a1=", help="Constants of the rows; as --set for each of them."),
+        click.option("--ctrl", metavar="FILE", help="Of a robot's file: table of controls (CSV, Parquet, NPZ)."),
+        click.option(
+            "--control", metavar="FILE.py:NAME",
+            help="Of a robot's file: a callable (t, q, v) -> u of your own, or a class of such.",
+        ),
+        click.option("--tick", type=float, metavar="S", help="Between two calls of it, s; 1e-3 if not given."),
+        click.option(
+            "--push", type=(str, *(float,) * 5), multiple=True, metavar="BODY FX FY FZ T0 T1",
+            help="Of a robot's file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
+        ),
+        click.option("--without", metavar="PARTS", help="Of a robot's file: parts to leave out of every engine."),
+        click.option("--rank", type=int, metavar="N", help="Of a robot's file: how many rows of its loops hold."),
+    )  # fmt: skip
+    return found
+
+
+def cases(command: _Work) -> _Work:
+    """Options that say what is run."""
+    return together(command, click.argument("names", metavar="[CASE]...", nargs=-1), wanted, variant, parameters, out())
+
+
+def replayed(command: _Work) -> _Work:
+    """Options that say which log is replayed on which model; results go to a folder of the command's own."""
+    return together(
+        command,
+        click.argument("path", metavar="LOG", type=PATH),
+        click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them."),
+        click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
+        click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart."),
+        click.option(
+            "--repair", metavar="R", multiple=True, help="fill_dropped, drop_duplicates or unwrap; repeatable."
+        ),
+        memory,
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the model; repeatable."),
+        click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
+        click.option("--horizon", type=float, metavar="S", help="Length of a window, s, if not to the next restart."),
+        click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of what was measured, s."),
+        click.option(
+            "--limit", "limits", metavar="NAME=V", multiple=True,
+            help="Limit on a metric, for example fit=90 or rmse_th1=0.01; repeatable.",
+        ),
+        out(f"out/{command.__name__}"),
+    )  # fmt: skip

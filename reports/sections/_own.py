@@ -1,0 +1,213 @@
+"""Our studies but those of logs: which of their tables a page shows, under which words, with which figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from crossbody.reports.figures.section import Column, Kind, Plot, Section, Table, columns, records
+from crossbody.reports.runs.study import read_json
+from crossbody.reports.sections import _words as words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ANALYSIS = "analysis-"
+"""How the tables of an analysis begin."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Study:
+    """As a module of a study: see the package.
+
+    Attributes:
+        TITLE: heading of its page and of the link to it.
+        sections: folder -> its sections.
+        CASES: names of those that it is about.
+    """
+
+    TITLE: str
+    sections: Callable[[Path], tuple[Section, ...]]
+    CASES: tuple[str, ...] = ()
+
+
+def _rows(out: Path, stem: str) -> pd.DataFrame:
+    """A table of the folder, with engine and profile in one column `who` too."""
+    import pandas as pd
+
+    rows = pd.DataFrame(read_json(out / f"{stem}.json")["rows"])
+    return rows.assign(who=rows["engine"] + ":" + rows["profile"]) if {"engine", "profile"} <= set(rows) else rows
+
+
+def _has(out: Path, stem: str) -> bool:
+    return (out / f"{stem}.json").is_file()
+
+
+def _table(title: str, shown: Sequence[Column], rows: pd.DataFrame, stem: str, folded: bool = False) -> Table:
+    return Table(title=title, columns=shown, rows=records(rows), file=f"{stem}.csv", folded=folded)
+
+
+def _one(
+    stem: str, heading: str, text: str, table: Callable[[Path], Table], plots: Callable[[Path], Iterable[Plot]]
+) -> Callable[[Path], tuple[Section, ...]]:
+    """One section of one table, where the folder has it."""
+
+    def sections(out: Path) -> tuple[Section, ...]:
+        if not _has(out, stem):
+            return ()
+        return (Section(name=stem, title=heading, text=text, plots=tuple(plots(out)), tables=(table(out),)),)
+
+    return sections
+
+
+def _plain(
+    stem: str, title: str, heading: str, text: str, shown: Sequence[Column]
+) -> Callable[[Path], tuple[Section, ...]]:
+    """One section of one table as it stands."""
+    return _one(stem, heading, text, lambda out: _table(title, shown, _rows(out, stem), stem), lambda _: ())
+
+
+def _analysis(out: Path) -> tuple[Section, ...]:
+    if not _has(out, f"{ANALYSIS}ranks"):
+        return ()
+    from crossbody.reports.analysis import figure as draw
+
+    drawn = {"poles": draw.pole_figure, "locus": draw.locus_figure, "responses": draw.response_figure,
+             "map": draw.map_figure}  # fmt: skip
+    plots = tuple(
+        Plot(name=f"{ANALYSIS}{name}", figure=figure(_rows(out, f"{ANALYSIS}{name}")))
+        for name, figure in drawn.items()
+        if _has(out, f"{ANALYSIS}{name}")
+    )
+    tables = tuple(
+        _table(title, shown, _rows(out, f"{ANALYSIS}{name}"), f"{ANALYSIS}{name}")
+        for title, name, shown in words.ANALYSIS_TABLES
+        if _has(out, f"{ANALYSIS}{name}")
+    )
+    title = STUDIES["analysis"].TITLE
+    return (Section(name="analysis", title=title, text=words.ANALYSIS_TEXT, plots=plots, tables=tables),)
+
+
+def _bode(out: Path) -> Iterator[Plot]:
+    from crossbody.reports.analysis.figure import bode_figure
+
+    yield Plot(name="bode-soft-contact", figure=bode_figure(_rows(out, "bode")))
+
+
+def _growths(out: Path) -> Table:
+    from crossbody.reports.analysis.bode import growths
+
+    return _table("Poles of the soft contact", words.GROWTHS, growths(_rows(out, "poles")), "poles")
+
+
+def _bench(out: Path) -> tuple[Section, ...]:
+    if not _has(out, "bench"):
+        return ()
+    from crossbody.reports.bench.figure import work_precision
+
+    rows, orders = _rows(out, "bench"), _rows(out, "orders")
+    tables = (_table("Observed order", words.ORDERS, orders, "orders"), _table("Timings", words.TIMINGS, rows, "bench"))
+    plots = [
+        Plot(name=f"work-precision-{i}", figure=work_precision(group))
+        for i, (_, group) in enumerate(rows.groupby("case", sort=False))
+    ]
+    return (Section(name="bench", title="Run time against error", text=words.BENCH_TEXT, plots=plots, tables=tables),)
+
+
+def _conformance(out: Path) -> tuple[Section, ...]:
+    if not _has(out, "conformance"):
+        return ()
+    rows = _rows(out, "conformance")
+    engines = list(dict.fromkeys(rows["engine"]))
+    versions = {name: max(own["version"]) for name, own in rows.groupby("engine")}
+    wide = [
+        {"feature": name} | dict(zip(own["engine"], own["verdict"], strict=True))
+        for name, own in rows.groupby("feature", sort=False)
+    ]
+    across = columns(feature="Feature", **{name: (f"{name} {versions[name]}", Kind.VERDICT) for name in engines})
+    off = rows[~rows["verdict"].isin(["ok", "-"])]
+    tables = (
+        Table(title="Features", columns=across, rows=[{name: "" for name in engines} | row for row in wide]),
+        _table("What is not ok", words.DETAILS, off, "conformance", folded=True),
+    )
+    title = STUDIES["conformance"].TITLE
+    return (Section(name="conformance", title=title, text=words.CONFORMANCE_TEXT, tables=tables),)
+
+
+def _gap_lines(out: Path) -> Table:
+    from crossbody.reports.maps.gapmap import summary
+
+    lines = summary(_rows(out, "gapmap"))
+    lines["who"] = lines["engine"] + ":" + lines["profile"]
+    return _table("Gap map, a line an engine", words.GAPS, lines, "gapmap")
+
+
+def _gap_map(out: Path) -> Iterator[Plot]:
+    from crossbody.reports.maps.figure import gap_map
+
+    yield Plot(name="gap-map", figure=gap_map(_rows(out, "gapmap")))
+
+
+def _scenes(out: Path) -> Table:
+    rows = _rows(out, "stability")
+    rows = rows.assign(scene=rows["scene"].replace("", "default"))
+    return _table("Stability map, a line a scene", words.STABILITY, rows, "stability")
+
+
+def _stability(out: Path) -> Iterator[Plot]:
+    from crossbody.reports.maps.figure import stability
+
+    yield Plot(name="stability-map", figure=stability(_rows(out, "stability")))
+
+
+def _stress(out: Path) -> Iterator[Section]:
+    if not _has(out, "stress_summary"):
+        return
+    table = _table("Runs by suite", words.SUITES, _rows(out, "stress_summary"), "stress")
+    yield Section(name="stress", title="Stress runs by suite", text=words.STRESS_TEXT, tables=(table,))
+    if len(cells := _rows(out, "stress_map")):
+        from crossbody.reports.maps.figure import stress_map
+
+        plot = Plot(name="stress-map", figure=stress_map(cells))
+        table = _table("Stability map of the engines", words.CELLS, cells, "stress_map", folded=True)
+        yield Section(name="stress-map", title="Stability map", text=words.MAPPED_TEXT, plots=(plot,), tables=(table,))
+    if len(small := _rows(out, "reproducers")):
+        table = _table("Reproducers", words.FAILED, small, "reproducers")
+        yield Section(name="reproducers", title="Smallest scenes that fail", text=words.SMALL_TEXT, tables=(table,))
+
+
+STUDIES: Mapping[str, Study] = {
+    "analysis": Study(TITLE="Equilibria and linear models", sections=_analysis),
+    "bench": Study(TITLE="Run time", sections=_bench),
+    "bode": Study(
+        TITLE="Frequency responses", CASES=("soft_contact",),
+        sections=_one("bode", "Frequency responses of the soft contact", words.BODE_TEXT, _growths, _bode),
+    ),
+    "conformance": Study(TITLE="Readers of robot files", sections=_conformance),
+    "gapmap": Study(
+        TITLE="Gap map", CASES=("newtons_cradle",),
+        sections=_one("gapmap", "Gap map of Newton's cradle", words.GAPS_TEXT, _gap_lines, _gap_map),
+    ),
+    "headline": Study(
+        TITLE="Lead of the reference",
+        sections=_plain(
+            "headline", "Lead of the reference", "How much faster the reference is", words.HEADLINE_TEXT,
+            words.HEADLINE,
+        ),
+    ),
+    "skip": Study(
+        TITLE="What is skipped",
+        sections=_plain("skip", "What is skipped", "What is skipped", words.SKIP_TEXT, words.RATIOS),
+    ),
+    "stability": Study(
+        TITLE="Stability map", CASES=("ball_maze",),
+        sections=_one("stability", "Stability map of the ball maze", words.STABILITY_TEXT, _scenes, _stability),
+    ),
+    "stress": Study(TITLE="Stress", sections=lambda out: tuple(_stress(out))),
+    "throughput": Study(
+        TITLE="Throughput",
+        sections=_plain("throughput", "Throughput", "Throughput", words.THROUGHPUT_TEXT, words.RATIOS),
+    ),
+}  # fmt: skip
