@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,9 +48,10 @@ def features() -> list[Feature]:
             ".//joint[@armature]", "Armature belongs to the joint.", about=("armature",)),
         *(written(f"{name} of an actuator",
             mjcf(tail=f'<actuator><motor name="m" joint="elbow" gear="3" {name}=".1"/></actuator>'),
-            arm(actuators=(Actuator(name="m", joint="elbow", gear=(3.0,), **{name: 0.1}),)), f".//motor[@{name}]",
+            arm(actuators=(replace(Actuator(name="m", joint="elbow", gear=(3.0,)), **change),)), f".//motor[@{name}]",
             f"The {name} of an actuator counts at its joint, times the square of the gear.",
-            "Write it at the joint, times the square of the gear.", (name,)) for name in ("armature", "damping")),
+            "Write it at the joint, times the square of the gear.", (name,))
+            for name, change in (("armature", {"armature": 0.1}), ("damping", {"damping": 0.1}))),
         written("armature of a class", mjcf(head='<default><joint armature=".1"/></default>'),
             arm(shoulder={"armature": 0.1}, elbow={"armature": 0.1}), ".//default/joint[@armature]", AXIS_RULE,
             "Write it at the joint itself.", ("armature",)),
