@@ -50,7 +50,8 @@ class _Robot:
                 "friction": m.dof_frictionloss[dofs],
                 "damping": m.dof_damping[dofs] + self._of_motors(i, m.actuator_damping),
                 "damping v|v|": m.dof_dampingpoly[dofs, 0], "damping v^3": m.dof_dampingpoly[dofs, 1],
-                "stiffness": stiff[0], "stiffness x^2": stiff[1], "stiffness x^3": stiff[2], "rest": m.qpos_spring[here if kind != "ball" else slice(at, at + 4)]
+                "stiffness": stiff[0], "stiffness x^2": stiff[1], "stiffness x^3": stiff[2],
+                "rest": m.qpos_spring[here if kind != "ball" else slice(at, at + 4)]
                 if any(stiff) else (), "lower": bounds[0] if single else -np.inf, "upper": bounds[1],
             }  # fmt: skip
             for key, value in values.items():

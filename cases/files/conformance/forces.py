@@ -31,7 +31,7 @@ def features() -> list[Feature]:
         return written(name, text, arm(elbow=change), finds, rule, rewrite, (about,))
 
     motor = '<actuator><motor name="m" joint="elbow"/></actuator>'
-    turn = np.pi / 180
+    geared, turn = Actuator(name="m", joint="elbow", gear=(3.0,)), np.pi / 180
     return [
         written("gravity", mjcf(head='<option gravity="1 -2 -3"/>'), arm(gravity=(1.0, -2.0, -3.0)),
             "option[@gravity]", "Gravity is a vector of the option.", "Set gravity in the engine."),
@@ -48,10 +48,11 @@ def features() -> list[Feature]:
             ".//joint[@armature]", "Armature belongs to the joint.", about=("armature",)),
         *(written(f"{name} of an actuator",
             mjcf(tail=f'<actuator><motor name="m" joint="elbow" gear="3" {name}=".1"/></actuator>'),
-            arm(actuators=(replace(Actuator(name="m", joint="elbow", gear=(3.0,)), **change),)), f".//motor[@{name}]",
+            arm(actuators=(heavy,)), f".//motor[@{name}]",
             f"The {name} of an actuator counts at its joint, times the square of the gear.",
             "Write it at the joint, times the square of the gear.", (name,))
-            for name, change in (("armature", {"armature": 0.1}), ("damping", {"damping": 0.1}))),
+            for name, heavy in (("armature", replace(geared, armature=0.1)),
+                                ("damping", replace(geared, damping=0.1)))),
         written("armature of a class", mjcf(head='<default><joint armature=".1"/></default>'),
             arm(shoulder={"armature": 0.1}, elbow={"armature": 0.1}), ".//default/joint[@armature]", AXIS_RULE,
             "Write it at the joint itself.", ("armature",)),
