@@ -155,6 +155,7 @@ class Trajectory:
         total: Floats = self.energy.sum(axis=1)
         return total
 
+    @checked_arguments
     def before(self, t: float) -> Trajectory:
         """Return the motion up to an instant t, s, with its events, switches and account until then."""
         kept = self.t <= t

@@ -15,6 +15,8 @@ from crossbody.engines.pinocchio._rows import point_jacobian
 
 ACCURACY, MU, ITERATIONS = 1e-12, 1e-10, 10
 """Of the proximal solver."""
+LEFT = 1e-2
+"""Part of an error that an iteration may leave: ten leave nothing."""
 
 
 class Native:
@@ -75,7 +77,17 @@ class Native:
         return found
 
 
-def apt(scene: Scene, law: Law, rows: int) -> bool:
-    """Return whether points that stay together, under a linear law, are the only rows of a scene."""
+def apt(scene: Scene, law: Law, A: Floats) -> bool:
+    """Return whether points that stay together, under a linear law, are the only rows of a scene, and surely hold.
+
+    An iteration of the proximal solver leaves mu / (mu + s^2) of the error of a row, s^2 its part of H M^-1 H^T over
+    the largest: one that nearly depends on others would be left behind its law.
+
+    Args:
+        scene: with its loops.
+        law: of all its rows.
+        A: H M^-1/2 of the loops (rows, nv).
+    """
     points = bool(scene.loops) and all(loop.type == "connect" for loop in scene.loops)
-    return points and law.linear and rows == 3 * len(scene.loops)
+    only = points and law.linear and len(law.a0) == len(A)
+    return only and MU * float(np.linalg.cond(A)) ** 2 < LEFT

@@ -25,7 +25,6 @@ from crossbody.engines._scale import depths
 from crossbody.engines.pinocchio._contacts import Points, contact_rows
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import (
-    DEPENDENT,
     Joined,
     Spans,
     Strings,
@@ -135,7 +134,7 @@ def build(case: Case, algebra: str) -> Prepared:
         root = np.linalg.cholesky(mass_matrix(model, pinned.data, start[0]))
         A = np.linalg.solve(root, gaps.gradients(start[0])[1][: sum(widths)].T).T
         loose = loose_rows(A, widths, case.rank) if widths else ()
-        if widths and apt(scene, law, len(case.contacts)) and np.linalg.cond(A) * DEPENDENT < 1.0:
+        if loose and not loose[0] and apt(scene, law, A):
             pinned.native = Native(model, placed, scene, law)
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling

@@ -94,7 +94,7 @@ def test_one_pair_of_sliders_swaps_its_speeds_after_half_a_period(name: str) -> 
 def test_momentum_of_a_cradle_is_kept(name: str) -> None:
     case = cases.load("newtons_cradle", "sliders", n=3, masses="1,2,4")
     engine = peer(name)
-    for profile in engine.profiles:
+    for profile in (one for one in engine.profiles if engine.why_not(case, one) is None):
         run = engine.prepare(case, profile).run()
         assert run.outcome.ok, run.message
         np.testing.assert_allclose(run.v @ [1.0, 2.0, 4.0], 1.0, rtol=1e-9)
@@ -145,7 +145,9 @@ def test_no_engine_is_outside_in_a_shipped_case(name: str, case: str, variant: s
     result = jobs.run_case(loaded, jobs.picks([name]), refine=False)
     rows = judged(loaded, result.entries, result.truth, "")
     assert [(row.profile, row.metric, row.why) for row in rows if row.verdict == Word.OUTSIDE] == []
-    assert {entry.profile for entry in result.entries} == {r.profile for r in rows if r.metric == "position"}
+    assert {entry.profile for entry in result.entries if not entry.skipped} == {
+        r.profile for r in rows if r.metric == "position"
+    }
 
 
 def test_a_discrete_plant_loses_energy_that_a_continuous_one_keeps() -> None:

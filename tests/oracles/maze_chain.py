@@ -94,4 +94,4 @@ nothing: assigned, not scaled."""
 
 
 def _pair(solref: tuple[float, float]) -> str:
-    return f"{solref[0]!r} {solref[1]!r}"
+    return f"{float(solref[0])!r} {float(solref[1])!r}"
