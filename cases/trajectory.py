@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -154,19 +154,6 @@ class Trajectory:
         """Kinetic plus potential energy (n,), J."""
         total: Floats = self.energy.sum(axis=1)
         return total
-
-    @checked_arguments
-    def before(self, t: float) -> Trajectory:
-        """Return the motion up to an instant t, s, with its events, switches and account until then."""
-        kept = self.t <= t
-        booked = self.ledger and Ledger(
-            contact=self.ledger.contact[kept], input=self.ledger.input[kept], dissipated=self.ledger.dissipated[kept]
-        )
-        return replace(
-            self, **{name: getattr(self, name)[kept] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")},
-            events=tuple(e for e in self.events if not e.t > t),
-            switches=tuple(s for s in self.switches if not s.t > t), ledger=booked,
-        )  # fmt: skip
 
     @checked_arguments
     def transitions(self, contact: int | None = None) -> tuple[Event, ...]:

@@ -31,7 +31,7 @@ from crossbody.reports.judging.verdict import (
     limit_for,
 )  # fmt: skip
 from crossbody.reports.measuring.alignment import instants
-from crossbody.reports.measuring.truth import TRUTH, Truth, shortened
+from crossbody.reports.measuring.truth import TRUTH, Truth, before, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -275,7 +275,7 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
             return rows
     if not len(entry.run.t):
         return rows
-    run = entry.run.before(truth.trusted) if truth.trusted < entry.run.t[-1] else entry.run
+    run = before(entry.run, truth.trusted) if truth.trusted < entry.run.t[-1] else entry.run
     return [*rows, *_measured(judge_, run, truth), *_split(judge_)]
 
 

@@ -19,7 +19,7 @@ from crossbody.reports.judging.answers import Answers
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
-from crossbody.reports.measuring.truth import Truth, sample_times, shortened
+from crossbody.reports.measuring.truth import Truth, before, sample_times, shortened
 
 if TYPE_CHECKING:
     from crossbody.engines import Run
@@ -372,6 +372,6 @@ def _agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]
 
     truth = shortened(truth)
     if len(second.t) and truth.trusted < second.t[-1]:
-        second = second.before(truth.trusted)
+        second = before(second, truth.trusted)
     found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
     return {name: value for name, value in found.items() if value is not None}

@@ -12,6 +12,7 @@ import numpy as np
 from crossbody.cases import Chaos, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
+from crossbody.cases.trajectory import Ledger
 
 TRUTH = "truth"
 """Name of the truth where engines have theirs, and of the row that judges it."""
@@ -87,7 +88,20 @@ def shortened(truth: Truth) -> Truth:
     if near:
         edges = [LAST * end, *(t for t in near if t < end), end]
         end = max((b - a, 0.5 * (a + b)) for a, b in pairwise(edges))[1]
-    return replace(truth, trajectory=truth.trajectory.before(end), trusted=end)
+    return replace(truth, trajectory=before(truth.trajectory, end), trusted=end)
+
+
+def before(run: Trajectory, t: float) -> Trajectory:
+    """Return a motion up to an instant t, s, with its events, switches and account until then."""
+    kept = run.t <= t
+    booked = run.ledger and Ledger(
+        contact=run.ledger.contact[kept], input=run.ledger.input[kept], dissipated=run.ledger.dissipated[kept]
+    )
+    return replace(
+        run, **{name: getattr(run, name)[kept] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")},
+        events=tuple(e for e in run.events if not e.t > t), switches=tuple(s for s in run.switches if not s.t > t),
+        ledger=booked,
+    )  # fmt: skip
 
 
 def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:

@@ -373,7 +373,7 @@ def test_a_truth_whose_touch_comes_earlier_or_later_beside_it_excuses_that_touch
 def test_a_slow_touch_does_not_set_the_clock_of_what_moves_fast() -> None:
     """It is known to microseconds only; the other masses, at a metre per second, agree at every instant.
 
-    A clock that is off by a microsecond would make 1e-6; springs as stiff as these make 1e-9 of rounding on some machines.
+    A clock that is off by a microsecond would make 1e-6; springs as stiff as these make 1e-9 of rounding.
     """
     law = {"a0": 40756072.9447183, "zeta": 0.8239943821405218, "collisions": "resolved"}
     family = Family(
