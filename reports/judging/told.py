@@ -80,7 +80,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     """Say how many runs are within all limits, which have known deviations, and which are off and why."""
     all_ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
     ran = [run for run in all_ran if run.judged]
-    if all_ran and not ran:
+    if all_ran and not ran and not any(run.wrong for run in runs):  # a truth may be outside by itself
         return "Nothing is judged here: no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
     right = [run for run in ran if not run.wrong]
