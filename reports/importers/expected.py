@@ -16,7 +16,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Scene, Shape, Tendon
 from crossbody.engines.importers.process import boxes, composite, posed
-from crossbody.reports.scenes._kinematics import body_poses
+from crossbody.reports.scenes.kinematics import body_poses
 
 SEED, DRAWN = 20241123, 4
 """Of the random states, and their number."""

@@ -18,7 +18,7 @@ from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.engines.nearest import Places, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
-from crossbody.reports.scenes._kinematics import Pose, body_poses, placed
+from crossbody.reports.scenes.kinematics import Pose, body_poses, placed
 
 MOST = 500
 """Bodies that are drawn."""
