@@ -97,9 +97,8 @@ class TimeStepper:
 
     def __init__(self, rows: PinRows, points: Points, e: list[float], tol: float, log: Log, max_steps: int) -> None:
         self.rows, self.log, self.max_steps = rows, log, max_steps
-        self.touching, self.e = Touching(rows, points, tol), np.array(e)
-        self.opens = np.array(rows.unilateral, dtype=bool)
-        self.held = tuple(np.flatnonzero(~self.opens).tolist())
+        self.touching, self.e, self.laws = Touching(rows, points, tol), e, rows.slow.T.tolist()
+        self.held = tuple(i for i, opens in enumerate(rows.unilateral) if not opens)
         self.none = np.zeros(rows.nc)
         self.none.flags.writeable = False
         self.steps = self.unsolved = 0
@@ -142,23 +141,26 @@ class TimeStepper:
         free = v + dt * rows.accelerate(q, v, (FREE,) * rows.nc)[0]
         if not closed:
             return free, self.none
-        J, which = rows.jacobian(q), list(closed)
-        H = J[which]
-        offset = self._offset(q, H @ v, which, dt)
-        p = np.zeros(rows.nc)
+        which = slice(None) if len(closed) == rows.nc else list(closed)
+        H, p = rows.jacobian(q)[which], np.zeros(rows.nc)
+        offset = np.array(self._offsets(q, (H @ v).tolist(), closed, dt))
         p[which] = part = self.touching.impulses(q, H @ free + offset, closed)
         new = v + dt * pin.aba(rows.model, rows.data, q, v, rows.tau + H.T @ (part / dt))
         self._check(part, H @ new + offset, closed)
         return new, p
 
-    def _offset(self, q: Floats, hd: Floats, closed: list[int], dt: float) -> Floats:
+    def _offsets(self, q: Floats, rates: list[float], closed: tuple[int, ...], dt: float) -> list[float]:
         """What is added to J v+ in the condition of every closed row, m/s."""
-        bounce: Floats = self.e[closed] * hd
-        if not self.held:
-            return bounce
-        h, (a0, a1, a2) = self.rows.heights(q)[closed], self.rows.slow[:, closed]
+        h = self.rows.heights(q).tolist() if self.held else ()
+        return [
+            self.e[i] * hd if self.rows.unilateral[i] else self._held(h[i], hd, self.laws[i], dt)
+            for i, hd in zip(closed, rates, strict=True)
+        ]
+
+    def _held(self, h: float, hd: float, law: Sequence[float], dt: float) -> float:
+        a0, a1, a2 = law
         k = a0 + a2 * h * h
-        return np.where(self.opens[closed], bounce, (k * dt * h - hd) / (1.0 + a1 * dt + k * dt * dt))
+        return (k * dt * h - hd) / (1.0 + a1 * dt + k * dt * dt)
 
     def _check(self, p: Floats, rate: Floats, closed: tuple[int, ...]) -> None:
         """Count a step whose conditions do not hold, whatever the solver says of itself."""
