@@ -497,6 +497,9 @@ class System:
         Raises:
             SceneError: if it has another shape than (nq,) or (n,), is not finite, or holds a quaternion that is zero.
         """
+        return self._copied(name, value)
+
+    def _copied(self, name: str, value: ArrayLike) -> Floats:
         at = name.startswith("q")
         array: Floats = np.array(frozen("simulate", name, value, (self.nq if at else self.n,)))
         if not np.all(np.isfinite(array)):
@@ -504,7 +507,7 @@ class System:
         return self.normalised(f"simulate.{name}", array) if at else array
 
     def _state(self, q: ArrayLike, v: ArrayLike | None) -> tuple[Floats, Floats]:
-        return self.checked_state("q", q), self.checked_state("v", np.zeros(self.n) if v is None else v)
+        return self._copied("q", q), self._copied("v", np.zeros(self.n) if v is None else v)
 
     def _input(self, u: ArrayLike | None) -> Floats:
         return np.array(frozen("simulate", "u", np.zeros(self.inputs) if u is None else u, (self.inputs,)))

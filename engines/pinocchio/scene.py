@@ -122,7 +122,7 @@ def build(case: Case, algebra: str) -> Prepared:
     acting = None if bodies.none else bodies.apply
     gaps = Gaps(scene, forces, (model, placed), to)
     pinned = PinRows(
-        model, lambda q: gaps.gradients(q)[1], gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
+        model, gaps.jacobian, gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
         law=law, algebra=algebra, forces=acting, drift_of=gaps.drift_of, gradient_of=gaps.gradient_of,
     )  # fmt: skip
     pinned.near[gaps.own :] = DIPS
@@ -139,7 +139,7 @@ def build(case: Case, algebra: str) -> Prepared:
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
     return Prepared(
-        rows=pinned, points=() if case.general else Points(scene, model, placed),
+        rows=pinned, points=None if case.general else Points(scene, model, placed, gaps.steady),
         observe=observer(scene, bodies, gaps),
         sizes=_given_sizes(case, to) or _sizes(pinned, *start),
         start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
@@ -205,6 +205,10 @@ class Gaps:
             return self.rows.heights(q)
         own = [self.rows.heights(self.to.ours(q)), *(part.heights(q) for part in self.in_space)]
         return np.concatenate(own)[self.order]
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Return H (nc, nv)."""
+        return self.rows.straight if self.steady else self.gradients(q)[1]
 
     def recorded(self, q: Floats) -> Floats:
         """Return h (m, nc) of recorded positions (m, nq)."""
