@@ -368,9 +368,12 @@ class Case:
             )
         if not (math.isfinite(self.t_end) and self.t_end > 0):
             raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
-        if self.force is not None and (self.general or self.scene is None):
-            what = "is no scene" if self.scene is None else "has no kernels of its own, in which the reference has it"
-            raise SceneError(f"Case {self.name} has a force but {what}.")
+        for name, part in (("a force", self.force), ("gates", self.gates)):
+            if part is not None and (self.general or self.scene is None):
+                what = (
+                    "is no scene" if self.scene is None else "has no kernels of its own, in which the reference has it"
+                )
+                raise SceneError(f"Case {self.name} has {name} but {what}.")
         self._put_control()
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
