@@ -64,6 +64,9 @@ class March:
         self.now = self._settled(scene.modes())
         self.tape.switch(0.0, tuple(m if m == Mode.BILATERAL else int(Mode.FREE) for m in self.now), self.now)
         self.tape.record(scene.lam(), self.now)
+        if why := scene.lost():
+            self._end(Outcome.LOST, why)
+            return
         for instant in instants:
             if not self._until(instant) or not self._change(instant):
                 return
@@ -85,7 +88,7 @@ class March:
         """Step to t_end, s; whether the run goes on."""
         scene, data, opt, dt = self.scene, self.scene.data, self.scene.model.opt, self.dt
         model, forward, advance, record = scene.model, mujoco.mj_forward, self.advance, self.tape.record
-        modes, safe, lam = scene.modes, scene.safe, scene.lam
+        modes, safe, lam, lost = scene.modes, scene.safe, scene.lam, scene.lost
         now, t, last = self.now, float(data.time), t_end - dt * (1 + 1e-9)
         opt.timestep = dt
         while t_end - t >= 1e-9 * dt:
@@ -105,6 +108,8 @@ class March:
                     return self._end(Outcome.MODE_CYCLE, f"rows {now} and {self.now} switch for ever")
                 now, opt.timestep = self.now, dt
             record(lam(), now)
+            if why := lost():
+                return self._end(Outcome.LOST, why)
         if scene.instants:
             data.time = t_end  # instants are met exactly, whatever the sum of the steps
         return True
