@@ -28,7 +28,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import InvalidValue, UnknownName
 from crossbody.cases.registry import Registry
 
-REGISTRY = Registry("importer", __name__, hidden=("process",))
+REGISTRY = Registry("importer", __name__, hidden=("beside",))
 SECONDS, BYTES = 20.0, 3 << 30
 """What an importer may take: time, s, and memory, bytes."""
 GRACE = 2.0
@@ -37,7 +37,7 @@ TOLD = 100_000
 """Bytes of what an importer says that are read."""
 WITHOUT = {"exudyn": " (its LoadURDFrobot is roboticstoolbox's)", "pymunk": "", "reference": ": it is the yardstick"}
 """Engines that there is nothing to ask."""
-PROCESS = Path(__file__).parent / "process.py"
+PROCESS = Path(__file__).parent / "beside" / "process.py"
 
 
 class Robot(Protocol):
@@ -47,9 +47,9 @@ class Robot(Protocol):
         version: of the engine.
         joints: name, body that it moves, kind (free, ball, hinge, slide; unbounded: a hinge by cos and sin; any other
             is compared by name alone), first position and first velocity.
-        free, ball: conventions of their coordinates, of those in `process.CONVENTIONS`.
+        free, ball: conventions of their coordinates, of those in `beside.conventions.CONVENTIONS`.
         nq, nv: numbers of positions and of velocities.
-        numbers: quantity (of `compare.NUMBERS`) -> joint -> one number, or one a velocity.
+        numbers: quantity (of `parts.NUMBERS`) -> joint -> one number, or one a velocity.
         actuators: which joints each moves.
         loops: of every equality its type (connect, weld, joint; empty where the engine tells their number alone), the
             two joints of one of joints, the coefficients of its polynomial.
@@ -98,7 +98,7 @@ class Robot(Protocol):
         """Return the length of every tendon."""
 
     def shapes(self) -> Sequence[tuple[str, str, str, Sequence[float], Floats, Floats, Floats]]:
-        """Return of every shape that may touch: name, kind, joint that moves it, and what else `process.bounds` needs.
+        """Return of every shape that may touch: name, kind, joint that moves it, and what else `beside.solids.bounds` needs.
 
         That is size, points, and where it stands: origin (3,) and rotation (3, 3).
         """

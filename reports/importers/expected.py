@@ -15,7 +15,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Scene, Shape, Tendon
-from crossbody.engines.importers.process import boxes, composite, posed
+from crossbody.engines.importers.beside.solids import boxes, composite, posed
 from crossbody.reports.scenes._kinematics import body_poses
 
 SEED, DRAWN = 20241123, 4

@@ -18,7 +18,9 @@ from robot_readers import ARM, HEAD, rows_of, run
 from crossbody.cases import CrossbodyError, installed
 from crossbody.cases.files.conformance import FEATURES
 from crossbody.engines import importers
-from crossbody.engines.importers.process import bounds, rotation, tried
+from crossbody.engines.importers.beside.conventions import rotation
+from crossbody.engines.importers.beside.process import tried
+from crossbody.engines.importers.beside.solids import bounds
 from crossbody.reports.importers.audit import audited, opened
 from crossbody.reports.importers.causes import advice, explained, parts, uses
 from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WORDS, WRONG, Said, rows

@@ -9,7 +9,7 @@ import pytest
 
 from crossbody.cases.files.conformance import FEATURES, Feature
 from crossbody.engines.importers import mujoco as own
-from crossbody.engines.importers.process import measured
+from crossbody.engines.importers.beside.robot import measured
 from crossbody.reports.cli import main
 from crossbody.reports.importers.audit import of_scene, opened
 from crossbody.reports.importers.compare import NONE, OK, UNSEEN, UNSUPPORTED, WRONG, Row, rows
