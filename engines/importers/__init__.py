@@ -54,6 +54,7 @@ class Robot(Protocol):
         loops: of every equality its type (connect, weld, joint; empty where the engine tells their number alone), the
             two joints of one of joints, the coefficients of its polynomial.
         tendons: damping, stiffness, friction loss, rest and range of each.
+        keys: name of every keyframe -> its positions (nq,).
         hidden: quantity -> why this engine does not have it.
         unseen: quantity -> why what it has of it cannot be looked at.
         precision: what rounding is to it, of the largest entry.
@@ -69,6 +70,7 @@ class Robot(Protocol):
     actuators: Mapping[str, Sequence[str]]
     loops: Sequence[tuple[str, Sequence[str], Sequence[float]]]
     tendons: Mapping[str, Sequence[float]]
+    keys: Mapping[str, Sequence[float]]
     hidden: Mapping[str, str]
     unseen: Mapping[str, str]
     precision: float
@@ -98,13 +100,25 @@ class Robot(Protocol):
         """Return the length of every tendon."""
 
     def shapes(self) -> Sequence[tuple[str, str, str, Sequence[float], Floats, Floats, Floats]]:
-        """Return of every shape that may touch: name, kind, joint that moves it, and what else `beside.solids.bounds` needs.
+        """Return of every shape that may touch: name, kind, joint that moves it, and what `bounds` needs.
 
-        That is size, points, and where it stands: origin (3,) and rotation (3, 3).
+        That is of `beside.solids`: size, points, and where it stands: origin (3,) and rotation (3, 3).
         """
 
     def contacts(self) -> Sequence[tuple[int, int]]:
         """Return which of these may touch each other, by their numbers."""
+
+    def surfaces(self) -> Sequence[Sequence[float]]:
+        """Return of each of these pairs its friction along two tangents, about the normal and them, and its margin, m.
+
+        Coefficients that are not in force are 0.
+        """
+
+    def softness(self) -> Mapping[str, Sequence[float]]:
+        """Return a0, 1/s^2, and a1, 1/s, of rows: bounds of joints and tendons, and loops, by their names.
+
+        A pair of shapes has their names with a colon between them.
+        """
 
     def inertias(self) -> Sequence[tuple[str, float, Floats, Floats]]:
         """Return of every body: joint that moves it, mass, kg, centre (3,), inertia about it (3, 3); world axes."""

@@ -32,6 +32,7 @@ class _Robot:
         "stiffness": NO_SPRINGS, "stiffness x^2": NO_SPRINGS, "stiffness x^3": NO_SPRINGS, "rest": NO_SPRINGS,
         "damping v|v|": "Pinocchio's dampers are linear.", "damping v^3": "Pinocchio's dampers are linear.",
         "actuators": "Pinocchio's model has no actuators.", "tendons": "Pinocchio's model has no tendons.",
+        "surfaces": "Pinocchio's shapes have no friction.", "softness": "Pinocchio's reader leaves solref out.",
     }  # fmt: skip
     tendons: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 0.0
@@ -66,6 +67,7 @@ class _Robot:
         self.joints = [joint for i in range(1, self._m.njoints) for joint in self._joints(i)]
         self.actuators: dict[str, list[str]] = {}
         self.numbers = self._numbers()
+        self.keys = {one.key(): one.data().tolist() for one in self._m.referenceConfigurations}
 
     def _joints(self, i: int) -> list[tuple[str, str, str, int, int]]:
         """Return the joints that one of Pinocchio's is: several of one body are a composite."""
@@ -89,6 +91,7 @@ class _Robot:
                 "armature": m.armature[dof], "damping": m.damping[dof], "friction": m.upperDryFrictionLimit[dof],
                 "lower": m.lowerPositionLimit[at] if bounded else -np.inf,
                 "upper": m.upperPositionLimit[at] if bounded else np.inf,
+                "least force": m.lowerEffortLimit[first], "most force": m.upperEffortLimit[first],
             }  # fmt: skip
             for key, value in values.items():
                 values_ = np.atleast_1d(value).astype(float)

@@ -20,12 +20,14 @@ class _Robot:
         "rest": "PyBullet's joints have no springs.", "actuators": "PyBullet drives joints, not actuators of a file.",
         "damping v|v|": "PyBullet's dampers are linear.", "damping v^3": "PyBullet's dampers are linear.",
         "stiffness x^2": "PyBullet's joints have no springs.", "stiffness x^3": "PyBullet's joints have no springs.",
-        "tendons": "PyBullet has no tendons.",
+        "tendons": "PyBullet has no tendons.", "softness": "PyBullet's rows have no solref.",
     }  # fmt: skip
     unseen = {  # noqa: RUF012
         "energy": "PyBullet tells no energy.", "contacts": "PyBullet does not tell which of its shapes may touch.",
+        "surfaces": "PyBullet does not tell which of its shapes may touch.",
     }  # fmt: skip
     tendons: dict[str, list[float]] = {}  # noqa: RUF012
+    keys: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 1e-5
     loops: list[Any] = []  # noqa: RUF012
 
@@ -63,6 +65,7 @@ class _Robot:
             values = {
                 "damping": info[6], "friction": info[7],
                 "lower": info[8] if bounded else -np.inf, "upper": info[9] if bounded else np.inf,
+                "least force": -info[10], "most force": info[10],
             }  # fmt: skip
             for key, value in values.items():
                 told.setdefault(key, {})[info[1].decode()] = [float(value)]

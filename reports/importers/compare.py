@@ -16,7 +16,8 @@ TOLERANCE = 1e-9
 OK, WRONG, UNSUPPORTED, FAILED, NONE, UNSEEN = "ok", "wrong", "unsupported", "failed", "-", "not shown"
 QUANTITIES = (
     "reading", "coordinates", "bodies", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping",
-    "springs", "limits", "friction", "tendons", "loops", "actuators", "shapes", "contacts",
+    "springs", "limits", "friction", "effort", "tendons", "loops", "actuators", "shapes", "contacts", "surfaces",
+    "softness", "keyframes",
 )  # fmt: skip
 """Of rows, in their order."""
 SAID = re.compile(r"unsupported|not (yet )?(been )?(supported|implemented)|(will be |is |are )?ignored|ignoring", re.I)
@@ -25,7 +26,9 @@ GENERAL = re.compile(r"the tag '\w+' found as a child of '\w+'", re.I)
 """How one says that it leaves all of a tag out, once; the line of the file is that of the first."""
 WORDS = {
     "armature": "armature|rotor", "damping": "damping", "springs": "stiffness|spring", "limits": "range|limit",
-    "friction": "friction", "loops": "equality|connect|weld|mimic|constraint",
+    "friction": "friction(loss)?", "effort": "actuatorfrcrange|effort", "keyframes": "keyframe",
+    "surfaces": "friction|condim|margin", "softness": "solref|solimp|solreflimit|solimplimit|timestep",
+    "loops": "equality|connect|weld|mimic|constraint",
     "actuators": "actuator|motor|transmission", "coordinates": "joint", "tendons": "tendon|spatial",
     "shapes": "mesh|shape|collision", "contacts": "exclude|contype|conaffinity|pair",
 }  # fmt: skip

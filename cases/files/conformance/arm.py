@@ -33,6 +33,16 @@ def arm(upper: Any = (), lower: Any = (), shoulder: Any = (), elbow: Any = (), *
     return Scene(**({"bodies": bodies, "joints": joints} | more))
 
 
+SECOND = f'<body name="other" pos="2 0 1"><joint name="other" axis="0 1 0"/>{LOWER_INERTIAL}</body>'
+
+
+def two_trees(**more: Any) -> Scene:
+    """Return the arm, and a lower link like its own that stands beside it (`SECOND`)."""
+    other = replace(LOWER, name="other", parent="", position=(2.0, 0.0, 1.0))
+    joint = Joint(name="other", body="other", type="hinge", axis=(0.0, 1.0, 0.0))
+    return arm(bodies=(UPPER, LOWER, other), joints=(SHOULDER, ELBOW, joint), **more)
+
+
 def mjcf(
     *, head: str = "", upper: str = 'pos=".1 .2 1"', shoulder: str = '<joint name="shoulder" axis="0 1 0"/>',
     upper_inertial: str = UPPER_INERTIAL, lower: str = 'pos="0 .05 -.4"', elbow: str = ELBOW_TEXT,

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 
 MOTION = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "frames")
@@ -26,6 +27,8 @@ class Feature:
         rule: what the format says, in a sentence.
         rewrite: how to write it so that every reader reads the same; empty where there is no such way.
         files: what else stands beside it, name -> text.
+        keys: name of every keyframe -> positions (nq,).
+        heavier: added to M (nv, nv) by what a scene does not have, of which our own reading says so.
     """
 
     name: str
@@ -37,6 +40,8 @@ class Feature:
     rule: str = ""
     rewrite: str = ""
     files: Mapping[str, str] = field(default_factory=dict)
+    keys: Mapping[str, Floats] = field(default_factory=dict)
+    heavier: tuple[tuple[float, ...], ...] = ()
 
 
 def written(

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import ELBOW, LOWER, LOWER_INERTIAL, SHOULDER, UPPER, arm, mjcf, turned
+from crossbody.cases.files.conformance.arm import ELBOW, SECOND, SHOULDER, arm, mjcf, turned, two_trees
 from crossbody.cases.files.conformance.feature import MOTION, Feature, written
-from crossbody.cases.scene import Joint
 
 AXIS_RULE = (
     "A joint takes what it does not say from its class, and a class what it does not say from the class around it."
@@ -19,6 +18,7 @@ AXIS_WAY = "Write axis, pos and type at the joint itself."
 def features() -> list[Feature]:
     """Return the features of joints and their classes."""
     z = {"axis": (0.0, 0.0, 1.0)}
+    hinge = '<joint name="shoulder" axis="0 1 0"/>'
     bare = '<joint name="elbow"/>'
     return [
         written("arm", mjcf(), arm(), ".//inertial[@diaginertia]", "An <inertial> says mass, centre and moments."),
@@ -102,10 +102,17 @@ def features() -> list[Feature]:
         written("reference of a slide", mjcf(elbow='<joint name="elbow" type="slide" axis="1 0 0" ref=".2"/>'),
             arm(elbow={"reference": 0.2, "type": "slide"}), ".//joint[@ref]",
             "At the pose of the file a joint has the coordinate ref.", "Leave ref out and shift the body."),
-        written("two trees",
-            mjcf(behind='<body name="other" pos="2 0 1"><joint name="other" axis="0 1 0"/>' + LOWER_INERTIAL +
-            "</body>"),
-            arm().replace(bodies=(UPPER, LOWER, replace(LOWER, name="other", parent="", position=(2.0, 0.0, 1.0))),
-            joints=(SHOULDER, ELBOW, Joint(name="other", body="other", type="hinge", axis=(0.0, 1.0, 0.0)))),
-            "worldbody/body[2]"),
+        *(written(name, mjcf(shoulder=shoulder, tail=f'<keyframe><key {text}/></keyframe>'), scene,
+            "keyframe/key", "A keyframe has positions of all joints, and a number for a name where it has none.", way,
+            ("keyframes",), keys=keys)
+            for name, shoulder, text, scene, way, keys in (
+                ("keyframe", hinge, 'name="home" qpos=".3 -.4"', arm(), "Set the positions in the engine.",
+                 {"home": np.array([0.3, -0.4])}),
+                ("keyframe without a name", hinge, 'qpos=".3 -.4"', arm(), "Give it a name.",
+                 {"key0": np.array([0.3, -0.4])}),
+                ("keyframe of a free body", '<joint name="shoulder" type="free"/>',
+                 'name="home" qpos="1 2 3 .36 .48 .64 .48 -.4"', arm(shoulder={"type": "free"}),
+                 "Set the positions in the engine.",
+                 {"home": np.array([1.0, 2.0, 3.0, 0.36, 0.48, 0.64, 0.48, -0.4])}))),
+        written("two trees", mjcf(behind=SECOND), two_trees(), "worldbody/body[2]"),
     ]  # fmt: skip

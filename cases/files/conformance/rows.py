@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, arm, mjcf
+from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, SECOND, arm, mjcf, two_trees
 from crossbody.cases.files.conformance.feature import Feature, written
 from crossbody.cases.scene import Actuator, Loop, Tendon
+
+WEIGHT = "The armature a of a tendon adds a J'J to M, J the rates of its length."
+WEIGHT_WAY = "Add it to M in the engine, or leave it out."
 
 
 def features() -> list[Feature]:
@@ -69,6 +72,13 @@ def features() -> list[Feature]:
                  "rest": (-0.1, 0.2)}),
                 ("damping", 'damping=".7"', "damping", {"damping": (0.7, 0.0, 0.0)}),
                 ("bound", 'range="-.5 1" limited="true"', "range", {"range": (-0.5, 1.0)}))),
+        written("armature of a tendon", mjcf(tail=both.replace('"t"', '"t" armature=".1"')), arm(tendons=(tendon,)),
+            ".//fixed[@armature]", WEIGHT, WEIGHT_WAY, ("M",), heavier=((0.1, 0.2), (0.2, 0.4))),
+        written("armature of a tendon across branches",
+            mjcf(behind=SECOND, tail=both.replace('"elbow"', '"other"').replace('"t"', '"t" armature=".1"')),
+            two_trees(tendons=(replace(tendon, joints=("shoulder", "other")),)),
+            ".//fixed[@armature]", WEIGHT, WEIGHT_WAY, ("M",),
+            heavier=((0.1, 0.0, 0.2), (0.0, 0.0, 0.0), (0.2, 0.0, 0.4))),
         written("actuator on a tendon", mjcf(tail=both + '<actuator><motor name="m" tendon="t"/></actuator>'),
             arm(tendons=(tendon,), actuators=(Actuator(name="m", tendon="t", gear=(1.0,)),)),
             ".//motor[@tendon] | .//general[@tendon]", about=("actuators",), rule="A fixed tendon is a sum of joints.",

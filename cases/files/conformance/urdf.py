@@ -102,6 +102,7 @@ def features() -> list[Feature]:
         inertia=(0.003, 0.004, 0.005, 0.0, 0.0, 0.0),
         orientation=quaternion(fixed_rpy),
     )
+    stand = Body(name="stand", position=(0.3, 0.0, 0.5), orientation=quaternion(fixed_rpy))
     hung = link("hand", ".02 0 .01", 0.5, moments(0.003, 0.004, 0.005)) + urdf_joint(
         "grip", "lower", "hand", '<origin xyz="0 .1 -.3" rpy=".3 .4 .5"/>', "fixed"
     )
@@ -128,6 +129,12 @@ def features() -> list[Feature]:
         of("floating joint", urdf(shoulder=urdf_joint("shoulder", "base", "upper", UPPER_AT, "floating")),
             urdf_arm(shoulder={"type": "free", **free}, base=False), "joint[@type='floating']",
             "A floating joint has six degrees of freedom, and stands at its origin where they are 0."),
+        of("floating joint below a fixed one", urdf(base='<link name="base"/><link name="stand"/>' + urdf_joint("post",
+            "base", "stand", '<origin xyz=".3 0 .5" rpy=".3 .4 .5"/>', "fixed"), shoulder=urdf_joint("shoulder",
+            "stand", "upper", '<origin xyz=".1 .2 1" rpy=".3 0 0"/>', "floating")),
+            urdf_arm(shoulder={"type": "free", **free}, base=False).replace(bodies=(stand, *arm().bodies)),
+            "joint[@type='fixed']", "What floats on a link that is fixed to the root is free in the world.",
+            "Let it float on the root."),
         of("axis not given", urdf(elbow=elbow(LOWER_AT)), plain, "joint!axis=xyz=1 0 0",
             rule="A joint without axis has 1 0 0.", rewrite="Write the axis."),
         of("axis not of length 1", urdf(elbow=elbow(LOWER_AT + '<axis xyz="3 0 4"/>')), urdf_arm(elbow={"axis": (0.6,
@@ -142,6 +149,10 @@ def features() -> list[Feature]:
             urdf_arm(elbow={"friction_loss": 0.3}), ".//dynamics[@friction]", about=("friction",)),
         of("bounds", urdf(elbow=elbow(LOWER_AT + x + '<limit lower="-.5" upper="1" effort="10" velocity="1"/>')),
             urdf_arm(elbow={"range": (-0.5, 1.0)}), ".//limit[@lower]", about=("limits",)),
+        of("bound of a force",
+            urdf(elbow=elbow(LOWER_AT + x + '<limit lower="-3" upper="3" effort="7" velocity="1"/>')),
+            urdf_arm(elbow={"force_range": (-7.0, 7.0)}, shoulder={"force_range": (-100.0, 100.0)}),
+            ".//limit[@effort]", "effort is the largest force of a joint.", "Bound it in the engine.", ("effort",)),
         of("safety limits",
             urdf(elbow=elbow(LOWER_AT + x + '<safety_controller soft_lower_limit="-.1" soft_upper_limit=".1" '
             'k_velocity="1"/>')),

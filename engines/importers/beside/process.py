@@ -67,7 +67,8 @@ def answered(module: Any, file: str, urdf: bool, job: Any, size: int, measured: 
     try:
         robot = module.open_robot(file, urdf)
         asked = job()
-        return measured(robot, asked)
+        told: dict[str, Any] = measured(robot, asked)
+        return told
     except ModuleNotFoundError as error:
         lacking = (error.name or "").partition(".")[0]
         own = lacking == module.MODULE

@@ -9,6 +9,9 @@ import numpy as np
 from .conventions import CONVENTIONS
 from .solids import boxes, composite, posed
 
+WIDTHS = {"free": 6, "ball": 3}
+"""Velocities of a joint, of others 1."""
+
 
 def matched(ours: Any, theirs: Any) -> dict[str, int]:
     """Return our joint -> number of theirs: by name; else in order on the body of that name, if the kinds agree."""
@@ -85,6 +88,17 @@ class Measured:
             b = np.linalg.solve(J.T, np.asarray(robot.bias())[order]) - M @ bend
         return M, b
 
+    def keys(self, wanted: Any) -> dict[str, Any]:
+        """Return of every keyframe that both have its positions, the engine's and what they are to be."""
+        told = {}
+        for name in self.robot.keys.keys() & wanted.keys():
+            q_e = np.zeros(self.robot.nq)
+            for (_, _, kind, at, _), q_j in zip(self.to, wanted[name], strict=True):
+                q_part = self._mapped(kind, q_j, np.zeros(WIDTHS.get(kind, 1)))[0]
+                q_e[at : at + len(q_part)] = q_part
+            told[name] = [list(map(float, self.robot.keys[name])), q_e.tolist()]
+        return told
+
     def _mapped(self, kind: str, q: Any, v: Any) -> Any:
         of = {"free": self.robot.free, "ball": self.robot.ball, "unbounded": "unbounded"}
         return CONVENTIONS[of.get(kind, "mujoco")](np.asarray(q, dtype=float), np.asarray(v, dtype=float))
@@ -135,4 +149,7 @@ def measured(robot: Any, job: Any) -> dict[str, Any]:
         lacks = robot.hidden.keys() | robot.unseen.keys()
         told["shapes"] = [] if "shapes" in lacks else whole.shapes(named)
         told["contacts"] = [] if "contacts" in lacks else [list(map(int, pair)) for pair in robot.contacts()]
+        told["surfaces"] = [] if "surfaces" in lacks else [list(map(float, pair)) for pair in robot.surfaces()]
+        told["softness"] = {} if "softness" in lacks else {k: list(map(float, a)) for k, a in robot.softness().items()}
+        told["keys"] = {} if "keyframes" in lacks else whole.keys(job.get("keys", {}))
     return told
