@@ -1,10 +1,10 @@
 """What an engine's own reader makes of a robot file: one module an importer, each run in a process of its own.
 
 A module has `FORMATS` (of "mjcf" and "urdf"), `PACKAGE` (what has to be installed), `MODULE` (what is imported of it),
-`TRIED` (first and last version that it was tried with; it may be left out) and `open_robot(path, urdf)`, which returns
-a `Robot`. It is loaded by its path where crossbody may not be installed, so it imports nothing of ours, and its engine
-only inside its functions: CROSSBODY_PYTHON_NEWTON=/path/to/python names the interpreter of the importer newton, where
-that is not this one.
+and `open_robot(path, urdf)`, which returns a `Robot`; it may have `TRIED` (first and last version that it was tried
+with) and `INSTALL` (what pip is to install, if not that package). It is loaded by its path where crossbody may not be
+installed, so it imports nothing of ours, and its engine only inside its functions:
+CROSSBODY_PYTHON_NEWTON=/path/to/python names the interpreter of the importer newton, where that is not this one.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -57,6 +58,7 @@ class Robot(Protocol):
         keys: name of every keyframe -> its positions (nq,).
         hidden: quantity -> why this engine does not have it.
         unseen: quantity -> why what it has of it cannot be looked at.
+        refused: of these, what its reader gives up on in this file; may be left out.
         precision: what rounding is to it, of the largest entry.
     """
 
@@ -281,6 +283,17 @@ def _lines(path: Path, begin: int, end: int) -> list[str]:
 def names() -> tuple[str, ...]:
     """Names of all importers, installed or not."""
     return REGISTRY.names()
+
+
+def missing(absent: Sequence[str]) -> str:
+    """Return in a sentence which importers are not installed, and what brings them."""
+    modules = [REGISTRY.load(name) for name in absent]
+    wanted = dict.fromkeys(getattr(module, "INSTALL", module.PACKAGE) for module in modules)
+    packages = " ".join(map(shlex.quote, wanted))
+    return (
+        f"Not installed: {', '.join(absent)}. pip install {packages} brings what is missing, here or in an environment "
+        f"whose python is named: CROSSBODY_PYTHON_{absent[0].upper()}=PATH."
+    )
 
 
 def known(wanted: Sequence[str]) -> tuple[str, ...]:

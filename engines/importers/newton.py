@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "newton", "newton"
-TRIED = ("1.8", "1.8")
+TRIED, INSTALL = ("1.8", "1.8"), "newton[importers]"
 KINDS = {0: "slide", 1: "hinge", 2: "ball", 4: "free"}
 FIXED = 3
 SHAPES = ("", "plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "cone", "mesh")

@@ -36,6 +36,7 @@ class _Robot:
     }  # fmt: skip
     tendons: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 0.0
+    refused: tuple[str, ...] = ()
 
     def __init__(self, path: str, urdf: bool) -> None:
         import pinocchio as pin
@@ -61,7 +62,9 @@ class _Robot:
                 pin.buildGeomFromMJCF(self._m, path, of))  # fmt: skip
             self._shapes = list(read.geometryObjects)
         except Exception as error:  # shapes are read by a call of their own
-            self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes: {error}"}
+            said = str(error).strip().rpartition("message:")[2].strip().rstrip(".")
+            self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes gives up: {said}."}
+            self.refused = ("shapes",)
         self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
         self._last: dict[int, str] = {}
         self.joints = [joint for i in range(1, self._m.njoints) for joint in self._joints(i)]

@@ -154,7 +154,8 @@ def _row(
     if own is None:
         return Row(**common, verdict=NONE)
     if quantity in unseen:
-        return Row(**common, verdict=UNSEEN, why=unseen[quantity])
+        verdict = FAILED if quantity in found.get("refused", ()) else UNSEEN
+        return Row(**common, verdict=verdict, why=unseen[quantity])
     told = sorted(own, key=lambda gap: -gap.size)
     off = [gap for gap in told if not gap.size <= tolerance]
     if not off:

@@ -72,7 +72,7 @@ def surfaces(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[in
     """Friction and margin of every pair of shapes that may touch, of those that both have."""
     if not wanted["contacts"]:
         return None
-    name, told = [shape[0] for shape in wanted["shapes"]], list[Gap]()
+    name, by, told = [shape[0] for shape in wanted["shapes"]], [shape[2] for shape in wanted["shapes"]], list[Gap]()
     if lacks(found, "surfaces"):
         return [Gap(1.0)]
     mine = {frozenset(pair): own for pair, own in zip(found["contacts"], found["surfaces"], strict=False)}
@@ -80,10 +80,10 @@ def surfaces(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[in
         own = mine.get(frozenset(of[k][0] for k in pair if k in of))
         if own is None:  # which may touch is another quantity
             continue
-        where = " and ".join(name[k] for k in pair)
+        where, part = " and ".join(name[k] for k in pair), next(filter(None, (by[k] for k in pair)), "")
         if np.isnan(own).any():
             told.append(Gap(1.0, f"The engine shows nothing of {where}.", unseen=True))
             continue
         for key, x, y in zip(PARTS, theirs, own, strict=True):
-            told.append(Gap(apart(x, y), f"{where}: {key}", y, x, part=where, key=key, lacks=y == 0.0))
+            told.append(Gap(apart(x, y), f"{where}: {key}", y, x, part=part, key=key, lacks=y == 0.0))
     return told or None

@@ -122,6 +122,12 @@ def features() -> list[Feature]:
             above(pairs=meeting(*both)), rewrite="Write them at the geom itself."),
         filtered("pair of the file", "contact/pair", touching(a=apart, b=apart, tail=pair.format("")),
             above(pairs=meeting("a:b")), "A <pair> touches whatever the filters say.", "Let it touch in the engine."),
+        written("class around a class of its own",
+            touching(a='class="bare"', b='class="bare"', head='<default><default class="drawn"><geom material="none"/>'
+            '</default><default class="bare"><geom group="3"/></default></default>').replace('"upper" pos',
+            '"upper" childclass="drawn" pos'), above(pairs=meeting(*both)), ".//default/geom[@material]",
+            "A geom that names a class has nothing of the childclass of its body.",
+            "Write at the geom itself what its class says, as --fix does.", ("shapes",)),
         filtered("contacts switched off", "option/flag[@contact]",
             touching(head='<option><flag contact="disable"/></option>'), above(), switched),
         rough("friction of two shapes", ".//geom[@friction]", touching('friction=".5"', 'friction=".8"'),
