@@ -23,7 +23,7 @@ from crossbody.reports.importers.forms import Forms, removed
 from crossbody.reports.importers.lines import Node, Place, names, with_lines
 
 TELLS = "The engine reads it as something else; say it in the engine."
-PLAIN = ("arm", "URDF: arm", "URDF: link without mass", "URDF: inertia of the root")
+PLAIN = ("arm", "shapes that may touch", "URDF: arm", "URDF: link without mass", "URDF: inertia of the root")
 """What every robot has: without it nothing would be left to differ."""
 AND, PAIRED = " together with ", 5
 """Between the names of two causes that act together; of how many features pairs are tried."""
@@ -59,7 +59,7 @@ def uses(path: Path, urdf: bool) -> list[Use]:
     found = []
     for feature in FEATURES:
         if (feature.format == "urdf") == urdf:
-            nodes = sorted({node for way in feature.finds for node in _at(root, places, way)}, key=order.__getitem__)
+            nodes = sorted({node for way in feature.paths for node in _at(root, places, way)}, key=order.__getitem__)
             if nodes:
                 named = tuple(frozenset(names(node, around)) for node in nodes)
                 found.append(Use(feature, tuple(places[node] for node in nodes), named))
@@ -84,7 +84,7 @@ def left_out(features: Sequence[Feature], root: Node, places: Mapping[Node, Plac
 
     Where something is not said, that is said which the format takes for it.
     """
-    for way in [way for feature in features for way in feature.finds]:
+    for way in [way for feature in features for way in feature.paths]:
         path, _, without = way.partition("!")
         last = path.rpartition("/")[2]
         told = re.findall(r"@(\w+)\]", last) or re.findall(r"@(\w+)", last)  # a value selects, where another is named

@@ -19,6 +19,11 @@ LOWER = Body(
     name="lower", parent="upper", position=(0.0, 0.05, -0.4), mass=1.0, com=(0.01, 0.03, -0.15),
     inertia=(0.02, 0.03, 0.015, 0.0, 0.0, 0.0),
 )  # fmt: skip
+HAND = Body(
+    name="hand", parent="lower", position=(0.0, 0.1, -0.3), mass=0.5, com=(0.02, 0.0, 0.01),
+    inertia=(0.003, 0.004, 0.005, 0.0, 0.0, 0.0),
+)  # fmt: skip
+"""What is put on the lower link by a joint that moves nothing."""
 SHOULDER = Joint(name="shoulder", body="upper", type="hinge", axis=(0.0, 1.0, 0.0))
 ELBOW = Joint(name="elbow", body="lower", type="hinge", axis=(1.0, 0.0, 0.0))
 UPPER_INERTIAL = '<inertial pos=".05 .02 -.2" mass="2" diaginertia=".04 .05 .02"/>'

@@ -17,7 +17,7 @@ from crossbody.cases.files.conformance.arm import (
     arm,
     mjcf,
 )
-from crossbody.cases.files.conformance.feature import Feature, written
+from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.scene import Body, Joint, Loop, Pair, RowLaw, Scene, Shape
 
 FILTER = "Two shapes may touch where a bit of contype of the one is one of conaffinity of the other."
@@ -81,20 +81,20 @@ def features() -> list[Feature]:
     apart = 'contype="0" conaffinity="0"'
 
     def filtered(name: str, finds: str, text: str, scene: Scene, rule: str = FILTER, rewrite: str = "") -> Feature:
-        return written(name, text, scene, finds, rule, rewrite, ("shapes", "contacts"))
+        return Feature(name, text, scene, finds, rule, rewrite, ("shapes", "contacts"))
 
     def rough(name: str, finds: str, text: str, pairs: tuple[Pair, ...], rule: str = MIXED) -> Feature:
-        return written(name, text, above(pairs=pairs), finds, rule, "Say friction in the engine.", ("surfaces",))
+        return Feature(name, text, above(pairs=pairs), finds, rule, "Say friction in the engine.", ("surfaces",))
 
     def soft(name: str, finds: str, law: RowLaw, rule: str = SOFT, head: str = "", **at: Any) -> Feature:
         pairs = (*meeting("floor:a", law=law), *meeting("floor:b"))
         text = touching(head=head, **at)
-        return written(name, text, above(pairs=pairs), finds, rule, DIRECT, ("softness",))
+        return Feature(name, text, above(pairs=pairs), finds, rule, DIRECT, ("softness",))
 
     def bound(name: str, attributes: str, finds: str, law: RowLaw, rule: str = SOFT, head: str = "") -> Feature:
         joint = f'<joint name="elbow" axis="1 0 0" range="-30 60" limited="true" {attributes}/>'
         range_ = (-np.pi / 6, np.pi / 3)
-        return written(name, mjcf(head=head, elbow=joint), arm(elbow={"range": range_, "law": law}), finds, rule,
+        return Feature(name, mjcf(head=head, elbow=joint), arm(elbow={"range": range_, "law": law}), finds, rule,
                        DIRECT, ("softness",))  # fmt: skip
 
     step, unsafe = '<option timestep=".005"/>', '<option timestep=".005"><flag refsafe="disable"/></option>'
@@ -122,7 +122,7 @@ def features() -> list[Feature]:
             above(pairs=meeting(*both)), rewrite="Write them at the geom itself."),
         filtered("pair of the file", "contact/pair", touching(a=apart, b=apart, tail=pair.format("")),
             above(pairs=meeting("a:b")), "A <pair> touches whatever the filters say.", "Let it touch in the engine."),
-        written("class around a class of its own",
+        Feature("class around a class of its own",
             touching(a='class="bare"', b='class="bare"', head='<default><default class="drawn"><geom material="none"/>'
             '</default><default class="bare"><geom group="3"/></default></default>').replace('"upper" pos',
             '"upper" childclass="drawn" pos'), above(pairs=meeting(*both)), ".//default/geom[@material]",
@@ -147,7 +147,7 @@ def features() -> list[Feature]:
             "With condim 6 a contact has friction against rolling too."),
         rough("margins of two shapes", ".//geom[@margin]", touching('margin=".01"', 'margin=".02"'),
             (*meeting("floor:a", margin=0.03), *meeting("floor:b", margin=0.01))),
-        written("details of a pair", touching(a=apart, b=apart, tail=pair.format('condim="6" friction=".4 .5 .02 .01 '
+        Feature("details of a pair", touching(a=apart, b=apart, tail=pair.format('condim="6" friction=".4 .5 .02 .01 '
             '.03" margin=".04" solref=".05 .8" solimp=".8 .9 .01"')), above(pairs=meeting("a:b", dimension=6,
             friction=(0.4, 0.5, 0.02, 0.01, 0.03), margin=0.04, law=softness(0.05, 0.8, 0.9))),
             "contact/pair[@friction] | contact/pair[@margin] | contact/pair[@condim] | contact/pair[@solref]",
@@ -170,14 +170,14 @@ def features() -> list[Feature]:
             step),
         bound("time constant with refsafe off", 'solreflimit=".002 1"', "option/flag[@refsafe]", softness(0.002),
             SAFE, unsafe),
-        written("bounds switched off",
+        Feature("bounds switched off",
             mjcf(head='<option><flag limit="disable"/></option>', elbow=ELBOW_TEXT.replace("/>", ' range="-30 60"/>')),
             arm(), "option/flag[@limit]", switched, "Leave the bounds out.", ("limits",)),
-        written("softness of an equality",
+        Feature("softness of an equality",
             mjcf(tail='<equality><joint name="c" joint1="elbow" solref=".05 .8"/></equality>'),
             arm(loops=(Loop(name="c", type="joint", first="elbow", law=softness(0.05, 0.8)),)),
             "equality/*[@solref]", SOFT, DIRECT, ("softness",)),
-        written("equalities switched off", mjcf(head='<option><flag equality="disable"/></option>',
+        Feature("equalities switched off", mjcf(head='<option><flag equality="disable"/></option>',
             tail='<equality><connect name="c" body1="lower" anchor="0 0 -.3"/></equality>'), arm(),
             "option/flag[@equality]", switched,
             "Leave the equalities out.", ("loops",)),

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import arm, quaternion, rotation, weighing
-from crossbody.cases.files.conformance.feature import MOTION, Feature, written
+from crossbody.cases.files.conformance.arm import HAND, arm, quaternion, rotation, weighing
+from crossbody.cases.files.conformance.feature import MOTION, Feature
 from crossbody.cases.files.inertias import placed
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Loop, Scene
@@ -72,16 +72,8 @@ MESHED = (
 def features() -> list[Feature]:
     """Return the features of URDF."""
 
-    def of(
-        name: str,
-        text: str,
-        scene: Scene,
-        finds: str = "",
-        rule: str = "",
-        rewrite: str = "",
-        about: tuple[str, ...] = MOTION,
-    ) -> Feature:
-        return written(f"URDF: {name}", text, scene, finds, rule, rewrite, about, format="urdf")
+    def of(name: str, *words: Any, **more: Any) -> Feature:
+        return replace(Feature(f"URDF: {name}", *words, **more), format="urdf")
 
     def elbow(more: str, kind: str = "revolute") -> str:
         return urdf_joint("elbow", "upper", "lower", more, kind)
@@ -93,15 +85,7 @@ def features() -> list[Feature]:
         )
     )
     tilted = placed(1.0, np.diag([0.02, 0.03, 0.015]), (0.01, 0.03, -0.15), fixed_rpy)
-    hand = Body(
-        name="hand",
-        parent="lower",
-        position=(0.0, 0.1, -0.3),
-        mass=0.5,
-        com=(0.02, 0.0, 0.01),
-        inertia=(0.003, 0.004, 0.005, 0.0, 0.0, 0.0),
-        orientation=quaternion(fixed_rpy),
-    )
+    hand = replace(HAND, orientation=quaternion(fixed_rpy))
     stand = Body(name="stand", position=(0.3, 0.0, 0.5), orientation=quaternion(fixed_rpy))
     hung = link("hand", ".02 0 .01", 0.5, moments(0.003, 0.004, 0.005)) + urdf_joint(
         "grip", "lower", "hand", '<origin xyz="0 .1 -.3" rpy=".3 .4 .5"/>', "fixed"
@@ -171,10 +155,10 @@ def features() -> list[Feature]:
         of("root that is called world", urdf(base='<link name="world"/>', shoulder=urdf_joint("shoulder", "world",
             "upper", UPPER_AT + '<axis xyz="0 1 0"/>')), urdf_arm(base=False), "link[@name='world']",
             "A link called world is the world."),
-        written("URDF: mesh of a package", urdf(more=MESHED), plain.replace(bodies=(*plain.bodies, tip)),
+        of("mesh of a package", urdf(more=MESHED), plain.replace(bodies=(*plain.bodies, tip)),
             "link/visual/geometry/mesh/../.. | link/collision/geometry/mesh/../..",
             "package://NAME/FILE is a file of the package NAME, which a reader has to be told of.",
-            "Write where it is from the file, as --fix does.", ("reading",), format="urdf",
+            "Write where it is from the file, as --fix does.", ("reading",),
             files={"conformance/part.obj": TETRAHEDRON}),
         of("transmission",
             urdf(more='<transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint '
