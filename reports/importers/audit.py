@@ -76,9 +76,7 @@ def audited(
         SceneError: for a file that cannot be the yardstick, before any importer is asked.
     """
     check_text(path)
-    left_out = {word.strip() for word in without.split(",")}
-    if is_urdf(path):
-        left_out.add("actuators")  # of transmissions, which move nothing by themselves
+    left_out = _left_out(path, without)
     with TemporaryDirectory(prefix="crossbody-audit-") as folder:
         given = meshless(path, Path(folder)) if is_urdf(path) and without_meshes(without) else path
         readings = [Reading(name, given, is_urdf(path), seconds, int(name != FIRST) * BEHIND) for name in engines]
@@ -90,6 +88,16 @@ def audited(
             raise
         with Forms(path, lambda form: opened(form, without, found.job)) as forms:
             yield from _answered(found, readings, left_out, forms)
+
+
+def _left_out(path: Path, without: str) -> set[str]:
+    """Return the quantities to which no reader is held: readers have the whole file."""
+    found = {word.strip().partition(":")[0].removesuffix("s") + "s" for word in without.split(",")}
+    if is_urdf(path):
+        return found | {"actuators"}  # of transmissions, which move nothing by themselves
+    if "tendons" in found and read(path)[0].tendon_armature.any():
+        found |= {"M", "energy"}
+    return found | {"friction", "surfaces"} if "frictions" in found else found
 
 
 def meshless(path: Path, folder: Path) -> Path:

@@ -87,6 +87,21 @@ def test_our_tree_and_mujoco_agree_on_everything_that_is_compared(tmp_path: Path
     assert {key for key, verdict in told.items() if verdict == NONE} == {"armature", "limits", "friction"}
 
 
+@pytest.mark.parametrize(
+    "without",
+    ["friction", "contacts", "limits", "actuators", "loops", "tendons", "tendon:t1", "actuator:m3", "loop:e1"],
+)
+def test_what_is_left_out_is_held_against_nobody(without: str, tmp_path: Path) -> None:
+    """MuJoCo reads the whole file all the same, and nothing of it is called wrong."""
+    path, armature = tmp_path / "parts.xml", "tendon" in without
+    path.write_text(
+        PARTS.replace('name="t1"', 'name="t1" armature=".1" frictionloss=".2"' if armature else 'name="t1"')
+    )
+    [(_, _, found)] = audited(path, ["mujoco"], without, seconds=60.0)
+    assert {row.verdict for row in found} <= {OK, NONE}, found
+    assert {"M", "energy"}.isdisjoint(row.quantity for row in found) == armature
+
+
 @given(
     st.sampled_from(["sphere", "capsule", "cylinder", "box", "ellipsoid"]),
     st.lists(st.floats(0.01, 2.0), min_size=3, max_size=3), st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7),
