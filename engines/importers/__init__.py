@@ -44,6 +44,8 @@ PROCESS = Path(__file__).parent / "beside" / "process.py"
 class Robot(Protocol):
     """A robot file as an engine's own reader has it, in that engine's coordinates.
 
+    What the engine does not have may be left out, if `hidden` or `unseen` says why, and all that would be empty.
+
     Attributes:
         version: of the engine.
         joints: name, body that it moves, kind (free, ball, hinge, slide; unbounded: a hinge by cos and sin; any other

@@ -21,10 +21,6 @@ class _Robot:
         "keyframes": "DART has no keyframes.",
         **dict.fromkeys(("spin", "roll", "margin"), "DART's contacts have sliding friction alone."),
     }  # fmt: skip
-    unseen: dict[str, str] = {}  # noqa: RUF012
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
-    keys: dict[str, list[float]] = {}  # noqa: RUF012
-    precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         import dartpy
@@ -70,7 +66,6 @@ class _Robot:
                     self._joints.append((j, n))
             self.nq += s.getNumDofs()
         self.nv = self.nq
-        self.actuators: dict[str, list[str]] = {}
         if any(node.getShape().getType() == "MeshShape" for _, node in self._solids()):
             self.unseen = {"shapes": "DART's Python does not show the corners of meshes."}
         self.numbers = self._numbers()
@@ -138,9 +133,6 @@ class _Robot:
         bodies = [s.getBodyNode(i) for s in self._s for i in range(s.getNumBodyNodes())]
         placed = {b.getName(): b.getWorldTransform() for b in bodies}
         return {name: (np.array(X.translation()), np.array(X.rotation())) for name, X in placed.items()}
-
-    def ends(self) -> Any:
-        return [[] for _ in self.loops]
 
     def _solids(self) -> Any:
         bodies = [s.getBodyNode(i) for s in self._s for i in range(s.getNumBodyNodes())]

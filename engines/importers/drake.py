@@ -23,10 +23,6 @@ class _Robot:
         **dict.fromkeys(FORCES, BOUNDED), "softness": "Drake's rows have no solref.",
         **dict.fromkeys(("spin", "roll", "margin"), "Drake's contacts have sliding friction alone."),
     }  # fmt: skip
-    unseen: dict[str, str] = {}  # noqa: RUF012
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
-    keys: dict[str, list[float]] = {}  # noqa: RUF012
-    precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         from importlib.metadata import version
@@ -92,9 +88,6 @@ class _Robot:
                 rest = spring.nominal_angle() if hasattr(spring, "nominal_angle") else spring.nominal_position()
                 told["rest"][spring.joint().name()] = [float(rest)]
         return told
-
-    def ends(self) -> Any:
-        return [[] for _ in self.loops]
 
     def drives(self) -> Any:
         """A motor that has a controller is told an angle, any other a force."""

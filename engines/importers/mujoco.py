@@ -18,8 +18,6 @@ FUSED = "MuJoCo's compiler makes links of a URDF that no joint moves one with wh
 
 class _Robot:
     free = ball = "mujoco"
-    unseen: dict[str, str] = {}  # noqa: RUF012
-    precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         import mujoco

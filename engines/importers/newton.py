@@ -29,8 +29,6 @@ class _Robot:
         "surfaces": "Newton's solvers mix the friction of two shapes, each in its own way.",
         "softness": "Newton keeps solref for its MuJoCo solver alone.",
     }  # fmt: skip
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
-    keys: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 2e-4
 
     def __init__(self, path: str, urdf: bool) -> None:
@@ -234,9 +232,6 @@ class _Robot:
         """Forces on a free joint are in the world's axes, wherever it stands; M and velocities are in the joint's."""
         own = self._g.numpy().astype(float) + self._h.numpy()
         return self._wrench.T @ own + self._shift.T @ self._own_mass_matrix() @ self._turn
-
-    def energy(self) -> float:
-        return float("nan")
 
     def frames(self) -> Any:
         told = {}

@@ -34,9 +34,6 @@ class _Robot:
         "actuators": "Pinocchio's model has no actuators.", "tendons": "Pinocchio's model has no tendons.",
         "surfaces": "Pinocchio's shapes have no friction.", "softness": "Pinocchio's reader leaves solref out.",
     }  # fmt: skip
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
-    precision = 0.0
-    refused: tuple[str, ...] = ()
 
     def __init__(self, path: str, urdf: bool) -> None:
         import pinocchio as pin
@@ -68,7 +65,6 @@ class _Robot:
         self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
         self._last: dict[int, str] = {}
         self.joints = [joint for i in range(1, self._m.njoints) for joint in self._joints(i)]
-        self.actuators: dict[str, list[str]] = {}
         self.numbers = self._numbers()
         self.keys = {one.key(): one.data().tolist() for one in self._m.referenceConfigurations}
 

@@ -13,6 +13,13 @@ WIDTHS = {"free": 6, "ball": 3}
 """Velocities of a joint, of others 1."""
 
 
+UNSAID: dict[str, Any] = {
+    "hidden": {}, "unseen": {}, "refused": (), "tendons": {}, "keys": {}, "actuators": {}, "loops": (),
+    "precision": 0.0,
+}  # fmt: skip
+"""What a robot has where its reader says nothing."""
+
+
 def matched(ours: Any, theirs: Any) -> dict[str, int]:
     """Return our joint -> number of theirs: by name; else in order on the body of that name, if the kinds agree."""
     kinds = ["hinge" if joint[2] == "unbounded" else joint[2] for joint in theirs]
@@ -51,7 +58,11 @@ class Measured:
         shown = {"M": moving[0], "bias": moving[1], "gravity": still[1]}
         told = {key: value.tolist() for key, value in shown.items() if key not in lacks}
         told["frames"] = {name: posed(*pose) for name, pose in robot.frames().items()}
-        told["ends"] = [[posed(*pose) for pose in ends] for ends in robot.ends()]
+        told["ends"] = (
+            [[posed(*pose) for pose in ends] for ends in robot.ends()]
+            if hasattr(robot, "ends")
+            else ([[] for _ in robot.loops])
+        )
         if "energy" not in lacks:
             told["energy"] = float(robot.energy())
         if "tendons" not in lacks:
@@ -125,6 +136,9 @@ class Measured:
 
 def measured(robot: Any, job: Any) -> dict[str, Any]:
     """Return what a robot's reader has made of its file, in the coordinates of the job's joints."""
+    for key, value in UNSAID.items():
+        if not hasattr(robot, key):
+            setattr(robot, key, value)
     ours, theirs = job["joints"], [list(joint) for joint in robot.joints]
     found = matched(ours, theirs)
     extra = [joint[0] for i, joint in enumerate(theirs) if i not in found.values()]
@@ -135,7 +149,7 @@ def measured(robot: Any, job: Any) -> dict[str, Any]:
     named = {theirs[i][0]: name for name, i in found.items()}
     told: dict[str, Any] = {
         "status": "read", "version": robot.version, "hidden": dict(robot.hidden), "unseen": dict(robot.unseen),
-        "refused": list(getattr(robot, "refused", ())),
+        "refused": list(robot.refused),
         "numbers": numbers,
         "precision": robot.precision, "missing": [name for name, *_ in ours if name not in found], "extra": extra,
         "actuators": {name: sorted(named.get(one, one) for one in of) for name, of in robot.actuators.items()},
