@@ -105,7 +105,7 @@ def test_every_suite_can_be_drawn_and_says_what_it_stresses(name: str) -> None:
     draw.check(name, suite)
     assert suites.summary(name)
     for place, family in enumerate(suite.families):
-        scenes = list(draw.scenes(name, family, place, 12, 0))
+        scenes = list(draw.scenes(name, family, place, 6, 0))
         assert scenes
         built = 0
         for scene in scenes:
