@@ -13,7 +13,7 @@ from crossbody.cases.mechanisms.maze import closed_forms as cf
 from crossbody.cases.mechanisms.maze import form as maze
 from crossbody.cases.mechanisms.maze.gates import EDGE_BELOW, INWARD, OUTWARD, STRAYED
 from crossbody.cases.mechanisms.maze.geometry import maze_of
-from crossbody.cases.mechanisms.maze.numbers import ABOVE, BELOW, CHANNEL, SECTOR_ABOVE, SECTOR_BELOW, SOLID
+from crossbody.cases.mechanisms.maze.numbers import ABOVE, BELOW, CHANNEL, NORMALS, SECTOR_ABOVE, SECTOR_BELOW, SOLID
 from crossbody.engines import load as load_engine
 from crossbody.reference.systems import maze as reference
 from crossbody.reports import metrics
@@ -216,6 +216,9 @@ def test_ring_is_changed_in_closed_loop_as_by_the_reference():
     assert ring_times(motion) == pytest.approx(ring_times(truth), abs=1e-7)
     changes = [(s.variable, s.before, s.after) for s in motion.switches]
     assert changes == [(s.variable, s.before, s.after) for s in truth.switches]
+    mine, theirs = ([e.contact for e in one.events if e.after == CONTACT] for one in (motion, truth))
+    assert mine == theirs
+    assert all(e.contact < NORMALS for e in motion.events)
     np.testing.assert_allclose(motion.q[-1], truth.q[-1], atol=3e-4 * np.abs(truth.q[-1]).max())
 
 
