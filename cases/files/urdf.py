@@ -185,16 +185,19 @@ def planar(path: Path) -> list[str]:
     return [joint.get("name", "") for joint in parsed(path).findall("joint") if joint.get("type") == "planar"]
 
 
-def bounds(path: Path) -> dict[str, tuple[float, float]]:
-    """Return lowest and highest coordinate of every joint that is bounded: 0 where a <limit> does not say them.
+def bounds(path: Path) -> dict[str, dict[str, float]]:
+    """Return lowest and highest coordinate and force of every joint that has them: 0 where a <limit> does not say them.
 
-    The compiler takes bounds that are alike for none.
+    The compiler takes bounds that are alike, and a largest force of 0, for none.
     """
-    found = {}
+    found: dict[str, dict[str, float]] = {}
     for joint in parsed(path).findall("joint"):
         name, limit = joint.get("name", ""), joint.find("limit")
-        if joint.get("type") in ("revolute", "prismatic") and limit is not None:
-            found[name] = (_number(name, limit, "lower"), _number(name, limit, "upper"))
+        if joint.get("type") in ("revolute", "prismatic", "continuous") and limit is not None:
+            most = abs(_number(name, limit, "effort"))
+            found[name] = {"least force": -most, "most force": most} if "effort" in limit.attrib else {}
+            if joint.get("type") != "continuous":
+                found[name] |= {key: _number(name, limit, key) for key in ("lower", "upper")}
     return found
 
 

@@ -11,8 +11,8 @@ import numpy as np
 FORMATS, PACKAGE, MODULE, TRIED = ("mjcf", "urdf"), "mujoco", "mujoco", ("4.0", "4.0")
 KINDS = ("free", "ball", "slide", "hinge")
 SHAPES = ("plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
-FAR = 1024.0
-"""What is added to a margin so that every row is there, m or rad: a power of 2, which takes the fewest digits."""
+FAR = 1e12
+"""Margin of a bound with which its row is there wherever it is, m or rad."""
 FUSED = "MuJoCo's compiler makes links of a URDF that no joint moves one with what they stand on (fusestatic)."
 
 
@@ -171,27 +171,28 @@ class _Robot:
 
     @cached_property
     def _rows(self) -> Any:
-        """Model and data in which all bounds and contacts have rows: of shapes all are balls, and touch however far."""
+        """Model and data in which all bounds and contacts have rows: bounds are wide, shapes are balls at one place."""
         lib, m = self._lib, copy(self._m)
-        for margin in (m.geom_margin, m.pair_margin, m.jnt_margin, m.tendon_margin):
-            margin[:] += FAR
-        m.body_margin[:] += 2.0 * FAR
-        m.opt.disableflags |= int(lib.mjtDisableBit.mjDSBL_MIDPHASE)
-        m.geom_type[:], m.geom_rbound[:], m.geom_size[:] = int(lib.mjtGeom.mjGEOM_SPHERE), 1.0, 1.0
-        m.opt.cone = int(lib.mjtCone.mjCONE_ELLIPTIC)
         d = lib.MjData(m)
-        lib.mj_fwdPosition(m, d)
+        for margin in (m.jnt_margin, m.tendon_margin):
+            margin[:] = FAR
+        m.geom_type[:], m.geom_rbound[:], m.geom_size[:] = int(lib.mjtGeom.mjGEOM_SPHERE), 1.0, 1.0
+        m.opt.disableflags |= int(lib.mjtDisableBit.mjDSBL_MIDPHASE)
+        m.opt.cone = int(lib.mjtCone.mjCONE_ELLIPTIC)
+        for step in (lib.mj_kinematics, lib.mj_comPos, lib.mj_tendon):
+            step(m, d)
+        d.geom_xpos[:] = 0.0
+        for step in (lib.mj_collision, lib.mj_makeConstraint):
+            step(m, d)
         return m, d
 
     def surfaces(self) -> Any:
         """Of each pair what MuJoCo mixes: friction in force, and margin; of one without a contact nothing is known."""
-        m, d = self._rows
+        d = self._rows[1]
         shapes, told = self._touching(), dict[tuple[int, int], Any]()
-        listed = {tuple(sorted(p)) for p in zip(m.pair_geom1.tolist(), m.pair_geom2.tolist(), strict=True)}
         for one in d.contact:
-            a, b = sorted(one.geom.tolist())
-            far = FAR if (a, b) in listed else 2.0 * FAR
-            told[a, b] = [*np.where(np.arange(5) < one.dim - 1, one.friction, 0.0), one.includemargin - far]
+            rubs = np.where(np.arange(5) < one.dim - 1, one.friction, 0.0)
+            told[tuple(sorted(one.geom.tolist()))] = [*rubs, one.includemargin]
         return [told.get(tuple(sorted((shapes[i], shapes[j]))), [np.nan] * 6) for i, j in self.contacts()]
 
     def softness(self) -> Any:

@@ -158,8 +158,8 @@ def opened(path: Path, without: str = "", job: dict[str, Any] | None = None) -> 
     if is_urdf(path):
         found.wanted["planar"] = planar(path)
         found.wanted["contacts"], found.wanted["softness"] = None, {}  # of which a URDF says nothing
-        for name, both in bounds(path).items():
-            for key, value in zip(("lower", "upper"), both, strict=True):
+        for name, own_bounds in bounds(path).items():
+            for key, value in own_bounds.items():
                 if name in found.wanted["numbers"][key]:
                     found.wanted["numbers"][key][name] = [value]
     return found

@@ -198,6 +198,12 @@ def _placed(body: Body, frame: Any) -> tuple[float, Floats, Floats]:
     return body.mass, p + R @ np.array(body.com), R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
 
 
+def _light(scene: Scene) -> Scene:
+    """Return the scene with bodies of unit inertia and no weight, in whose forces those of actuators lose no digits."""
+    unit: dict[str, Any] = {"mass": 1.0, "com": (0.0,) * 3, "inertia": (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)}
+    return scene.replace(bodies=tuple(replace(body, **unit) for body in scene.bodies), gravity=(0.0,) * 3)
+
+
 def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Sequence[Any]) -> list[dict[str, Any]]:
     """Return M, bias, gravity and energy at every state."""
     from crossbody.reference.tree import mechanism
@@ -213,21 +219,21 @@ def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Seq
         tendons=tuple(replace(part, **slack) for part in scene.tendons),
         actuators=tuple(replace(part, **plain) for part in scene.actuators),
     )  # fmt: skip
-    table, n = tabulate(bare), scene.nv
-    w, none, units = np.zeros(table.scratch), np.zeros(len(scene.actuators)), np.eye(len(scene.actuators))
+    heavy, light, n = tabulate(bare), tabulate(_light(bare)), scene.nv
+    none, units = np.zeros(len(scene.actuators)), np.eye(len(scene.actuators))
     widths = [WIDTHS[joint.type][1] for joint in scene.joints]
     motors = np.repeat([value for (value,) in _numbers(scene)["armature"].values()], widths)
     own = np.repeat([joint.armature for joint in scene.joints], widths)
 
-    def of(q: Floats, v: Floats, u: Floats) -> tuple[Floats, Floats]:
+    def of(q: Floats, v: Floats, u: Floats, table: Any = heavy) -> tuple[Floats, Floats]:
         M, f = np.zeros((n, n)), np.zeros(n)
-        mechanism.dynamics(0.0, q, v, u, table.p, M, f, w)
+        mechanism.dynamics(0.0, q, v, u, table.p, M, f, np.zeros(table.scratch))
         return M + np.diag(motors - own), f
 
     found = []
     for (q, v), here in zip(states, frames, strict=True):
         M, free = of(q, v, np.zeros(0))
-        held = of(q, v, none)[1]
+        held, alone = (of(q, v, u, light)[1] for u in (none, np.zeros(0)))
         weight = sum(m * np.array(scene.gravity) @ c for m, c, _ in (_placed(b, here[b.name]) for b in scene.bodies))
         found.append(
             {
@@ -236,9 +242,9 @@ def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Seq
                 "gravity": (-of(q, np.zeros(n), np.zeros(0))[1]).tolist(),
                 "energy": float(v @ M @ v / 2 - weight),
                 "v": v.tolist(),
-                "held": (held - free).tolist(),
+                "held": (held - alone).tolist(),
                 "driven": {
-                    part.name: (of(q, v, unit)[1] - held).tolist()
+                    part.name: (of(q, v, unit, light)[1] - held).tolist()
                     for part, unit in zip(scene.actuators, units, strict=True)
                 },
             }

@@ -239,6 +239,18 @@ def test_a_large_number_of_one_joint_hides_no_difference_of_another(
     assert rows_of(tmp_path / "two.xml", "mujoco", here, there)[quantity] == WRONG
 
 
+def test_a_mass_far_out_hides_no_force_of_an_actuator(tmp_path: Path) -> None:
+    """Its bias is 1e18 N m, of which a force of 3 N m is no digit."""
+    far = '<inertial pos="0 0 1e9" mass="1" diaginertia=".1 .1 .1"/>'
+    here, there = (
+        TWO.format(kind="slide", of1="", of2="").replace('<geom size=".1" pos="0 0 .5" mass="1"/>', far).replace(
+            "</worldbody>", f'</worldbody><actuator><position joint="j2" kp="10" kv="{kv}" gear="3"/></actuator>')
+        for kv in (1, 1.01)
+    )  # fmt: skip
+    assert rows_of(tmp_path / "two.xml", "mujoco", here, here)["actuators"] == OK
+    assert rows_of(tmp_path / "two.xml", "mujoco", here, there)["actuators"] == WRONG
+
+
 def test_a_ball_joint_has_a_bound_that_is_compared(tmp_path: Path) -> None:
     here, there = (TWO.format(kind="ball", of1=of, of2="") for of in ('limited="true" range="0 40"', ""))
     assert rows_of(tmp_path / "ball.xml", "mujoco", here, there)["limits"] == WRONG
