@@ -97,7 +97,7 @@ def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = 
         return math.nan
     if rho.max() < ALIKE * _ceiling(a):
         return math.nan
-    heights, unsure = np.array([_height(rho, k) for k in peaks]).T
+    heights, unsure = np.array([_height(rho, int(k)) for k in peaks]).T
     high = heights + unsure >= RIVAL * heights.max()
     rivals = _rivals(b, most, peaks[high], (heights - unsure)[high])
     k = int(rivals[np.argmin(np.abs(lags[rivals]))])
