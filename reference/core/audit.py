@@ -90,17 +90,20 @@ def account(K: Any, s: Any, m: Model, w: Work) -> int:
     0, NOT_FINITE or INCONSISTENT.
 
     A step may move every coordinate by its tolerance. That changes the kinetic energy by at most 2 sqrt(T T'), T' that
-    of the tolerances as velocities, and the potential energy by about rtol of its size.
+    of the tolerances as velocities, and the potential energy by about rtol of its size, but no less than what the loads
+    that rows carry do over the tolerance of positions: a weight that hangs at height 0 has no energy at all.
     """
     nq, nc = s.nq, s.nc
     K.energy(w.y[:nq], w.y[nq:], m.p, w.e)
     kinetic, potential = w.e[0], w.e[1]
-    booked, moved = w.z[nc] - w.z[nc + 1], abs(w.z[nc]) + abs(w.z[nc + 1])
+    booked, moved, load = w.z[nc] - w.z[nc + 1], abs(w.z[nc]) + abs(w.z[nc + 1]), 0.0
     for i in range(nc):
         booked += w.z[i]
         moved += abs(w.z[i])
+        load += abs(w.lam0[i])
     s.energy_size = max(s.energy_size, kinetic + abs(potential) + moved)
     tolerance = s.rtol * s.energy_size + 2.0 * s.atol * np.sqrt(kinetic * s.energy_unit) + s.atol**2 * s.energy_unit
+    tolerance += s.atol * load
     s.energy_allowed += OPEN * np.sqrt(nq + s.n) * tolerance
     s.energy_open = kinetic + potential - s.energy_start - booked
     if not np.isfinite(s.energy_open):

@@ -50,19 +50,25 @@ def times(a: Jet, b: Jet) -> Jet:
 
 
 @kernels.helper
+def part(a: Any, b: Any) -> Any:
+    """Return a / b of two numbers, what is no number where b is 0: of complex ones the division itself would raise."""
+    return np.nan * a if b == 0.0 else a / b
+
+
+@kernels.helper
 def over(a: Jet, b: Jet) -> Jet:
     """Return a / b."""
-    x = a[0] / b[0]
-    y = (a[1] - x * b[1]) / b[0]
-    return x, y, (a[2] - 2.0 * y * b[1] - x * b[2]) / b[0]
+    x = part(a[0], b[0])
+    y = part(a[1] - x * b[1], b[0])
+    return x, y, part(a[2] - 2.0 * y * b[1] - x * b[2], b[0])
 
 
 @kernels.helper
 def root(a: Jet) -> Jet:
-    """Return the square root of a."""
+    """Return the square root of a; at 0 it has no derivatives."""
     x = np.sqrt(a[0])
-    y = 0.5 * a[1] / x
-    return x, y, (0.5 * a[2] - y * y) / x
+    y = part(0.5 * a[1], x)
+    return x, y, part(0.5 * a[2] - y * y, x)
 
 
 @kernels.helper

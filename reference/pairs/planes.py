@@ -17,6 +17,7 @@ from crossbody.reference.pairs.jets import (
     dot,
     less,
     moved,
+    part,
     root,
     scaled,
     shifted,
@@ -45,7 +46,7 @@ def rim(P: Vector, N: Vector, E: Vector, X: Vector, Y: Vector, r: float) -> Gap:
     x, y = dot(N, X), dot(N, Y)
     s = root(add(times(x, x), times(y, y)))
     h = less(dot(N, apart(E, P)), scaled(r, s))
-    return h, value(N), value(moved(moved(E, -r * x[0] / s[0], X), -r * y[0] / s[0], Y))
+    return h, value(N), value(moved(moved(E, part(-r * x[0], s[0]), X), part(-r * y[0], s[0]), Y))
 
 
 @kernels.helper
@@ -53,5 +54,7 @@ def ellipsoid(P: Vector, N: Vector, C: Vector, X: Vector, Y: Vector, Z: Vector, 
     """Return the gap of an ellipsoid with semi-axes of these sizes along X, Y, Z."""
     x, y, z = scaled(size[0], dot(N, X)), scaled(size[1], dot(N, Y)), scaled(size[2], dot(N, Z))
     s = root(add(add(times(x, x), times(y, y)), times(z, z)))
-    low = moved(moved(moved(C, -size[0] * x[0] / s[0], X), -size[1] * y[0] / s[0], Y), -size[2] * z[0] / s[0], Z)
+    low = moved(
+        moved(moved(C, part(-size[0] * x[0], s[0]), X), part(-size[1] * y[0], s[0]), Y), part(-size[2] * z[0], s[0]), Z
+    )
     return less(dot(N, apart(C, P)), s), value(N), value(low)

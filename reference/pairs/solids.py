@@ -24,6 +24,7 @@ from crossbody.reference.pairs.jets import (
     less,
     moved,
     over,
+    part,
     root,
     scaled,
     shifted,
@@ -66,9 +67,9 @@ def _beyond(s: Jet, half: float, side: int) -> Jet:
 
 @kernels.helper
 def _toward(D: Vector, d: Jet) -> Distance:
-    """Return the length d of D and its direction."""
+    """Return the length d of D and its direction; not a number where D has none."""
     x, y, z = value(D)
-    return d, (x / d[0], y / d[0], z / d[0])
+    return d, (part(x, d[0]), part(y, d[0]), part(z, d[0]))
 
 
 @kernels.helper
@@ -137,7 +138,7 @@ def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float, sides:
         return _face(s, half, A)
     rho = root(square)
     x, y, z = value(out)
-    return shifted(rho, -radius), (x / rho[0], y / rho[0], z / rho[0])
+    return shifted(rho, -radius), (part(x, rho[0]), part(y, rho[0]), part(z, rho[0]))
 
 
 @kernels.helper

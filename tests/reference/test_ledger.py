@@ -1,7 +1,10 @@
 """The energy account of spec 1.4: E(t) - E(0) = input - dissipated + work of every row."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from friction_scenes import LAW, G, box_on_floor, run
 from gusty import gusty
 from mechanisms import ball, flyby, oscillator, sliders
 from wall_pendulum import wall_pendulum
@@ -112,3 +115,14 @@ def test_a_first_step_that_is_some_tolerances_off_contradicts_nothing():
     values = {"a0": 121796.9705728013, "a1": 570.2599202694515, "height": -0.005680055905624148}
     case = cases.load("bouncing_ball", "linear", t_end=0.5, speed=-0.9301994487774878, **values)
     assert engines.load("reference").prepare(case, "compiled").run().outcome.ok
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+@pytest.mark.parametrize("sunk", [0.0, 0.25])
+def test_what_rests_without_any_energy_has_an_account(mu: float, sunk: float) -> None:
+    """Loads over the tolerance of positions are work too: of a weight at height 0 there is no other."""
+    scene = box_on_floor(mu)
+    floor, box = scene.shapes
+    low = scene.replace(shapes=(floor, replace(box, position=(0.0, 0.0, 0.1))))
+    found = run(low, [0, 0, -sunk * G / LAW.a0, 1, 0, 0, 0], np.zeros(6), 0.2, rtol=1e-9)
+    assert found.outcome is Outcome.FINISHED, found.message

@@ -107,6 +107,26 @@ def test_a_sphere_against_a_solid(name: str) -> None:
         check_derivatives(gap)
 
 
+@pytest.mark.parametrize("kind", [1.0, 1.0 + 0.0j])
+@pytest.mark.parametrize("seed", range(5))
+def test_shapes_whose_middles_meet_have_no_direction_in_real_and_complex_kernels(seed: int, kind: complex) -> None:
+    """Nothing raises, and nothing is a number that says where they part; gaps are still known."""
+    rng = np.random.default_rng(seed)
+    one = Frame(rng, fixed=True)
+    M, (_, _, A) = one.at(0.0 * kind)
+    two = Frame(rng, fixed=True)
+    two.p = one.p
+    N, (_, _, B) = two.at(0.0 * kind)
+    K, L = solids.segments(M, A, SIZE[1], N, B, LONG)
+    for d, n in (solids.point(M, M), solids.segment(M, M, A, SIZE[1]), solids.point(L, K)):
+        assert d[0] == 0.0
+        assert np.isnan(d[1:]).all()
+        assert np.isnan(n).all()
+    d, n = solids.cylinder(M, M, A, SIZE[0], 3.0 * SIZE[0])
+    assert d[0] == -SIZE[0]
+    assert np.isnan(n).all()
+
+
 @pytest.mark.parametrize("sine", [1e-1, 1e-2, 1e-3, 1.1e-4])
 def test_capsules_that_are_nearly_parallel_part_as_their_points_do(sine: float) -> None:
     """Where the nearest points run along, the distance does not: its rate is that of the points where they meet."""
