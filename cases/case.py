@@ -21,6 +21,7 @@ from crossbody.cases.trajectory import Trajectory
 if TYPE_CHECKING:
     from crossbody.cases.control import Control
     from crossbody.cases.form import Form
+    from crossbody.cases.gates import Gates
     from crossbody.cases.metric import CaseMetric
     from crossbody.cases.scene import Scene
 
@@ -304,6 +305,7 @@ class Case:
         scene: bodies, joints and what acts between them, of which engines build their models; the reference takes the
             kernels of `mechanism` where there are some. `file` is where it was read from, `findings` what is strange.
         force: what acts on the scene beside its parts; the kernels of `mechanism` have it.
+        gates: rows beside those of the scene, and what opens and closes them; the kernels of `mechanism` have theirs.
         form: (case, whether servos act, whether inputs stand for a sampled controller) -> the case on a scene, for
             engines, where its own coordinates are others.
         consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
@@ -340,6 +342,7 @@ class Case:
     consistent: bool = True
     scene: Scene | None = None
     force: Force | None = None
+    gates: Gates | None = None
     form: Callable[..., Form] | None = None
     rank: int = -1
     act0: Floats = field(default_factory=lambda: np.zeros(0))
@@ -365,9 +368,12 @@ class Case:
             )
         if not (math.isfinite(self.t_end) and self.t_end > 0):
             raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
-        if self.force is not None and (self.general or self.scene is None):
-            what = "is no scene" if self.scene is None else "has no kernels of its own, in which the reference has it"
-            raise SceneError(f"Case {self.name} has a force but {what}.")
+        for name, part in (("a force", self.force), ("gates", self.gates)):
+            if part is not None and (self.general or self.scene is None):
+                what = (
+                    "is no scene" if self.scene is None else "has no kernels of its own, in which the reference has it"
+                )
+                raise SceneError(f"Case {self.name} has {name} but {what}.")
         self._put_control()
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))

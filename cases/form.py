@@ -55,11 +55,12 @@ def formed(case: Case, scene: Scene, q0: Floats, v0: Floats, **changes: Any) -> 
         scene: that stands for it.
         q0: start (nq,), in the coordinates of the joints.
         v0: velocities there (nv,).
-        changes: other fields; inputs and control are none if not given, and law is the scene's own.
+        changes: other fields; inputs and control are none if not given, law and contacts are the scene's own.
     """
-    own: dict[str, Any] = {"inputs": None, "control": None, "law": law_of(scene), **changes}
+    contacts = tuple(rows_of(scene)[0])
+    own: dict[str, Any] = {"inputs": None, "control": None, "law": law_of(scene), "contacts": contacts, **changes}
     return replace(
         case, form=None, scene=scene, q0=q0, v0=v0, coordinates=coordinates(scene),
-        velocities=coordinates(scene, RATES), quaternions=quaternions(scene), contacts=tuple(rows_of(scene)[0]),
+        velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         closed_form=None, claims=(), metrics={}, limits=(), **own,
     )  # fmt: skip

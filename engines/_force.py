@@ -1,4 +1,4 @@
-"""Forces of cases, compiled: engines ask for them in every stage of a step."""
+"""Functions of cases, compiled: engines ask for forces, and for rows, in every stage of a step."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ Acting = Callable[[float, Floats, Floats, Floats], None]
 
 def acting(force: Force) -> Acting:
     """Return a force as a function of time and state alone."""
-    kernel, numbers = _kernel(force.function), force.numbers
+    function, numbers = kernel(force.function, _SIGNATURE), force.numbers
 
     def act(t: float, q: Floats, v: Floats, out: Floats) -> None:
-        kernel(t, q, v, numbers, out)
+        function(t, q, v, numbers, out)
 
     return act
 
 
 @cache
-def _kernel(function: FunctionType) -> Any:
-    return compiled(_over_compiled(function), [_SIGNATURE])
+def kernel(function: Any, signature: Any) -> Any:
+    """Return a function of a case, and all that it calls, compiled."""
+    return compiled(_over_compiled(function), [signature])
 
 
 def _over_compiled(function: FunctionType) -> FunctionType:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Case, Inputs, Mode, Trajectory
+from crossbody.cases import Case, CaseUnsupported, Inputs, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.form import Form
 from crossbody.engines._scene import places
@@ -24,6 +24,7 @@ def form_of(case: Case, powered: bool = True, steady: bool = False) -> Form | No
 
     Raises:
         SceneError: for a start that the case's equations refuse.
+        CaseUnsupported: for what the case's own scene cannot say.
     """
     if case.form is None:
         return None
@@ -32,6 +33,15 @@ def form_of(case: Case, powered: bool = True, steady: bool = False) -> Form | No
         check(case.parameters, case.q0, case.v0)
     found: Form = case.form(case, powered, steady)
     return found
+
+
+def why_no_form(case: Case) -> str | None:
+    """Return why engines cannot build a case; None if they may."""
+    try:
+        form_of(case)
+    except CaseUnsupported as error:
+        return str(error)
+    return None
 
 
 def on_scene(case: Case) -> Case:

@@ -78,12 +78,13 @@ class LevelMachine:
     Args:
         rows: of the mechanism.
         rtol: to which positions are known; rows that close touch together where it cannot tell which comes first.
+        fast: rate that counts as seen from the start, of bodies that move along their rows and not against them.
     """
 
-    def __init__(self, rows: Rows, rtol: float = 0.0) -> None:
+    def __init__(self, rows: Rows, rtol: float = 0.0, fast: float = 0.0) -> None:
         self.rows, self.rtol = rows, rtol
         self.own = switched(rows)
-        self.slow = 0.0
+        self.slow = SLOW * fast
         self._closed: set[int] = set()
         self._unmoved: set[int] = set()
         self._order: dict[Modes, tuple[NDArray[np.intp], list[int]]] = {}
@@ -126,7 +127,9 @@ class LevelMachine:
         modes, passed = self._fire(h, modes, fired)
         h[[i for i, which in fired if which == GAP]] = 0.0
         modes, more, cycle = self._iterate(q, v, h, hd, modes)
-        self._closed = {i for i in self.own if h[i] <= 0.0}
+        near = self._closed | {i for i, before, after, _ in (*passed, *more) if before != FREE == after}
+        known = self._known(q)  # whether what is let go is just above its surface or just below is rounding
+        self._closed = {i for i in self.own if h[i] <= 0.0 or (i in near and h[i] <= known)}
         return Settled(modes, v, (*passed, *more), cycle=cycle)
 
     def _fire(self, h: Floats, modes: Modes, fired: Fired) -> tuple[Modes, list[Passed]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ class Log:
         mode: modes of the rows.
         events: transitions, in order.
         switches: changes of discrete variables, in order.
+        follows: index of the row whose mode each one shares, which has no events of its own; -1 for none.
     """
 
     def __init__(self) -> None:
@@ -39,6 +40,7 @@ class Log:
         self.mode: list[Modes] = []
         self.events: list[Event] = []
         self.switches: list[Switch] = []
+        self.follows: Sequence[int] = ()
 
     def add(self, t: float, q: Floats, v: Floats, lam: Any, mode: Modes) -> None:
         """Append one instant; q and v are kept, not copied."""
@@ -49,7 +51,7 @@ class Log:
     def switch(self, t: float, before: Modes, after: Modes) -> None:
         """Append an event for every row whose mode changed."""
         for i, (b, a) in enumerate(zip(before, after, strict=True)):
-            if a != b:
+            if a != b and (not self.follows or self.follows[i] < 0):
                 self.events.append(Event(t=t, contact=i, before=Mode(b), after=Mode(a)))
 
     def columns(self) -> tuple[Floats, Floats, Floats]:

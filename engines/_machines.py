@@ -110,8 +110,9 @@ class Machine(Protocol):
 
 
 def first_modes(rows: Rows) -> Modes:
-    """Every switched row FREE, every other BILATERAL."""
-    return tuple(int(Mode.FREE if u else Mode.BILATERAL) for u in rows.unilateral)
+    """Every switched row FREE, and what follows one; every other BILATERAL."""
+    opens = (u or leader >= 0 for u, leader in zip(rows.unilateral, rows.follows, strict=True))
+    return tuple(int(Mode.FREE if one else Mode.BILATERAL) for one in opens)
 
 
 def switched(rows: Rows) -> tuple[int, ...]:

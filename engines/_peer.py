@@ -58,8 +58,17 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
 """What no engine for bodies on a line shows; see `crossbody.engines.Engine`."""
 
 
+def why_beside(engine: str, case: Case) -> str | None:
+    """Return why an engine that builds a scene's own parts cannot run a case; None if these are all that it has."""
+    more = {"forces": case.force, "rows and gates": case.gates, "a scene in other coordinates": case.form}
+    found = [name for name, part in more.items() if part is not None]
+    return f"{engine} builds the parts of a scene alone, and {case.label} has {found[0]} beside." if found else None
+
+
 def why_not(engine: str, case: Case) -> str | None:
     """The sentence for a case that is not of bodies on a line, or has friction."""
+    if (found := why_beside(engine, case)) is not None:
+        return found
     if case.scene is not None and (found := frictional(case.scene)):
         return found
     reason = why_no_line(case)

@@ -23,6 +23,7 @@ import numpy as np
 from crossbody.cases.case import Case, Coordinate, Law, Parameter, Value
 from crossbody.cases.mechanisms.maze import geometry
 from crossbody.cases.mechanisms.maze.claims import claims, fallen
+from crossbody.cases.mechanisms.maze.form import in_plane
 from crossbody.cases.mechanisms.maze.limits import limits
 from crossbody.cases.mechanisms.maze.metrics import METRICS
 
@@ -121,6 +122,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
             a2=np.zeros(rows),
             unilateral=np.arange(rows) < NORMAL,
         ),
+        form=in_plane,
         claims=claimed,
         metrics=METRICS,
         limits=limits(claimed, fallen(p, maze)),

@@ -16,7 +16,7 @@ from crossbody.cases.scene import Shape
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, line
-from crossbody.engines._peer import HIDDEN, why_not
+from crossbody.engines._peer import HIDDEN, why_beside, why_not
 from crossbody.engines._peer_steps import STEPS, no_rigid_contact, settings, stepped
 from crossbody.engines._real_time import one_set
 from crossbody.engines._rubbing import RubbingRun
@@ -112,7 +112,7 @@ class Dart(Engine):
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         if case.scene is not None and frictional(case.scene):
-            return _contacts.why_not(case.scene)
+            return why_beside("DART", case) or _contacts.why_not(case.scene)
         if profile == "default":
             return (
                 "Without friction DART differs from the profile matched by its restitution alone, which is a setting."

@@ -14,7 +14,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, followed, law_name, line
-from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
+from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_beside, why_not
 from crossbody.engines._rubbing import RIGID, RubbingRun
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.drake import _scene
@@ -94,7 +94,7 @@ class Drake(Engine):
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         if case.general and case.scene is not None:
-            return _scene.why_not(case.scene, profile)
+            return why_beside("Drake", case) or _scene.why_not(case.scene, profile)
         reason = why_not("Drake", case)
         if reason is None and profile != "matched" and not case.law.unilateral.all():
             return "A contact of a MultibodyPlant pushes only: a row that is always on is none."

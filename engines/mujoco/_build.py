@@ -160,17 +160,17 @@ def _add_loop(spec: Any, loop: Loop) -> None:
 def _add_contact(spec: Any, bodies: Mapping[str, Any], contact: Contact) -> None:
     """Add a pair by itself, and its shapes where no other pair has added them; nothing else touches them."""
     for shape in (contact.first, contact.second):
-        _add_shape(spec, bodies, shape)
+        add_shape(spec, bodies, shape)
     _add_pair(spec, contact, contact.pair.name, contact.second.name)
 
 
 def _add_corners(spec: Any, bodies: Mapping[str, Any], contact: Contact) -> None:
     """Add every corner of a hull as the least ball that there is, and a pair of each with the plane."""
-    _add_shape(spec, bodies, contact.first)
+    add_shape(spec, bodies, contact.first)
     shape = contact.second
     at = np.array(shape.position) + np.array(shape.corners) @ matrices(np.array(shape.orientation)).T
     for row, name, corner in zip(contact.normals, corner_names(shape), at, strict=True):
-        _add_shape(spec, bodies, Shape(name=name, body=shape.body, size=(POINT, 0.0, 0.0), position=corner))
+        add_shape(spec, bodies, Shape(name=name, body=shape.body, size=(POINT, 0.0, 0.0), position=corner))
         _add_pair(spec, contact, row, name)
 
 
@@ -179,7 +179,7 @@ def corner_names(shape: Shape) -> tuple[str, ...]:
     return tuple(f"{shape.name}\n{k}" for k in range(len(shape.corners)))
 
 
-def _add_shape(spec: Any, bodies: Mapping[str, Any], shape: Shape) -> None:
+def add_shape(spec: Any, bodies: Mapping[str, Any], shape: Shape) -> None:
     """Add a shape that touches nothing by itself, if it is not there."""
     if spec.geom(shape.name) is not None:
         return

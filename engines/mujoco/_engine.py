@@ -15,7 +15,7 @@ from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Tr
 from crossbody.cases.files.warned import captured
 from crossbody.cases.registry import Registry
 from crossbody.engines import settings as _settings
-from crossbody.engines._formed import FormedRun, form_of, linearised, on_scene
+from crossbody.engines._formed import FormedRun, form_of, linearised, on_scene, why_no_form
 from crossbody.engines._scene import module_of
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.linear import Spot, Tangent
@@ -48,6 +48,7 @@ class MujocoRun(Run):
         case, scene = self.case, self.scene
         dt, limit = float(self.settings["dt"]), int(self.settings["max_steps"])
         tape = Tape(scene.model, scene.data, min(limit, int(1.1 * case.t_end / dt) + 64, 1_000_000))
+        tape.follows = scene.follows
         march = March(scene, tape, dt, limit)
         with captured() as warned, hooked(scene.hook):
             start = perf_counter()
@@ -56,6 +57,7 @@ class MujocoRun(Run):
         heard = (f"MuJoCo warned: {w.strip()}" for w in dict.fromkeys((*self.said, *warned)))
         message = " ".join(w for w in (march.message, self.rounded, *heard) if w)
         counts = {"located": march.trials}
+        tape.switches += scene.switches
         with captured():  # gaps are looked at with the same model, and have no more to say
             found = tape.trajectory(scene.observe, march.outcome, message, march.steps, wall, counts)
         return found if scene.acting is None else scene.acting.told(found)
@@ -110,6 +112,8 @@ class Mujoco(Engine):
         """Mechanisms without a model here cannot be run."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
+        if (refused := why_no_form(case)) is not None:
+            return refused
         case = on_scene(case)
         if profile == "as_is" and case.scene is None:
             return f"The profile as_is runs a robot file as it stands, and {case.name} is none; its own is default."

@@ -7,6 +7,7 @@ the integrator's first stage: mj_forward, then the integrator alone, instead of 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -28,10 +29,10 @@ SAME_INSTANT = 100
 def integrator(model: Any, data: Any) -> Callable[[], None]:
     """Return what mj_step does after its forward pass, for the integrator that the model names."""
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-        return lambda: mujoco.mj_RungeKutta(model, data, 4)
+        return partial(mujoco.mj_RungeKutta, model, data, 4)
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
-        return lambda: mujoco.mj_Euler(model, data)
-    return lambda: mujoco.mj_implicit(model, data)
+        return partial(mujoco.mj_Euler, model, data)
+    return partial(mujoco.mj_implicit, model, data)
 
 
 class March:
@@ -63,6 +64,9 @@ class March:
         self.now = self._settled(scene.modes())
         self.tape.switch(0.0, tuple(m if m == Mode.BILATERAL else int(Mode.FREE) for m in self.now), self.now)
         self.tape.record(scene.lam(), self.now)
+        if why := scene.lost():
+            self._end(Outcome.LOST, why)
+            return
         for instant in instants:
             if not self._until(instant) or not self._change(instant):
                 return
@@ -84,7 +88,7 @@ class March:
         """Step to t_end, s; whether the run goes on."""
         scene, data, opt, dt = self.scene, self.scene.data, self.scene.model.opt, self.dt
         model, forward, advance, record = scene.model, mujoco.mj_forward, self.advance, self.tape.record
-        modes, safe, lam = scene.modes, scene.safe, scene.lam
+        modes, safe, lam, lost = scene.modes, scene.safe, scene.lam, scene.lost
         now, t, last = self.now, float(data.time), t_end - dt * (1 + 1e-9)
         opt.timestep = dt
         while t_end - t >= 1e-9 * dt:
@@ -104,6 +108,8 @@ class March:
                     return self._end(Outcome.MODE_CYCLE, f"rows {now} and {self.now} switch for ever")
                 now, opt.timestep = self.now, dt
             record(lam(), now)
+            if why := lost():
+                return self._end(Outcome.LOST, why)
         if scene.instants:
             data.time = t_end  # instants are met exactly, whatever the sum of the steps
         return True

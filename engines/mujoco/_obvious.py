@@ -13,7 +13,7 @@ from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import by_shapes
 from crossbody.engines._log import Modes
 from crossbody.engines._scene import Forces
-from crossbody.engines.mujoco._build import compiled, spec_of
+from crossbody.engines.mujoco._build import add_shape, compiled, spec_of
 from crossbody.engines.mujoco._rows import Rows
 from crossbody.engines.mujoco._rubs import EDGES
 
@@ -22,6 +22,9 @@ USUAL = 1e4
 MuJoCo's own constants (solref 0.02 1) would have them stick together."""
 SMALL, SLIGHT = 1e-12, 1e-8
 """Gap that rounding may make of bodies that touch, m or rad; acceleration of the heaviest that its push is then."""
+LOCKED = 1e-3
+"""Inertia of a joint amid all, over their mean, below which one is so heavy that it stands still. The tolerance of
+MuJoCo's solver is relative to the mean: beside 1e6 kg m^2 it would never start, and is relative to that amid all."""
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 
 
@@ -72,10 +75,14 @@ class Obvious(Rows):
         return always + tuple(FREE if gap > SMALL else mode for gap, mode in zip(gaps, closed, strict=True))
 
 
-def obvious(scene: Scene) -> Any:
+def obvious(scene: Scene, *, colliding: bool = False) -> Any:
     """Return the model of a scene: MuJoCo's contacts, solids in the place of point masses, its own law of rows.
 
     What is a bound in the scene is a shape among all others; pairs that the scene states are the only ones.
+
+    Args:
+        scene: what it is made of.
+        colliding: whether all shapes collide, in the place of rows that no part of the scene has.
     """
     given, scene = scene, by_shapes(scene)
     solids = _solids(scene)
@@ -92,6 +99,11 @@ def obvious(scene: Scene) -> Any:
             geom.contype = geom.conaffinity = 1
             geom.solref = elastic.get(name, geom.solref)
         spec.delete(pair)
+    for shape in scene.shapes if colliding else ():
+        add_shape(spec, {shape.body: spec.body(shape.body) if shape.body else spec.worldbody}, shape)
+        geom = spec.geom(shape.name)
+        geom.contype = geom.conaffinity = 1
+        geom.friction = shape.friction
     for name, mass in solids.items():
         spec.body(name).geoms[0].mass = mass
     model = compiled(spec, scene)
@@ -100,6 +112,8 @@ def obvious(scene: Scene) -> Any:
         for kind in ("ref", "imp"):
             getattr(model, name.format(kind))[:] = getattr(plain, f"geom_sol{kind}")[0]
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if (part := float(np.median(model.dof_M0)) / model.stat.meaninertia) < LOCKED:
+        model.opt.tolerance *= part
     return model
 
 

@@ -6,9 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from crossbody.cases import Switch
 from crossbody.engines._acting import Acting
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines.mujoco._globals import Hook
+
+
+def _goes_on() -> str:
+    """Nothing ends a motion before its horizon."""
+    return ""
 
 
 def _nothing(_t: float) -> None:
@@ -39,6 +45,9 @@ class Scene:
             lam >= 0 (matched profile only).
         entered: modes of rows that push or not -> those of rows with two sets of constants, which collide first.
         outlives: whether a row that pushes stays on above its surface until it no longer does, as the law has it.
+        lost: -> why the motion has ended, as the case's own switch says; empty while it goes on.
+        follows: index of the row whose mode each one shares; empty where none does.
+        switches: changes of the case's discrete variables, in order.
         machine: which state machine the rows follow.
         audit: the physics read back from the compiled model.
     """
@@ -60,5 +69,8 @@ class Scene:
     margins: Callable[[], list[tuple[float, float]]] | None = None
     entered: Callable[[Sequence[int]], Modes] = tuple
     outlives: bool = False
+    lost: Callable[[], str] = _goes_on
+    switches: Sequence[Switch] = ()
+    follows: Sequence[int] = ()
     machine: str = "memoryless"
     audit: Mapping[str, Any] = field(default_factory=dict)

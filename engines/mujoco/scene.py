@@ -23,12 +23,14 @@ from crossbody.cases.scene_contacts import frictional, rough
 from crossbody.cases.scene_rows import rows_of, under_law
 from crossbody.engines._acting import Acting
 from crossbody.engines._force import acting as acting_of
+from crossbody.engines._gates import ALL_AT_ONCE
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scale import depths, resolving_step
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of
 from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
+from crossbody.engines.mujoco._gated import GatedRows
 from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import mass_matrix, numbers
 from crossbody.engines.mujoco._obvious import Obvious, obvious
@@ -68,6 +70,10 @@ CONES = {
 OF_FORCE = 1.5
 """Time constants of what answers to a force that a step may be long: Runge-Kutta 4 is stable up to 2.8."""
 SOFT = "The file's rows are soft: their law varies with depth."
+OWN_CONTACTS = (
+    "MuJoCo has no row for what this case has beside its shapes, as rolling on the face of a ring: what its own "
+    "contacts make of the shapes is the profile default."
+)
 HIDDEN = "MuJoCo has a row for a bound only where it acts."
 
 
@@ -77,6 +83,8 @@ def why_not(case: Case, profile: str) -> str | None:
         return (
             "What MuJoCo makes of a robot file by itself is the profile as_is; default is that of scenes without one."
         )
+    if profile != "default" and case.gates is not None:
+        return OWN_CONTACTS
     if profile == "matched" and case.scene is not None and (found := frictional(case.scene)):
         return found
     if profile == "matched" and case.fsm != "level":
@@ -193,7 +201,7 @@ def build(
         model = held(_from_file(case))
         model = model if reader == "file" else rebuilt(scene, model)
     elif profile == "default":
-        model = obvious(scene)
+        model = obvious(scene, colliding=case.gates is not None)
     else:
         model = matched(scene)
     _set_cone(model.opt, cone, impratio, noslip)
@@ -201,7 +209,9 @@ def build(
         model.geom_solref[:, 0] = model.pair_solref[:, 0] = timeconst
     data = mujoco.MjData(model)
     switched = Switched(scene, model, data) if profile == "matched" else None
-    rows, acting = switched or (Obvious if profile == "default" else Rows)(scene, model, data), Acting(case)
+    gated = GatedRows(case, scene, model, data) if case.gates is not None else None
+    rows = switched or gated or (Obvious if profile == "default" else Rows)(scene, model, data)
+    integrated, acting = _reading(integrated, gated), Acting(case)
     driver = Forces(scene) if profile == "matched" and scene.activated else None
     hook = _hook(integrated, data, switched, driver)
     prepared = Prepared(
@@ -213,11 +223,20 @@ def build(
         hook=hook, always=driver is not None or case.force is not None or (switched is not None and switched.wakeful),
         machine="level" if switched else "memoryless",
     )  # fmt: skip
+    if gated is not None:
+        variables, why = gated.gated, gated.gated.gates.lost
+        prepared.follows = gated.follows
+        prepared.switches, prepared.lost = gated.switches, lambda: why if variables.lost else ""
     if switched is not None and switched.nc > switched.always:
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
         prepared.entered = switched.entered
     prepared.audit = _audit(case, profile, scene, model, rows)
     return prepared
+
+
+def _reading(case: Case, gated: GatedRows | None) -> Case:
+    """Return the case whose force reads the discrete variables of a run."""
+    return case if gated is None or case.force is None else replace(case, force=gated.gated.force(case.force))
 
 
 def _set_cone(option: Any, cone: str, impratio: float, noslip: int) -> None:
@@ -243,7 +262,7 @@ def _guard(case: Case, data: Any, rows: Rows) -> Callable[[], bool]:
     data.qpos[:], data.qvel[:] = case.q0, case.v0
     mujoco.mj_forward(rows.model, data)
     fastest = FASTEST * (speed + float((np.abs(rates) + np.abs(data.qacc_smooth) * case.t_end).max())) or np.inf
-    return lambda: bool(np.abs(rates).max() < fastest)
+    return lambda: all(-fastest < rate < fastest for rate in rates.tolist())
 
 
 def _scene(case: Case) -> Scene:
@@ -302,6 +321,8 @@ def _start(case: Case, data: Any, rows: Rows, acting: Acting, driver: Forces | N
             rows.last = np.zeros(rows.nc)  # not in place: multipliers that are recorded are these arrays
             rows.arm(rows.free)
         data.qpos[:], data.qvel[:] = case.q0, case.v0
+        if isinstance(rows, GatedRows):
+            rows.begin()
         if driver is not None:
             driver.begin(case.act0)
         else:
@@ -354,7 +375,10 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
     model = copy(model)  # rows are put on here
     data = mujoco.MjData(model)
     entered = profile == "matched" and not case.general  # of a robot the states are not those of rows that act
-    of_run, rows = rows, type(rows)(scene, model, data)
+    of_run, rows = rows, rows.anew(model, data)
+    if isinstance(rows, GatedRows):
+        rows.begin()
+        case = _reading(case, rows)
     if isinstance(rows, Switched) and isinstance(of_run, Switched):
         rows.surface[:] = of_run.surface
     hook = _hook(case, data, rows if entered and isinstance(rows, Switched) else None, None)
@@ -400,7 +424,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
     }  # fmt: skip
     if profile == "matched" or not case.general:
         found["constants"] = rows.constants(own=profile == "default")
-    hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT}
+    hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT if case.gates is None else ALL_AT_ONCE}
     if profile == "default" and not case.general:
         return found | {"hidden": hidden, "lam": lam}
     if rows.nc > rows.always and not entered:

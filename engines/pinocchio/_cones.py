@@ -48,7 +48,7 @@ class Cones:
         self.touching = self.gaps.touching.contacts
         self.e = np.array(e[self.gaps.own :][: self.touching.count])
         self.carriers = [own.placed[body][0] for body in self.touching.bodies]
-        self.observed = observer(case.scene, own, self.gaps)
+        self.observed = observer(case.scene, own, self.gaps.recorded)
         self.tau = np.zeros(own.model.nv)
         self.options = pin.ADMMSolverSettings()
         for name in ("feasibility_tol", "complementarity_tol"):

@@ -16,7 +16,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.registry import Registry
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
-from crossbody.engines._formed import FormedRun, form_of, linearised, on_scene
+from crossbody.engines._formed import FormedRun, form_of, linearised, on_scene, why_no_form
 from crossbody.engines._level_machine import LevelMachine
 from crossbody.engines._log import Log
 from crossbody.engines._machines import Machine
@@ -40,6 +40,9 @@ METHOD = Parameter(default="Adams", doc="linear multistep method of CVODE", choi
 METHOD_OF_STIFF = replace(
     METHOD, default=AUTO, doc="that, or auto: which goes further by a right-hand side", choices=(AUTO, *METHODS)
 )
+OF_GATES = replace(RTOL, default=1e-12), replace(METHOD, default="BDF")
+"""A ball that rests on a face is stiff; and what a switch latches of a place, as the angle that a controller goes to,
+stays off by the error that it had: of 1e-10 three microseconds are left after a minute in the maze."""
 TRIED = 250
 """Steps by which the methods are compared: their start, at order 1, takes less than half of them."""
 SOLVER = Parameter(default="forwardDynamics", doc="how v' and lam are solved for", choices=tuple(ALGEBRA))
@@ -108,6 +111,8 @@ class Pinocchio(Engine):
         """Mechanisms without a model, machines other than `level`, and impacts of what is always on."""
         _settings.check_case(case)
         profile = _settings.profile_of(self.name, self.profiles, profile)
+        if (refused := why_no_form(case)) is not None:
+            return refused
         known, case = MECHANISMS.names(), on_scene(case)
         if (name := module_of(case)) not in known:
             return f"Pinocchio has no model of the mechanism {name!r}; it has: {', '.join(known)}."
@@ -193,8 +198,8 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
         return own
     if profile == "law":
         stiff = case.general and len(case.law.a0) > 0  # a file's rows bind the steps of Adams' formulas
-        method = METHOD_OF_STIFF if stiff else METHOD
-        return {"rtol": RTOL, "method": method, "algebra": SOLVER, "max_steps": STEPS}
+        rtol, method = (RTOL, METHOD_OF_STIFF if stiff else METHOD) if case.gates is None else OF_GATES
+        return {"rtol": rtol, "method": method, "algebra": SOLVER, "max_steps": STEPS}
     e = Parameter(default=max(_bounces(case, {}), default=0.0), doc="restitution of every row", low=0.0, high=1.0)
     if profile in RULES:
         return {"rtol": RTOL, "restitution": e, "max_steps": STEPS}
@@ -220,7 +225,8 @@ Integrate = Callable[[Log], tuple[Solver, Mapping[str, int]]]
 
 
 def _law(case: Case, scene: Scene, used: Mapping[str, Any], _e: list[float]) -> Integrate:
-    return _flowing(lambda: LevelMachine(scene.rows, float(used["rtol"])), case, scene, used)
+    fast = min(case.force.fast, default=0.0) if case.gates is not None and case.force is not None else 0.0
+    return _flowing(lambda: LevelMachine(scene.rows, float(used["rtol"]), fast), case, scene, used)
 
 
 def _impulse(rule: Impact) -> Callable[[Case, Scene, Mapping[str, Any], list[float]], Integrate]:
@@ -262,8 +268,11 @@ def _flowing(machine: Callable[[], Machine], case: Case, scene: Scene, used: Map
 
 
 def _admm(case: Case, scene: Scene, used: Mapping[str, Any], e: list[float]) -> Integrate:
+    assert scene.points is not None
+    points = scene.points
+
     def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
-        stepper = TimeStepper(scene.rows, scene.points, e, float(used["tol"]), log, int(used["max_steps"]))
+        stepper = TimeStepper(scene.rows, points, e, float(used["tol"]), log, int(used["max_steps"]))
         stepper.run(*_start(case, scene), case.t_end, float(used["dt"]))
         return stepper, {"iterations": stepper.iterations, "unsolved": stepper.unsolved}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from sksundae.cvode import CVODE
 from crossbody.cases import Mode, Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.cases.control import NotFinite
+from crossbody.engines._gates import Gated
 from crossbody.engines._log import Log
-from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Settled, first_modes
+from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Passed, Settled, first_modes
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._rows import ULP, PinRows
 from crossbody.engines.pinocchio._scene import World
@@ -60,6 +62,7 @@ class Flow:
         self.modes = first_modes(self.rows)
         options: dict[str, Any] = {"rtol": rtol, "atol": atol, "method": method, "max_num_steps": PER_SOLVE}
         self.ways = machine.rows.ways if isinstance(machine.rows, PinRows) else None
+        self.gated = self.ways if isinstance(self.ways, Gated) else None
         watched = WATCHED * self.rows.nc + (self.ways.watched if self.ways is not None else 0)
 
         def watch(t: float, y: NDArray[Any], out: NDArray[Any]) -> None:  # CVODE hangs attributes on it
@@ -76,7 +79,7 @@ class Flow:
         self.start = q0.copy()
         self.world.reset()
         if self.ways is not None:
-            self.ways.begin()
+            self.ways.begin(q0)
         with quiet() as said:
             self._run(np.concatenate((q0, v0)), t_end)
         words = " ".join(said.getvalue().split())
@@ -177,34 +180,48 @@ class Flow:
         q, v = self._state(y)
         lam = self.rows.accelerate(q, v, self.modes)[1]
         if not first:
-            self.log.add(t, q, v, lam, self.modes)
+            self._record(t, q, v, lam)
         if not first and not fired and not turned and not (self.opens and self._pulls(lam)):
             return y
         if not self.opens and t > 0.0:
-            self.log.add(t, q, v, lam, self.modes)
+            self._record(t, q, v, lam)
             return y
+        before = self.gated.discrete() if self.gated is not None and t > 0.0 else ()
         self._turn(t, q, turned)
-        settled: Settled = self.machine.settle(q, v, self.modes, fired)
-        if settled.passed:
-            self.modes = settled.modes
-            self.log.events += settled.events(t)
-            lam = self.rows.accelerate(q, settled.v, self.modes)[1]
+        settled = self._settle(t, q, v, fired)
         y = np.concatenate((y[: self.n], settled.v))
-        if self.ways is not None:
-            self.ways.hold(q, self.modes)
         if settled.passed or first or turned:
-            self.log.add(t, q, settled.v, lam, self.modes)
+            self._record(t, q, settled.v, self.rows.accelerate(q, settled.v, self.modes)[1])
+        if self.gated is not None and before:
+            self.log.switches += self.gated.switches(t, before)
+        if self.gated is not None and self.gated.lost:
+            return self._end(Outcome.LOST, t, y, self.gated.gates.lost)
         if settled.cycle:
             self._end(Outcome.MODE_CYCLE, t, y, f"the rows come back to {settled.modes} at one instant")
         return y
 
+    def _record(self, t: float, q: Floats, v: Floats, lam: Floats) -> None:
+        self.log.add(t, q, v, lam, self.modes)
+        if self.gated is not None:
+            self.gated.keep()
+
+    def _settle(self, t: float, q: Floats, v: Floats, fired: Fired) -> Settled:
+        """Switch rows until nothing changes; again where what acts on them depends on which are in force."""
+        passed: tuple[Passed, ...] = ()
+        while True:
+            settled: Settled = self.machine.settle(q, v, self.modes, fired)
+            self.modes, v, fired, passed = settled.modes, settled.v, frozenset(), (*passed, *settled.passed)
+            self.log.events += settled.events(t)
+            if self.ways is None or not self.ways.hold(q, self.modes):
+                return replace(settled, passed=passed)
+
     def _turn(self, t: float, q: Floats, turned: frozenset[int]) -> None:
-        """Let pairs of shapes lie the other way, with the modes of their rows."""
+        """Let pairs of shapes lie the other way, or gates open and close, with the modes of their rows."""
         if self.ways is None or not turned:
             return
         before, self.modes = self.modes, self.ways.turn(q, self.modes, turned)
-        pairs = zip(before, self.modes, strict=True)
-        passed = tuple((i, b, a, 0.0) for i, (b, a) in enumerate(pairs) if a != b)
+        pairs = zip(before, self.modes, self.rows.follows, strict=True)  # a row that follows has no events of its own
+        passed = tuple((i, b, a, 0.0) for i, (b, a, leader) in enumerate(pairs) if a != b and leader < 0)
         self.log.events += Settled(self.modes, np.zeros(0), passed).events(t)
 
     def _pulls(self, lam: Floats) -> bool:

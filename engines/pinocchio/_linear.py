@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases.arrays import Floats
+from crossbody.engines._gates import Gated
 from crossbody.engines.linear import Chart, Spot, Tangent, in_contact, same
 from crossbody.engines.pinocchio._native import Native
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
@@ -30,6 +31,8 @@ TURNED = (
     "Pinocchio 4.1.0 turns the force on the second body of a constraint nv times about the first joint's axis in "
     "ddq_dq; ddq_dv and ddq_dtau are right."
 )
+CLOSE = 2e-2
+"""Size of coordinates of what moves among gates, for differences, SI: these are a few of it apart."""
 STEP = 1e-3
 """Of the differences, as a part of the coordinates' sizes."""
 Force = Callable[[Floats, Floats], Floats]
@@ -99,6 +102,11 @@ def _same_coordinates(mechanism: ModuleType) -> Callable[[Case, Spot], Stand]:
         if scene.world.clock is not None:
             scene.world.clock(spot.t)
         found = of_rows(scene.rows, spot)
+        if isinstance(scene.rows.ways, Gated):
+            modes = [int(Mode.CONTACT if i in spot.rows else Mode.FREE) for i in range(scene.rows.nc)]
+            scene.rows.ways.begin(spot.q)
+            scene.rows.ways.hold(spot.q, tuple(modes))
+            found = replace(found, size=CLOSE)
         return found if scene.rows.native is None else replace(found, more=_constrained(scene.rows.native))
 
     return stand

@@ -15,6 +15,7 @@ from crossbody.engines._log import Modes
 from crossbody.engines._machines import active, elastic_part
 
 if TYPE_CHECKING:
+    from crossbody.engines._gates import Gated
     from crossbody.engines.pinocchio._native import Native
     from crossbody.engines.pinocchio._ways import Ways
 
@@ -107,7 +108,8 @@ class PinRows:
         law: constants of every row.
         near: as of `crossbody.engines._machines.Rows`.
         follows: index of the row whose mode each one shares; -1 for none.
-        ways: how pairs of shapes lie to each other that may in two ways; None where there is none.
+        ways: how pairs of shapes lie to each other that may in two ways, or discrete variables that say which rows
+            can be touched; None where there is none.
         native: the rows as Pinocchio's own constraints, where none ever opens; None elsewhere.
         shared: what makes multipliers of rows that depend on each other such that none pulls; None where rows do not.
     """
@@ -139,7 +141,7 @@ class PinRows:
         quick = np.stack((law.b0, law.b1, np.zeros(self.nc)))
         self.entered = np.where(law.b0 > 0.0, quick, self.slow)  # what a row has that is just entered
         self._sets: dict[Modes, Any] = {}
-        self.ways: Ways | None = None
+        self.ways: Ways | Gated | None = None
         self.shared: Shared | None = None
         self.native: Native | None = None
         self.solve = ALGEBRA[algebra](model, self.data, self.tau)

@@ -41,12 +41,12 @@ class Ways:
         places = touching.contacts.rows
         self.rows = [[first + i for i, (k, _) in enumerate(places) if k == turned] for turned in self.turning]
 
-    def begin(self) -> None:
+    def begin(self, _q: Floats) -> None:
         """Hold none."""
         self.touching.along.clear()
         self.forget()
 
-    def hold(self, q: Floats, modes: Modes) -> None:
+    def hold(self, q: Floats, modes: Modes) -> bool:
         """Hold the ways of pairs of which a row is in force, as they lie now if they were not, and of no other."""
         along, before = self.touching.along, len(self.touching.along)
         wanted = [k for k, rows in zip(self.turning, self.rows, strict=True) if any(modes[i] for i in rows)]
@@ -59,6 +59,7 @@ class Ways:
             self.sides.update({k: sides[k] for k in new})
         if new or len(along) != before:
             self.forget()
+        return False
 
     def watch(self, q: Floats, out: Floats) -> None:
         """Fill out (watched,) with what is positive until a pair that is held lies the other way."""

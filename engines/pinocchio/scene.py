@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases import Case, CaseUnsupported, Mode
+from crossbody.cases import Case, CaseUnsupported, Law, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Force
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
@@ -18,6 +18,7 @@ from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
 from crossbody.engines._force import acting as acting_of
+from crossbody.engines._gates import ALL_AT_ONCE, Gated
 from crossbody.engines._log import Observe
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._rubbing import why_no_steps
@@ -59,6 +60,8 @@ def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: bounds and loops follow the law alone."""
     if case.scene is not None and (found := frictional(case.scene)):
         return found if profile != "admm" else why_no_steps("Pinocchio's admm", case.scene)
+    if profile != "law" and case.gates is not None:
+        return f"The profile {profile} has no rows that hand a contact over where a wall ends, as at the maze's gaps."
     if profile != "law" and case.force is not None:
         return "What acts here feels forces that are finite: impacts and time stepping have impulses instead."
     if profile != "law" and case.general:
@@ -117,18 +120,53 @@ def build(case: Case, algebra: str) -> Prepared:
     if scene is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     law = (real_time(case, two_sets=True) or case).law
-    bodies = Bodies(scene, case.force)
+    gated = None if case.gates is None else Gated(case.gates, len(case.contacts), scene.nv)
+    bodies = Bodies(scene, case.force if gated is None or case.force is None else gated.force(case.force))
     model, placed, forces, to = bodies.model, bodies.placed, bodies.forces, bodies.to
-    acting = None if bodies.none else bodies.apply
-    gaps = Gaps(scene, forces, (model, placed), to)
+    start = to.theirs(case.q0), to.back(to.theirs(case.q0), case.v0)
+    points = None
+    gaps: Gated | Gaps
+    if gated is not None:
+        gaps, pinned = gated, _of_gates(case, gated, bodies, law, algebra)
+    else:
+        gaps = Gaps(scene, forces, (model, placed), to)
+        pinned = _of_parts(case, gaps, bodies, law, algebra, start)
+        points = None if case.general else Points(scene, model, placed, gaps.steady)
+    return Prepared(
+        rows=pinned, points=points, observe=observer(scene, bodies, gaps.recorded),
+        sizes=_given_sizes(case, to) or _sizes(pinned, *start),
+        start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
+        world=_world(case, forces, to), audit=_audit(scene, pinned, bodies),
+        coordinates=to if to.turns else None,
+    )  # fmt: skip
+
+
+def _of_gates(case: Case, gated: Gated, bodies: Bodies, law: Law, algebra: str) -> PinRows:
+    """Return the rows that a case brings beside its scene."""
+    gated.begin(case.q0)
     pinned = PinRows(
-        model, lambda q: gaps.gradients(q)[1], gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
-        law=law, algebra=algebra, forces=acting, drift_of=gaps.drift_of, gradient_of=gaps.gradient_of,
+        bodies.model, lambda q: gated.gradients(q)[1], lambda q: gated.gradients(q)[0],
+        lambda q, v: gated.at(q, v)[2], law=law, algebra=algebra, forces=None if bodies.none else bodies.apply,
+        follows=gated.gates.follows, gradient_of=gated.gradient_of,
+    )  # fmt: skip
+    pinned.ways = gated
+    pinned.near[:] = min(case.force.far, default=np.inf) if case.force is not None else np.inf
+    return pinned
+
+
+def _of_parts(
+    case: Case, gaps: Gaps, bodies: Bodies, law: Law, algebra: str, start: tuple[Floats, Floats]
+) -> PinRows:  # fmt: skip
+    """Return the rows of a scene's own parts."""
+    scene, model, placed = gaps.scene, bodies.model, bodies.placed
+    pinned = PinRows(
+        model, gaps.jacobian, gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
+        law=law, algebra=algebra, forces=None if bodies.none else bodies.apply, drift_of=gaps.drift_of,
+        gradient_of=gaps.gradient_of,
     )  # fmt: skip
     pinned.near[gaps.own :] = DIPS
     if gaps.touching.contacts.turning:
         pinned.ways = Ways(gaps.touching, gaps.own, gaps.gradients.forget)
-    start = to.theirs(case.q0), to.back(to.theirs(case.q0), case.v0)
     if _may_depend(scene, gaps):
         widths = [loop.width for loop in scene.loops]
         root = np.linalg.cholesky(mass_matrix(model, pinned.data, start[0]))
@@ -138,14 +176,7 @@ def build(case: Case, algebra: str) -> Prepared:
             pinned.native = Native(model, placed, scene, law)
         pinned.solve = by_least_norm(model, pinned.data, pinned.tau, *loose)
         pinned.shared = none_pulling
-    return Prepared(
-        rows=pinned, points=() if case.general else Points(scene, model, placed),
-        observe=observer(scene, bodies, gaps),
-        sizes=_given_sizes(case, to) or _sizes(pinned, *start),
-        start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
-        world=_world(case, forces, to), audit=_audit(scene, pinned, bodies),
-        coordinates=to if to.turns else None,
-    )  # fmt: skip
+    return pinned
 
 
 def _given_sizes(case: Case, to: Coordinates) -> tuple[Floats, Floats] | None:
@@ -181,7 +212,7 @@ class Gaps:
     """
 
     def __init__(self, scene: Scene, forces: parts.Forces, tree: tuple[Any, Placed], to: Coordinates) -> None:
-        self.to, self.nv = to, tree[0].nv
+        self.scene, self.to, self.nv = scene, to, tree[0].nv
         self.rows = parts.Rows(scene.replace(loops=tuple(loop for loop in scene.loops if not loop.in_space)), forces)
         loops, strings = [loop for loop in scene.loops if loop.in_space], [one for one in scene.tendons if one.bodies]
         self.in_space: list[Joined | Strings] = [
@@ -205,6 +236,10 @@ class Gaps:
             return self.rows.heights(q)
         own = [self.rows.heights(self.to.ours(q)), *(part.heights(q) for part in self.in_space)]
         return np.concatenate(own)[self.order]
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Return H (nc, nv)."""
+        return self.rows.straight if self.steady else self.gradients(q)[1]
 
     def recorded(self, q: Floats) -> Floats:
         """Return h (m, nc) of recorded positions (m, nq)."""
@@ -400,7 +435,7 @@ def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed
     return force
 
 
-def observer(scene: Scene, bodies: Bodies, gaps: Gaps) -> Observe:
+def observer(scene: Scene, bodies: Bodies, recorded: Callable[[Floats], Floats]) -> Observe:
     """Return what gives gaps (n, nc), and kinetic and potential energy (n, 2) with that of the springs."""
     model, placed, forces, to = bodies.model, bodies.placed, bodies.forces, bodies.to
     data = model.createData()
@@ -424,7 +459,7 @@ def observer(scene: Scene, bodies: Bodies, gaps: Gaps) -> Observe:
                 height = (data.oMi[carrier] * pose).act(np.array(body.com)) @ np.array(scene.gravity)
                 energy[i, 1] += body.weightless * body.mass * height
         energy[:, 1] += forces.energy(to.ours(q))
-        return gaps.recorded(q), energy
+        return recorded(q), energy
 
     return observe
 
@@ -474,6 +509,7 @@ def mechanics(scene: Scene, bodies: Bodies) -> dict[str, Any]:
 def _audit(scene: Scene, rows: PinRows, bodies: Bodies) -> dict[str, Any]:
     """What differs from the rows' own audit."""
     on, to = rows_on(rows), bodies.to
+    hidden = {"hidden": {"lam": ALL_AT_ONCE}} if isinstance(rows.ways, Gated) else {}
 
     def lam(q: Floats, v: Floats) -> Floats:
         bodies.forces.still()
@@ -484,7 +520,7 @@ def _audit(scene: Scene, rows: PinRows, bodies: Bodies) -> dict[str, Any]:
         r = to.theirs(q)
         return to.velocities(r, rows.jacobian(r))
 
-    return mechanics(scene, bodies) | {"H": H, "lam": lam}
+    return mechanics(scene, bodies) | {"H": H, "lam": lam} | hidden
 
 
 def rows_on(rows: PinRows) -> tuple[int, ...]:

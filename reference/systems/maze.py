@@ -253,5 +253,6 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
 
 
 def listed(p: Floats) -> dict[str, Any]:
-    """What the parity audit lists side by side, read back from the parameter array."""
-    return {"masses": p[[JM, MB, MB, JB]].copy(), "gravity": float(p[G])}
+    """What the parity audit lists side by side, read back from the parameter array; the maze weighs as a disc would."""
+    wall = p[layout.TABLE + layout.STRIDE * int(p[layout.RINGS]) + INNER]
+    return {"masses": np.array([2.0 * p[JM] / wall**2, p[MB]]), "gravity": float(p[G])}

@@ -1,1 +1,0 @@
-"""The ball maze as engines see it: scene, rows, and its event machine in plain Python."""
