@@ -195,7 +195,7 @@ def bounds(path: Path) -> dict[str, dict[str, float]]:
         name, limit = joint.get("name", ""), joint.find("limit")
         if joint.get("type") in ("revolute", "prismatic", "continuous") and limit is not None:
             most = abs(_number(name, limit, "effort"))
-            found[name] = {"least force": -most, "most force": most} if "effort" in limit.attrib else {}
+            found[name] = {"least force": 0.0 - most, "most force": most} if "effort" in limit.attrib else {}
             if joint.get("type") != "continuous":
                 found[name] |= {key: _number(name, limit, key) for key in ("lower", "upper")}
     return found

@@ -34,6 +34,8 @@ SECONDS, BYTES = 20.0, 3 << 30
 """What an importer may take: time, s, and memory, bytes."""
 GRACE = 2.0
 """What it has in any case when its job is there, s: it may have waited for that."""
+LATE = "It did not come back within"
+"""How the sentence on an importer begins that took more than its time."""
 TOLD = 100_000
 """Bytes of what an importer says that are read."""
 WITHOUT = {"exudyn": " (its LoadURDFrobot is roboticstoolbox's)", "pymunk": "", "reference": ": it is the yardstick"}
@@ -209,7 +211,7 @@ class Reading:
         try:
             self._talked(process, jobs)
         except subprocess.TimeoutExpired:
-            return f"It did not come back within {self.seconds:g} s and was ended."
+            return f"{LATE} {self.seconds:g} s and was ended; see --time-limit."
         finally:
             self._kill()
         number = -process.returncode

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from crossbody.cases.files.conformance import FEATURES, Feature
-from crossbody.engines.importers import SECONDS, answers
+from crossbody.engines.importers import LATE, SECONDS, answers
 from crossbody.reports.importers.audit import opened
 from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, WRONG, Row
 from crossbody.reports.importers.compare import rows as compared
@@ -119,7 +119,7 @@ def explained(
         jobs: importers that are asked at once.
         without: as of the audit.
     """
-    off = [row for row in rows if row.verdict in (WRONG, FAILED)]
+    off = [row for row in rows if row.verdict in (WRONG, FAILED) and not row.why.startswith(LATE)]
     if not off:
         return list(rows)
     used = uses(path, urdf)

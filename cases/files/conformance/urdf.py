@@ -133,10 +133,11 @@ def features() -> list[Feature]:
             urdf_arm(elbow={"friction_loss": 0.3}), ".//dynamics[@friction]", about=("friction",)),
         of("bounds", urdf(elbow=elbow(LOWER_AT + x + '<limit lower="-.5" upper="1" effort="10" velocity="1"/>')),
             urdf_arm(elbow={"range": (-0.5, 1.0)}), ".//limit[@lower]", about=("limits",)),
-        of("bound of a force",
-            urdf(elbow=elbow(LOWER_AT + x + '<limit lower="-3" upper="3" effort="7" velocity="1"/>')),
-            urdf_arm(elbow={"force_range": (-7.0, 7.0)}, shoulder={"force_range": (-100.0, 100.0)}),
-            ".//limit[@effort]", "effort is the largest force of a joint.", "Bound it in the engine.", ("effort",)),
+        *(of(name, urdf(elbow=elbow(LOWER_AT + x + f'<limit lower="-3" upper="3" effort="{most:g}" velocity="1"/>')),
+            urdf_arm(elbow={"force_range": (0.0 - most, most)}, shoulder={"force_range": (-100.0, 100.0)}), finds,
+            "effort is the largest force of a joint, 0 too.", way, ("effort",)) for name, most, finds, way in (
+                ("bound of a force", 7.0, ".//limit[@effort]", "Bound it in the engine."),
+                ("largest force of 0", 0.0, ".//limit[@effort='0']", "Write the force that the joint has."))),
         of("safety limits",
             urdf(elbow=elbow(LOWER_AT + x + '<safety_controller soft_lower_limit="-.1" soft_upper_limit=".1" '
             'k_velocity="1"/>')),
