@@ -108,17 +108,18 @@ def summary(name: str) -> str:
 
 @checked_arguments
 def variants(name: str) -> tuple[str, ...]:
-    """The variants of a case, the default first."""
-    from crossbody.cases.loading import module
+    """The variants of a case, the default first; of CASE:VARIANT that one."""
+    from crossbody.cases.loading import module, parted
 
-    return tuple(module(name).VARIANTS)
+    name, variant = parted(name)
+    return tuple(module(name).VARIANTS) if variant is None else (variant,)
 
 
 def load(name: str, variant: str | None = None, **overrides: Value) -> Case:
     """Build a case.
 
     Args:
-        name: a name of `names()`, or the path of a case file of one's own (ends in .py).
+        name: a name of `names()`, or the path of a case file of one's own (ends in .py); or CASE:VARIANT.
         variant: one of the case's variants; its first if not given.
         overrides: parameters to change.
 

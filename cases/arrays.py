@@ -33,6 +33,8 @@ def numbers(owner: str, field: str, value: Any, dtype: DTypeLike = np.float64) -
     Raises:
         SceneError: naming the owner and the field, if it holds anything but numbers.
     """
+    if type(value) is np.ndarray and value.dtype == dtype:
+        return np.array(value, order="C")
     try:
         if np.iscomplexobj(value) or np.asarray(value).dtype.kind in "US":
             raise TypeError("complex numbers and texts are not admitted")

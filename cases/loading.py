@@ -13,11 +13,32 @@ import numpy as np
 from crossbody import cases
 from crossbody.cases.arguments import path, shown
 from crossbody.cases.case import Case, Parameter, Value
-from crossbody.cases.errors import CrossbodyError, SceneError, UnknownName
+from crossbody.cases.errors import CrossbodyError, InvalidValue, SceneError, UnknownName
 from crossbody.cases.files.case import UNNAMED, case_of, open_file
 from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
 from crossbody.cases.own_file import from_file
 from crossbody.cases.scene import Scene
+
+OF_USERS = (".py", *ROBOT_FILES)
+"""How the paths of files with cases of users' own end."""
+
+
+def parted(name: str) -> tuple[str, str | None]:
+    """Return what CASE, FILE, CASE:VARIANT or FILE:KEY names, and the variant; None without one."""
+    case, colon, variant = name.rpartition(":")
+    return (case, variant) if colon and not name.endswith(OF_USERS) else (name, None)
+
+
+def chosen(name: str, variant: str | None = None) -> tuple[str, str | None]:
+    """Return a case's name and the variant that is asked for, by the name or beside it.
+
+    Raises:
+        InvalidValue: if these are two.
+    """
+    case, own = parted(name)
+    if own is not None and variant not in (None, own):
+        raise InvalidValue(f"The case is {name!r}, and the variant {shown(variant)}; give one of them.")
+    return case, variant if own is None else own
 
 
 def module(name: str) -> Any:
@@ -48,16 +69,16 @@ def resolve(
 
 def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Case:
     """See `crossbody.cases.load`."""
-    name = path("case", name)
+    name, variant = chosen(path("case", name), variant)
     source = module(name)
-    chosen = next(iter(source.VARIANTS)) if variant is None else variant
-    if not isinstance(chosen, str) or chosen not in source.VARIANTS:
-        raise UnknownName(f"variant of {Path(name).stem}", chosen, source.VARIANTS)
-    label = f"{Path(name).stem}:{chosen}"
-    numbers = resolve(label, source.PARAMETERS, source.VARIANTS[chosen], overrides)
+    variant = next(iter(source.VARIANTS)) if variant is None else variant
+    if not isinstance(variant, str) or variant not in source.VARIANTS:
+        raise UnknownName(f"variant of {Path(name).stem}", variant, source.VARIANTS)
+    label = f"{Path(name).stem}:{variant}"
+    numbers = resolve(label, source.PARAMETERS, source.VARIANTS[variant], overrides)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            made = source.build(chosen, numbers)
+            made = source.build(variant, numbers)
             return named(made, label, numbers)
     except CrossbodyError:
         raise

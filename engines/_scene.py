@@ -121,6 +121,7 @@ class Forces:
         T (nt, nv): dl/dx of the tendons, 0 of those between points.
         A (nu, nv): dl/dx of the actuators on joints, gear included.
         straight: whether all joints are slides and hinges: then x is q.
+        plain (n,): positions of the joints whose bounds are all that there are; None where others have some.
         steady: whether what actuators do changes with the controls alone; held (nv,): that.
         none: whether nothing but pushes ever acts.
         spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics; None without them.
@@ -186,6 +187,9 @@ class Forces:
         ]
         of, self.bound_sign, self.bound_at = np.array(rows).reshape(-1, 3).T
         self.bound_of = of.astype(int)
+        bounded = [self.scene.bounded[i] for i in self.bound_of]
+        single = all(isinstance(part, Joint) and part.type != "ball" for part in bounded)
+        self.plain = np.array([self.at[part.name] for part in bounded], dtype=int) if single else None
 
     def _lay_out_actuators(self) -> None:
         scene, names = self.scene, [tendon.name for tendon in self.scene.tendons]
@@ -312,6 +316,9 @@ class Forces:
 
     def bounds(self, q: Floats, lengths: Floats) -> Floats:
         """Return the gaps (..., n) of all bounds, in the order of their rows; lengths (..., nt) are of the tendons."""
+        if self.plain is not None:
+            plain: Floats = self.bound_sign * q[..., self.plain] + self.bound_at
+            return plain
         found = np.concatenate([self.x(q)[..., self.firsts], lengths], axis=-1)
         for i, at in self.balls:
             found[..., i] = np.linalg.norm(angle_of(q[..., at : at + 4]), axis=-1)

@@ -11,7 +11,7 @@ from crossbody.reference._check import ARGUMENTS
 from crossbody.reference._guarded import entry
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats, Index
-from crossbody.reference.systems import _none
+from crossbody.reference.systems import absent
 
 VANISHED = 1e-6  # part of H M^-1 H^T of a row at the start below which what moves the row is as good as nothing
 LOOKS = 60  # states ahead, each twice as far as the one before
@@ -83,7 +83,7 @@ def _values(
     }  # fmt: skip
     for name, outputs in filled.items():
         kernel = system.kernels[name]
-        if kernel is getattr(_none, name, None) or (name in ("gaps", "rows") and not nc):
+        if kernel is getattr(absent, name, None) or (name in ("gaps", "rows") and not nc):
             continue
         values = given | outputs
         kernel(*(values[argument] for argument in ARGUMENTS[name]))

@@ -23,7 +23,7 @@ from crossbody.reference._guarded import GuardedCall, entry
 from crossbody.reference._state import NOISE, State, started
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
-from crossbody.reference.systems import _none
+from crossbody.reference.systems import absent
 
 ROUNDED = 64 * np.finfo(float).eps  # by which a length of 1 is known
 EXACT = 1e-9  # part of the terms by which what is computed twice may differ
@@ -111,7 +111,7 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
     }  # fmt: skip
     for name, outputs in rooms.items():
         kernel = s.kernels[name]
-        if kernel is getattr(_none, name, None) or (name in ("gaps", "rows") and not s.nc):
+        if kernel is getattr(absent, name, None) or (name in ("gaps", "rows") and not s.nc):
             continue
         found = GuardedCall(name, kernel, ARGUMENTS[name], given, outputs, HINTS).filled()
         given.setdefault("w", found.get("w"))

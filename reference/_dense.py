@@ -18,7 +18,7 @@ from crossbody.cases import InvalidValue
 from crossbody.cases.arguments import shown
 from crossbody.cases.arrays import numbers
 from crossbody.reference.core import layout
-from crossbody.reference.core._struct import table
+from crossbody.reference.core.bundles import table
 from crossbody.reference.kinds import Floats
 
 if TYPE_CHECKING:

@@ -42,7 +42,7 @@ from crossbody.reference._program import (
 from crossbody.reference._run import OUTCOMES, CompiledRun
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.cache import compiled
-from crossbody.reference.core._struct import TABLE
+from crossbody.reference.core.bundles import TABLE
 from crossbody.reference.core.layout import MORE, STATE, open_buffers, open_model, open_work
 from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.options import Chosen, Options, checked

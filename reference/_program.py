@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 from crossbody.reference import kernels
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import advance as core
-from crossbody.reference.core._struct import TABLE
+from crossbody.reference.core.bundles import TABLE
 from crossbody.reference.core.layout import BUFFERS, MODEL, STATE, WORK
 
 

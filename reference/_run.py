@@ -22,10 +22,10 @@ from crossbody.reference._program import entry, friction_code, instant_code
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.core import layout
-from crossbody.reference.core._struct import table
+from crossbody.reference.core.bundles import table
 from crossbody.reference.kinds import Floats
 from crossbody.reference.options import COLLISIONS, FSMS, Options
-from crossbody.reference.systems import _none
+from crossbody.reference.systems import absent
 
 SLICE, SLICE_S = 200, 0.05  # first steps between two looks at the clock, and the time aimed at, s
 ROWS, EVENTS, HISTORY = 256, 256, 64
@@ -119,7 +119,7 @@ class CompiledRun:
             "friction_code": friction_code() if system.frictional else 0,
             "instant_code": instant_code(),
             "loops": system.solve is None and bool(np.any(system.held)),
-            "keep_events": options.events, "has_energy": system.energy is not _none.energy,
+            "keep_events": options.events, "has_energy": system.energy is not absent.energy,
             "has_control": system.control is not None,
             "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
             "tick": system.tick,
@@ -231,7 +231,7 @@ class CompiledRun:
         """Rows before the first one that holds NaN or infinity: energies and powers steer no step, but are told."""
         rows = self.buffers["out"][: int(self.state["rows"][0])]
         known = np.ones(rows.shape[1], dtype=bool)
-        if self.system.energy is _none.energy:
+        if self.system.energy is absent.energy:
             start = 1 + self.system.nq + self.system.n + 2 * self.system.nc
             known[start : start + 2] = False
         good = np.isfinite(rows[:, known]).all(axis=1)
@@ -341,4 +341,4 @@ class CompiledRun:
 def _books_everything(system: System) -> bool:
     """Whether the system says what its energy is and what changes it; one that nothing drives need not name a power."""
     driven = system.inputs > 0 or system.jumps
-    return system.energy is not _none.energy and (system.power is not _none.power or not driven)
+    return system.energy is not absent.energy and (system.power is not absent.power or not driven)

@@ -19,7 +19,7 @@ from crossbody.reference import kernels as kernel_types
 from crossbody.reference._activations import Activations
 from crossbody.reference._indices import different
 from crossbody.reference.kinds import Bytes, Floats, Index
-from crossbody.reference.systems import _none
+from crossbody.reference.systems import absent
 
 LARGEST = 1_000_000
 """Of every size of a system."""
@@ -84,10 +84,10 @@ class System:
 
     n: int
     dynamics: Any
-    gaps: Any = _none.gaps
-    rows: Any = _none.rows
-    energy: Any = _none.energy
-    power: Any = _none.power
+    gaps: Any = absent.gaps
+    rows: Any = absent.rows
+    energy: Any = absent.energy
+    power: Any = absent.power
     velocity: Any = None
     solve: Any = None
     control: Any = None
@@ -136,7 +136,7 @@ class System:
         put = object.__setattr__
         self._check_sizes()
         for name in ("gaps", "rows", "energy", "power"):
-            put(self, name, getattr(_none, name) if getattr(self, name) is None else getattr(self, name))
+            put(self, name, getattr(absent, name) if getattr(self, name) is None else getattr(self, name))
         self._check_kernels()
         if isinstance(self.control, Control):
             self._put_callable(self.control)
@@ -211,7 +211,7 @@ class System:
             from crossbody.reference._callback import control
 
             given["control"] = control
-        return {name: getattr(_none, name, None) if kernel is None else kernel for name, kernel in given.items()}
+        return {name: getattr(absent, name, None) if kernel is None else kernel for name, kernel in given.items()}
 
     def _put_friction(self, nc: int) -> None:
         """Find the tangential rows of every normal row and check that the machine can do what they ask."""
@@ -497,6 +497,9 @@ class System:
         Raises:
             SceneError: if it has another shape than (nq,) or (n,), is not finite, or holds a quaternion that is zero.
         """
+        return self._copied(name, value)
+
+    def _copied(self, name: str, value: ArrayLike) -> Floats:
         at = name.startswith("q")
         array: Floats = np.array(frozen("simulate", name, value, (self.nq if at else self.n,)))
         if not np.all(np.isfinite(array)):
@@ -504,7 +507,7 @@ class System:
         return self.normalised(f"simulate.{name}", array) if at else array
 
     def _state(self, q: ArrayLike, v: ArrayLike | None) -> tuple[Floats, Floats]:
-        return self.checked_state("q", q), self.checked_state("v", np.zeros(self.n) if v is None else v)
+        return self._copied("q", q), self._copied("v", np.zeros(self.n) if v is None else v)
 
     def _input(self, u: ArrayLike | None) -> Floats:
         return np.array(frozen("simulate", "u", np.zeros(self.inputs) if u is None else u, (self.inputs,)))

@@ -35,8 +35,9 @@ def case(name: str) -> Named:
     from crossbody import cases
     from crossbody.cases import loading
 
+    name, wanted = loading.parted(name)
     source = loading.module(name)
-    found = {variant: cases.load(name, variant) for variant in source.VARIANTS}
+    found = {variant: cases.load(name, variant) for variant in ((wanted,) if wanted else source.VARIANTS)}
     parameters = {key: _parameter(each) for key, each in source.PARAMETERS.items()}
     own = {key: f"{metric.doc} [{metric.unit}]" for one in found.values() for key, metric in one.metrics.items()}
     rows = {row: "" for one in found.values() for row in one.contacts}

@@ -6,8 +6,10 @@ and `pytest` lines run, each with the exit code that its comment names, 0 if non
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from typing import Any
 
 import pytest
 
+from crossbody.reference import code_store
 from crossbody.reports.cli import cli, main
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -54,8 +57,13 @@ def test_every_command_is_in_the_reference() -> None:
 def test_every_block_runs(
     page: str, own_plugins: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    if any("cache clear" in block.text for block in blocks(page)):  # not that of all other tests
-        monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path / "cache"))
+    if any("cache clear" in block.text for block in blocks(page)):  # a copy of that of all other tests
+        copy, kept = tmp_path / "cache" / "compiled", code_store.base()
+        copy.mkdir(parents=True, mode=0o700)
+        for code in kept.glob(f"*{code_store.CODE}") if kept else ():
+            with contextlib.suppress(FileNotFoundError):  # another process drops what is old
+                shutil.copy2(code, copy)
+        monkeypatch.setenv("CROSSBODY_CACHE", str(copy.parent))
     monkeypatch.chdir(tmp_path)
     scope: dict[str, Any] = {"__name__": "page", "__file__": str(tmp_path / "page.py")}
     for i, block in enumerate(blocks(page)):

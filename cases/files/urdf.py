@@ -86,20 +86,61 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
 
 
 def _float(root: ElementTree.Element) -> None:
-    """Call the root the world where a joint floats on it: the compiler lets nothing float but on that.
+    """Let floating joints hang on the world itself, which the root is called then: the compiler knows none elsewhere.
 
     The root stands on the world anyway, and is no body of the scene then.
+
+    Raises:
+        SceneError: for one that floats on what another joint moves.
     """
-    children = {child.get("link") for child in root.findall("joint/child")}
-    ground = next((link for link in root.findall("link") if link.get("name") not in children), None)
-    floating = [joint.find("parent") for joint in root.findall("joint") if joint.get("type") == "floating"]
-    if ground is None or ground.get("name") not in [one.get("link") for one in floating if one is not None]:
+    floating = [joint for joint in root.findall("joint") if joint.get("type") == "floating"]
+    above = {_link(joint, "child"): joint for joint in root.findall("joint")}
+    ground = next((link for link in root.findall("link") if link.get("name") not in above), None)
+    if not floating or ground is None:
         return
+    for joint in floating:
+        p, R, on, passed = *_origin(joint), _link(joint, "parent"), {joint}
+        while on in above and above[on] not in passed:
+            below = above[on]
+            if below.get("type") != "fixed":
+                raise SceneError(
+                    f"Joint {joint.get('name')!r} floats on {_link(joint, 'parent')!r}, which joint "
+                    f"{below.get('name')!r} moves; valid: a floating joint on the root, or on what is fixed to it."
+                )
+            passed.add(below)
+            p_on, R_on = _origin(below)
+            p, R, on = p_on + R_on @ p, R_on @ R, _link(below, "parent")
+        if len(passed) > 1 and on == ground.get("name"):
+            _hang(joint, on, p, R)
     name = ground.get("name")
     ground.set("name", "world")
     for parent in root.findall("joint/parent"):
         if parent.get("link") == name:
             parent.set("link", "world")
+
+
+def _link(joint: ElementTree.Element, side: str) -> str:
+    found = joint.find(side)
+    return "" if found is None else found.get("link", "")
+
+
+def _origin(joint: ElementTree.Element) -> tuple[Floats, Floats]:
+    name, origin = joint.get("name"), joint.find("origin")
+    return _numbers(name, origin, "xyz"), _rotation(_numbers(name, origin, "rpy"))
+
+
+def _hang(joint: ElementTree.Element, link: str, p: Floats, R: Floats) -> None:
+    """Put a joint at a pose of another link."""
+    for tag in ("parent", "origin"):
+        for old in joint.findall(tag):
+            joint.remove(old)
+    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+    level = math.hypot(R[0, 0], R[1, 0]) < 1e-9  # then roll and yaw are about one axis: all of it is yaw
+    roll = 0.0 if level else math.atan2(R[2, 1], R[2, 2])
+    yaw = math.atan2(-R[0, 1], R[1, 1]) if level else math.atan2(R[1, 0], R[0, 0])
+    words = {"xyz": p.tolist(), "rpy": [roll, pitch, yaw]}
+    ElementTree.SubElement(joint, "parent", {"link": link})
+    ElementTree.SubElement(joint, "origin", {key: " ".join(map(repr, three)) for key, three in words.items()})
 
 
 def _check_mimics(root: ElementTree.Element) -> None:
@@ -144,16 +185,19 @@ def planar(path: Path) -> list[str]:
     return [joint.get("name", "") for joint in parsed(path).findall("joint") if joint.get("type") == "planar"]
 
 
-def bounds(path: Path) -> dict[str, tuple[float, float]]:
-    """Return lowest and highest coordinate of every joint that is bounded: 0 where a <limit> does not say them.
+def bounds(path: Path) -> dict[str, dict[str, float]]:
+    """Return lowest and highest coordinate and force of every joint that has them: 0 where a <limit> does not say them.
 
-    The compiler takes bounds that are alike for none.
+    The compiler takes bounds that are alike, and a largest force of 0, for none.
     """
-    found = {}
+    found: dict[str, dict[str, float]] = {}
     for joint in parsed(path).findall("joint"):
         name, limit = joint.get("name", ""), joint.find("limit")
-        if joint.get("type") in ("revolute", "prismatic") and limit is not None:
-            found[name] = (_number(name, limit, "lower"), _number(name, limit, "upper"))
+        if joint.get("type") in ("revolute", "prismatic", "continuous") and limit is not None:
+            most = abs(_number(name, limit, "effort"))
+            found[name] = {"least force": -most, "most force": most} if "effort" in limit.attrib else {}
+            if joint.get("type") != "continuous":
+                found[name] |= {key: _number(name, limit, key) for key in ("lower", "upper")}
     return found
 
 

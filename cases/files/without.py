@@ -133,6 +133,7 @@ def _loop(model: Any, i: int) -> None:
 
 def _tendon(model: Any, i: int) -> None:
     model.tendon_stiffness[i] = model.tendon_damping[i] = model.tendon_frictionloss[i] = 0.0
+    model.tendon_armature[i] = 0.0
     model.tendon_stiffnesspoly[i] = model.tendon_dampingpoly[i] = 0.0
     model.tendon_limited[i] = 0
 

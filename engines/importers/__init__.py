@@ -1,10 +1,10 @@
 """What an engine's own reader makes of a robot file: one module an importer, each run in a process of its own.
 
 A module has `FORMATS` (of "mjcf" and "urdf"), `PACKAGE` (what has to be installed), `MODULE` (what is imported of it),
-`TRIED` (first and last version that it was tried with; it may be left out) and `open_robot(path, urdf)`, which returns
-a `Robot`. It is loaded by its path where crossbody may not be installed, so it imports nothing of ours, and its engine
-only inside its functions: CROSSBODY_PYTHON_NEWTON=/path/to/python names the interpreter of the importer newton, where
-that is not this one.
+and `open_robot(path, urdf)`, which returns a `Robot`; it may have `TRIED` (first and last version that it was tried
+with) and `INSTALL` (what pip is to install, if not that package). It is loaded by its path where crossbody may not be
+installed, so it imports nothing of ours, and its engine only inside its functions:
+CROSSBODY_PYTHON_NEWTON=/path/to/python names the interpreter of the importer newton, where that is not this one.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -28,7 +29,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import InvalidValue, UnknownName
 from crossbody.cases.registry import Registry
 
-REGISTRY = Registry("importer", __name__, hidden=("process",))
+REGISTRY = Registry("importer", __name__, hidden=("beside",))
 SECONDS, BYTES = 20.0, 3 << 30
 """What an importer may take: time, s, and memory, bytes."""
 GRACE = 2.0
@@ -37,25 +38,29 @@ TOLD = 100_000
 """Bytes of what an importer says that are read."""
 WITHOUT = {"exudyn": " (its LoadURDFrobot is roboticstoolbox's)", "pymunk": "", "reference": ": it is the yardstick"}
 """Engines that there is nothing to ask."""
-PROCESS = Path(__file__).parent / "process.py"
+PROCESS = Path(__file__).parent / "beside" / "process.py"
 
 
 class Robot(Protocol):
     """A robot file as an engine's own reader has it, in that engine's coordinates.
 
+    What the engine does not have may be left out, if `hidden` or `unseen` says why, and all that would be empty.
+
     Attributes:
         version: of the engine.
         joints: name, body that it moves, kind (free, ball, hinge, slide; unbounded: a hinge by cos and sin; any other
             is compared by name alone), first position and first velocity.
-        free, ball: conventions of their coordinates, of those in `process.CONVENTIONS`.
+        free, ball: conventions of their coordinates, of those in `beside.conventions.CONVENTIONS`.
         nq, nv: numbers of positions and of velocities.
-        numbers: quantity (of `compare.NUMBERS`) -> joint -> one number, or one a velocity.
+        numbers: quantity (of `parts.NUMBERS`) -> joint -> one number, or one a velocity.
         actuators: which joints each moves.
         loops: of every equality its type (connect, weld, joint; empty where the engine tells their number alone), the
             two joints of one of joints, the coefficients of its polynomial.
         tendons: damping, stiffness, friction loss, rest and range of each.
+        keys: name of every keyframe -> its positions (nq,).
         hidden: quantity -> why this engine does not have it.
         unseen: quantity -> why what it has of it cannot be looked at.
+        refused: of these, what its reader gives up on in this file; may be left out.
         precision: what rounding is to it, of the largest entry.
     """
 
@@ -69,6 +74,7 @@ class Robot(Protocol):
     actuators: Mapping[str, Sequence[str]]
     loops: Sequence[tuple[str, Sequence[str], Sequence[float]]]
     tendons: Mapping[str, Sequence[float]]
+    keys: Mapping[str, Sequence[float]]
     hidden: Mapping[str, str]
     unseen: Mapping[str, str]
     precision: float
@@ -98,13 +104,25 @@ class Robot(Protocol):
         """Return the length of every tendon."""
 
     def shapes(self) -> Sequence[tuple[str, str, str, Sequence[float], Floats, Floats, Floats]]:
-        """Return of every shape that may touch: name, kind, joint that moves it, and what else `process.bounds` needs.
+        """Return of every shape that may touch: name, kind, joint that moves it, and what `bounds` needs.
 
-        That is size, points, and where it stands: origin (3,) and rotation (3, 3).
+        That is of `beside.solids`: size, points, and where it stands: origin (3,) and rotation (3, 3).
         """
 
     def contacts(self) -> Sequence[tuple[int, int]]:
         """Return which of these may touch each other, by their numbers."""
+
+    def surfaces(self) -> Sequence[Sequence[float]]:
+        """Return of each of these pairs its friction along two tangents, about the normal and them, and its margin, m.
+
+        Coefficients that are not in force are 0.
+        """
+
+    def softness(self) -> Mapping[str, Sequence[float]]:
+        """Return a0, 1/s^2, and a1, 1/s, of rows: bounds of joints and tendons, and loops, by their names.
+
+        A pair of shapes has their names with a colon between them.
+        """
 
     def inertias(self) -> Sequence[tuple[str, float, Floats, Floats]]:
         """Return of every body: joint that moves it, mass, kg, centre (3,), inertia about it (3, 3); world axes."""
@@ -267,6 +285,17 @@ def _lines(path: Path, begin: int, end: int) -> list[str]:
 def names() -> tuple[str, ...]:
     """Names of all importers, installed or not."""
     return REGISTRY.names()
+
+
+def missing(absent: Sequence[str]) -> str:
+    """Return in a sentence which importers are not installed, and what brings them."""
+    modules = [REGISTRY.load(name) for name in absent]
+    wanted = dict.fromkeys(getattr(module, "INSTALL", module.PACKAGE) for module in modules)
+    packages = " ".join(map(shlex.quote, wanted))
+    return (
+        f"Not installed: {', '.join(absent)}. pip install {packages} brings what is missing, here or in an environment "
+        f"whose python is named: CROSSBODY_PYTHON_{absent[0].upper()}=PATH."
+    )
 
 
 def known(wanted: Sequence[str]) -> tuple[str, ...]:

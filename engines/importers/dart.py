@@ -17,11 +17,10 @@ class _Robot:
         "armature": "DART's joints have no armature.", "actuators": "DART's reader makes no actuators of a file.",
         "damping v|v|": "DART's dampers are linear.", "damping v^3": "DART's dampers are linear.",
         "stiffness x^2": "DART's springs are linear.", "stiffness x^3": "DART's springs are linear.",
-        "tendons": "DART has no tendons.",
+        "tendons": "DART has no tendons.", "softness": "DART's rows have no solref.",
+        "keyframes": "DART has no keyframes.",
+        **dict.fromkeys(("spin", "roll", "margin"), "DART's contacts have sliding friction alone."),
     }  # fmt: skip
-    unseen: dict[str, str] = {}  # noqa: RUF012
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
-    precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         import dartpy
@@ -67,7 +66,6 @@ class _Robot:
                     self._joints.append((j, n))
             self.nq += s.getNumDofs()
         self.nv = self.nq
-        self.actuators: dict[str, list[str]] = {}
         if any(node.getShape().getType() == "MeshShape" for _, node in self._solids()):
             self.unseen = {"shapes": "DART's Python does not show the corners of meshes."}
         self.numbers = self._numbers()
@@ -83,6 +81,7 @@ class _Robot:
                 "friction": [j.getCoulombFriction(k) for k in range(n)], "stiffness": j.getSpringStiffness(0),
                 "rest": j.getRestPosition(0) if n == 1 and j.getSpringStiffness(0) else 0.0,
                 "lower": bounds[0], "upper": bounds[1],
+                "least force": j.getForceLowerLimit(0), "most force": j.getForceUpperLimit(0),
             }  # fmt: skip
             for key, value in values.items():
                 told.setdefault(key, {})[j.getName()] = np.atleast_1d(value).astype(float).tolist()
@@ -90,11 +89,15 @@ class _Robot:
 
     def place(self, q: Any, v: Any) -> None:
         """A free joint counts from where its body stands in the file, its velocities are the world's all the same."""
-        at, q = 0, np.array(q)
+        at, q, self._T = 0, np.array(q), np.eye(self.nv)
         for (_, _, kind, first, _), (joint, _) in zip(self.joints, self._joints, strict=True):
             if kind == "free":
-                stands, here = joint.getTransformFromParentBodyNode(), slice(first, first + 6)
+                stands, here, on = joint.getTransformFromParentBodyNode(), slice(first, first + 6), _parent(joint)
+                if on is not None:  # then its velocities are in the axes of that
+                    stands = on.getWorldTransform().multiply(stands)
+                    self._T[here, here] = np.kron(np.eye(2), np.array(on.getWorldTransform().rotation()).T)
                 q[here] = joint.convertToPositions(stands.inverse().multiply(joint.convertToTransform(q[here])))
+        v = self._T @ v
         for s in self._s:
             n = s.getNumDofs()
             s.setPositions(q[at : at + n])
@@ -107,10 +110,10 @@ class _Robot:
             n = s.getNumDofs()
             M[at : at + n, at : at + n] = s.getMassMatrix()
             at += n
-        return M
+        return self._T.T @ M @ self._T
 
     def bias(self) -> Any:
-        return np.concatenate([s.getCoriolisAndGravityForces() for s in self._s])
+        return self._T.T @ np.concatenate([s.getCoriolisAndGravityForces() for s in self._s])
 
     def energy(self) -> float:
         bodies = [s.getBodyNode(i) for s in self._s for i in range(s.getNumBodyNodes())]
@@ -130,9 +133,6 @@ class _Robot:
         bodies = [s.getBodyNode(i) for s in self._s for i in range(s.getNumBodyNodes())]
         placed = {b.getName(): b.getWorldTransform() for b in bodies}
         return {name: (np.array(X.translation()), np.array(X.rotation())) for name, X in placed.items()}
-
-    def ends(self) -> Any:
-        return [[] for _ in self.loops]
 
     def _solids(self) -> Any:
         bodies = [s.getBodyNode(i) for s in self._s for i in range(s.getNumBodyNodes())]
@@ -162,6 +162,13 @@ class _Robot:
                     found.append((i, j))
         return found
 
+    def surfaces(self) -> Any:
+        """Of two shapes the lesser friction."""
+        of = [node.getDynamicsAspect().getFrictionCoeff() if node.hasDynamicsAspect() else 1.0
+              for _, node in self._solids()]  # fmt: skip
+        rubs = (min(of[i], of[j]) for i, j in self.contacts())
+        return [[mu, mu, 0.0, 0.0, 0.0, 0.0] for mu in rubs]
+
     def inertias(self) -> Any:
         told = []
         for s in self._s:
@@ -172,6 +179,11 @@ class _Robot:
                     J = np.array(own.getMoment())
                     told.append((joint, mass, X.translation() + R @ c, R @ J @ R.T))
         return told
+
+
+def _parent(joint: Any) -> Any:
+    """Return the body that a joint hangs on; none of the world."""
+    return joint.getChildBodyNode().getParentBodyNode()
 
 
 def _mover(body: Any) -> str:

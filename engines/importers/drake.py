@@ -9,6 +9,8 @@ import numpy as np
 
 FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "drake", "pydrake"
 TRIED = ("1.51", "1.51")
+FORCES = ("least force", "most force")
+BOUNDED = "Drake bounds the forces of actuators, and a joint without one has no bound."
 KINDS = {"quaternion_floating": "free", "ball_rpy": "ball", "revolute": "hinge", "prismatic": "slide"}
 
 
@@ -18,10 +20,9 @@ class _Robot:
         "friction": "Drake's joints have no dry friction.", "tendons": "Drake has no tendons.",
         "damping v|v|": "Drake's dampers are linear.", "damping v^3": "Drake's dampers are linear.",
         "stiffness x^2": "Drake's springs are linear.", "stiffness x^3": "Drake's springs are linear.",
+        **dict.fromkeys(FORCES, BOUNDED), "softness": "Drake's rows have no solref.",
+        **dict.fromkeys(("spin", "roll", "margin"), "Drake's contacts have sliding friction alone."),
     }  # fmt: skip
-    unseen: dict[str, str] = {}  # noqa: RUF012
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
-    precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         from importlib.metadata import version
@@ -68,7 +69,7 @@ class _Robot:
 
     def _numbers(self, motors: Any) -> dict[str, dict[str, Any]]:
         told: dict[str, dict[str, Any]] = {
-            key: {} for key in ("armature", "damping", "lower", "upper", "stiffness", "rest")
+            key: {} for key in ("armature", "damping", "lower", "upper", "stiffness", "rest", *FORCES)
         }
         for joint in (joint for joint in self._joints if joint.num_velocities()):
             name, single = joint.name(), joint.num_positions() == 1
@@ -78,6 +79,8 @@ class _Robot:
             told["upper"][name] = [float(joint.position_upper_limits()[0])] if single else [np.inf]
         for motor in motors:
             told["armature"][motor.joint().name()] = [motor.default_rotor_inertia() * motor.default_gear_ratio() ** 2]
+            told["least force"][motor.joint().name()] = [-motor.effort_limit()]
+            told["most force"][motor.joint().name()] = [motor.effort_limit()]
         for k in range(1, self._p.num_force_elements()):
             spring = self._p.get_force_element(_index(k))
             if hasattr(spring, "stiffness") and hasattr(spring, "joint"):
@@ -85,9 +88,6 @@ class _Robot:
                 rest = spring.nominal_angle() if hasattr(spring, "nominal_angle") else spring.nominal_position()
                 told["rest"][spring.joint().name()] = [float(rest)]
         return told
-
-    def ends(self) -> Any:
-        return [[] for _ in self.loops]
 
     def drives(self) -> Any:
         """A motor that has a controller is told an angle, any other a force."""
@@ -116,6 +116,15 @@ class _Robot:
     def contacts(self) -> Any:
         ids = list(enumerate(self._shapes))
         return [(i, j) for i, a in ids for j, b in ids[i + 1 :] if not self._look.CollisionFiltered(a, b)]
+
+    def surfaces(self) -> Any:
+        from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties
+
+        of = [self._look.GetProximityProperties(one).GetPropertyOrDefault("material", "coulomb_friction", None)
+              for one in self._shapes]  # fmt: skip
+        mixed = CalcContactFrictionFromSurfaceProperties
+        rubs = (mixed(of[i], of[j]).dynamic_friction() if of[i] and of[j] else 0.0 for i, j in self.contacts())
+        return [[mu, mu, 0.0, 0.0, 0.0, 0.0] for mu in rubs]
 
     def place(self, q: Any, v: Any) -> None:
         self._p.SetPositions(self._c, q)

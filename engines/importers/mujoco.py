@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,13 +11,13 @@ import numpy as np
 FORMATS, PACKAGE, MODULE, TRIED = ("mjcf", "urdf"), "mujoco", "mujoco", ("4.0", "4.0")
 KINDS = ("free", "ball", "slide", "hinge")
 SHAPES = ("plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
+FAR = 1e12
+"""Margin of a bound with which its row is there wherever it is, m or rad."""
 FUSED = "MuJoCo's compiler makes links of a URDF that no joint moves one with what they stand on (fusestatic)."
 
 
 class _Robot:
     free = ball = "mujoco"
-    unseen: dict[str, str] = {}  # noqa: RUF012
-    precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         import mujoco
@@ -34,16 +36,25 @@ class _Robot:
         ]
         self.numbers = self._numbers()
         self.actuators = {m.actuator(i).name or f"actuator{i}": self._moved(i) for i in range(m.nu)}
-        self._loops = [i for i in range(m.neq) if m.eq_active0[i]]
+        self._loops = [i for i in range(m.neq) if m.eq_active0[i] and self._on("EQUALITY")]
         self.loops = [self._loop(i) for i in self._loops]
         self._tendons = [m.tendon(i).name or f"tendon{i}" for i in range(m.ntendon)]
         self.tendons = {name: self._tendon(i) for i, name in enumerate(self._tendons)}
+        self.keys = {m.key(i).name or f"key{i}": m.key_qpos[i].tolist() for i in range(m.nkey)}
+        m.jnt_actfrclimited[:] = m.tendon_actfrclimited[:] = 0  # bounds are numbers, and forces are without them
+
+    def _on(self, rows: str) -> bool:
+        """Return whether the file has a kind of rows at all."""
+        off = (int(getattr(self._lib.mjtDisableBit, f"mjDSBL_{key}")) for key in (rows, "CONSTRAINT"))
+        return not any(self._m.opt.disableflags & flag for flag in off)
 
     def _numbers(self) -> dict[str, dict[str, Any]]:
         m, told = self._m, dict[str, dict[str, Any]]()
         for i, (name, _, kind, at, dof) in enumerate(self.joints):
             single, dofs = kind in ("slide", "hinge"), slice(dof, dof + {"free": 6, "ball": 3}.get(kind, 1))
-            bounds = m.jnt_range[i] if m.jnt_limited[i] else (-np.inf, np.inf)
+            free = (-np.inf, np.inf)
+            bounds = m.jnt_range[i] if m.jnt_limited[i] and self._on("LIMIT") else free
+            least, most = m.jnt_actfrcrange[i] if m.jnt_actfrclimited[i] else free
             stiff, here = [m.jnt_stiffness[i], *m.jnt_stiffnesspoly[i]], slice(at, at + 1 if single else at)
             values = {
                 "armature": m.dof_armature[dofs] + self._of_motors(i, m.actuator_armature),
@@ -53,6 +64,7 @@ class _Robot:
                 "stiffness": stiff[0], "stiffness x^2": stiff[1], "stiffness x^3": stiff[2],
                 "rest": m.qpos_spring[here if kind != "ball" else slice(at, at + 4)]
                 if any(stiff) else (), "lower": bounds[0] if single else -np.inf, "upper": bounds[1],
+                "least force": least, "most force": most,
             }  # fmt: skip
             for key, value in values.items():
                 told.setdefault(key, {})[name] = np.atleast_1d(value).astype(float).tolist()
@@ -99,7 +111,7 @@ class _Robot:
 
     def _tendon(self, i: int) -> list[float]:
         m = self._m
-        bounds = m.tendon_range[i] if m.tendon_limited[i] else (-np.inf, np.inf)
+        bounds = m.tendon_range[i] if m.tendon_limited[i] and self._on("LIMIT") else (-np.inf, np.inf)
         parts = (m.tendon_damping[i], m.tendon_dampingpoly[i], m.tendon_stiffness[i], m.tendon_stiffnesspoly[i],
                  m.tendon_frictionloss[i], m.tendon_lengthspring[i], bounds)  # fmt: skip
         return [float(x) for part in parts for x in np.atleast_1d(part)]
@@ -107,11 +119,15 @@ class _Robot:
     def lengths(self) -> Any:
         return dict(zip(self._tendons, self._d.ten_length.tolist(), strict=True))
 
+    def _moments(self) -> Any:
+        d, moments = self._d, np.zeros((self._m.nu, self._m.nv))
+        self._lib.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
+        return moments
+
     def drives(self) -> Any:
         """Forces by gears, gains and biases alone: no bound of a control or force, no activation."""
-        m, d = self._m, self._d
-        moments, gain, held = np.zeros((m.nu, m.nv)), m.actuator_gainprm, np.zeros(m.nv)
-        self._lib.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
+        m, d, moments = self._m, self._d, self._moments()
+        gain, held = m.actuator_gainprm, np.zeros(m.nv)
         fixed, none = m.actuator_gaintype == int(self._lib.mjtGain.mjGAIN_FIXED), int(self._lib.mjtBias.mjBIAS_NONE)
         motion = np.column_stack([np.ones(m.nu), d.actuator_length, d.actuator_velocity])
         factors = np.where(fixed, gain[:, 0], (gain[:, :3] * motion).sum(axis=1))
@@ -136,7 +152,7 @@ class _Robot:
 
     def contacts(self) -> Any:
         m, at = self._m, {geom: k for k, geom in enumerate(self._touching())}
-        if m.opt.disableflags & int(self._lib.mjtDisableBit.mjDSBL_CONTACT):
+        if not self._on("CONTACT"):
             return []
         moved, out = m.body_weldid[m.geom_bodyid], {int(one) for one in m.exclude_signature}
         above = m.body_weldid[m.body_parentid[moved]]
@@ -153,6 +169,56 @@ class _Robot:
                     found.add((i, j))
         return [(at[i], at[j]) for i, j in found]
 
+    @cached_property
+    def _rows(self) -> Any:
+        """Model and data in which all bounds and contacts have rows: bounds are wide, shapes are balls at one place."""
+        lib, m = self._lib, copy(self._m)
+        d = lib.MjData(m)
+        for margin in (m.jnt_margin, m.tendon_margin):
+            margin[:] = FAR
+        m.geom_type[:], m.geom_rbound[:], m.geom_size[:] = int(lib.mjtGeom.mjGEOM_SPHERE), 1.0, 1.0
+        m.opt.disableflags |= int(lib.mjtDisableBit.mjDSBL_MIDPHASE)
+        m.opt.cone = int(lib.mjtCone.mjCONE_ELLIPTIC)
+        for step in (lib.mj_kinematics, lib.mj_comPos, lib.mj_tendon):
+            step(m, d)
+        d.geom_xpos[:] = 0.0
+        for step in (lib.mj_collision, lib.mj_makeConstraint):
+            step(m, d)
+        return m, d
+
+    def surfaces(self) -> Any:
+        """Of each pair what MuJoCo mixes: friction in force, and margin; of one without a contact nothing is known."""
+        d = self._rows[1]
+        shapes, told = self._touching(), dict[tuple[int, int], Any]()
+        for one in d.contact:
+            rubs = np.where(np.arange(5) < one.dim - 1, one.friction, 0.0)
+            told[tuple(sorted(one.geom.tolist()))] = [*rubs, one.includemargin]
+        return [told.get(tuple(sorted((shapes[i], shapes[j]))), [np.nan] * 6) for i, j in self.contacts()]
+
+    def softness(self) -> Any:
+        """Of each row what MuJoCo makes of solref and of the largest impedance: K dmax and B."""
+        m, d = self._rows
+        kind, geoms, told = self._lib.mjtConstraint, [m.geom(i).name or f"shape{i}" for i in range(m.ngeom)], {}
+        loops = [m.equality(i).name or f"loop{i}" for i in range(m.neq)]
+        names = [joint[0] for joint in self.joints]
+        of = {
+            int(kind.mjCNSTR_EQUALITY): lambda k: (loops[k], m.eq_solimp[k]),
+            int(kind.mjCNSTR_LIMIT_JOINT): lambda k: (names[k], m.jnt_solimp[k]),
+            int(kind.mjCNSTR_LIMIT_TENDON): lambda k: (self._tendons[k], m.tendon_solimp_lim[k]),
+        }
+        for row in range(d.nefc):
+            if (type_ := int(d.efc_type[row])) in of:
+                name, solimp = of[type_](int(d.efc_id[row]))
+                told[name] = self._softness(d.efc_KBIP[row], solimp)
+        for one in d.contact:
+            if one.efc_address >= 0:
+                name = ":".join(sorted(geoms[k] for k in one.geom))
+                told[name] = self._softness(d.efc_KBIP[one.efc_address], one.solimp)
+        return told
+
+    def _softness(self, KBIP: Any, solimp: Any) -> list[float]:
+        return [float(KBIP[0] * np.clip(solimp[1], 1e-4, 0.9999)), float(KBIP[1])]
+
     def place(self, q: Any, v: Any) -> None:
         self._d.qpos[:], self._d.qvel[:] = q, v
         self._lib.mj_forward(self._m, self._d)
@@ -165,7 +231,10 @@ class _Robot:
         return full
 
     def bias(self) -> Any:
-        return self._d.qfrc_bias - self._d.qfrc_gravcomp
+        """Weight is taken off by a passive force, or among those of the actuators; what that makes of it counts."""
+        m, d = self._m, self._d
+        by_motors = d.qfrc_actuator - d.actuator_force @ self._moments()
+        return d.qfrc_bias - np.where(m.jnt_actgravcomp[m.dof_jntid], by_motors, d.qfrc_gravcomp)
 
     def energy(self) -> float:
         springs = self._m.jnt_stiffness.copy()  # the other readers tell of springs by their numbers alone

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 FORMATS, PACKAGE, MODULE = ("mjcf", "urdf"), "newton", "newton"
-TRIED = ("1.8", "1.8")
+TRIED, INSTALL = ("1.8", "1.8"), "newton[importers]"
 KINDS = {0: "slide", 1: "hinge", 2: "ball", 4: "free"}
 FIXED = 3
 SHAPES = ("", "plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "cone", "mesh")
 COLLIDES = 2
+UNSAID = 1e6
+"""Force of a joint of whose bounds nothing is said, N m or N."""
 
 
 class _Robot:
@@ -20,9 +22,13 @@ class _Robot:
     hidden = {  # noqa: RUF012
         "damping v|v|": "Newton's dampers are linear.", "damping v^3": "Newton's dampers are linear.",
         "stiffness x^2": "Newton's springs are linear.", "stiffness x^3": "Newton's springs are linear.",
+        "keyframes": "Newton has no keyframes.",
     }  # fmt: skip
-    unseen = {"energy": "Newton tells no energy.", "tendons": "Newton keeps tendons for its MuJoCo solver alone."}  # noqa: RUF012
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
+    unseen = {  # noqa: RUF012
+        "energy": "Newton tells no energy.", "tendons": "Newton keeps tendons for its MuJoCo solver alone.",
+        "surfaces": "Newton's solvers mix the friction of two shapes, each in its own way.",
+        "softness": "Newton keeps solref for its MuJoCo solver alone.",
+    }  # fmt: skip
     precision = 2e-4
 
     def __init__(self, path: str, urdf: bool) -> None:
@@ -41,6 +47,7 @@ class _Robot:
             [named.get(label.rpartition("/")[2], label.rpartition("/")[2]) for label in labels]
             for labels in (m.joint_label, m.body_label)
         )
+        newton.eval_fk(m, m.joint_q, m.joint_qd, self._s)
         loops = (m.joint_articulation.numpy() < 0).tolist()
         kinds, self._child, at, first = (
             getattr(m, f"joint_{key}").numpy() for key in ("type", "child", "q_start", "qd_start")
@@ -70,7 +77,8 @@ class _Robot:
             elif kinds[i] != FIXED:
                 self.joints.append((name, self._bodies[self._child[i]], kind, int(at[i]), int(first[i])))
             if kind == "free":
-                stands = _behind((np.zeros(3), np.eye(3)), m.joint_X_p.numpy()[i]) if urdf else (np.zeros(3), np.eye(3))
+                on = self._frame(int(m.joint_parent.numpy()[i]))
+                stands = _behind(on, m.joint_X_p.numpy()[i]) if urdf else (np.zeros(3), np.eye(3))
                 self._frees.append((int(at[i]), int(first[i]), int(self._child[i]), *stands))
         self.actuators: dict[str, list[str]] = {}
         self._motors(named)
@@ -161,7 +169,7 @@ class _Robot:
         told: dict[str, dict[str, Any]] = {}
         arrays = {
             key: getattr(self._m, f"joint_{key}").numpy()
-            for key in ("armature", "friction", "limit_lower", "limit_upper", "damping", "stiffness")
+            for key in ("armature", "friction", "limit_lower", "limit_upper", "damping", "stiffness", "effort_limit")
         }
         for name, _, kind, at, dof in self.joints:
             single, dofs = kind in ("hinge", "slide"), slice(dof, dof + {"free": 6, "ball": 3}.get(kind, 1))
@@ -172,6 +180,9 @@ class _Robot:
                 "lower": arrays["limit_lower"][dof] if single else -np.inf,
                 "upper": arrays["limit_upper"][dof] if single else np.inf,
             }  # fmt: skip
+            effort = arrays["effort_limit"][dof]
+            effort = np.inf if effort >= UNSAID else effort
+            values |= {"least force": -effort, "most force": effort}
             for key, value in values.items():
                 every = np.atleast_1d(value).astype(float)
                 told.setdefault(key, {})[name] = np.where(
@@ -182,7 +193,7 @@ class _Robot:
     def place(self, q: Any, v: Any) -> None:
         wp, m, s = self._wp, self._m, self._s
         self._q, self._v = np.array(q), v
-        self._shift = np.eye(self.nv)
+        self._shift, self._wrench = np.eye(self.nv), np.eye(self.nv)
         self._turn = np.zeros(self.nv)
         for at, _, _, p, R in self._frees:  # of a URDF one counts from where it stands, in the axes there
             self._q[at : at + 3] = R.T @ (q[at : at + 3] - p)
@@ -195,6 +206,7 @@ class _Robot:
             self._shift[first : first + 3, first + 3 : first + 6] = np.cross(np.eye(3), -r)
             self._turn[first : first + 3] = np.cross(w, np.cross(w, r))
             axes = np.kron(np.eye(2), R.T)
+            self._wrench[here] = self._shift[here]
             self._shift[here], self._turn[here] = axes @ self._shift[here], axes @ self._turn[here]
         s.joint_qd.assign((self._shift @ v).astype(np.float32))
         self._newton.eval_fk(m, s.joint_q, s.joint_qd, s)
@@ -217,11 +229,9 @@ class _Robot:
         return self._shift.T @ self._own_mass_matrix() @ self._shift
 
     def bias(self) -> Any:
+        """Forces on a free joint are in the world's axes, wherever it stands; M and velocities are in the joint's."""
         own = self._g.numpy().astype(float) + self._h.numpy()
-        return self._shift.T @ (own + self._own_mass_matrix() @ self._turn)
-
-    def energy(self) -> float:
-        return float("nan")
+        return self._wrench.T @ own + self._shift.T @ self._own_mass_matrix() @ self._turn
 
     def frames(self) -> Any:
         told = {}

@@ -32,9 +32,8 @@ class _Robot:
         "stiffness": NO_SPRINGS, "stiffness x^2": NO_SPRINGS, "stiffness x^3": NO_SPRINGS, "rest": NO_SPRINGS,
         "damping v|v|": "Pinocchio's dampers are linear.", "damping v^3": "Pinocchio's dampers are linear.",
         "actuators": "Pinocchio's model has no actuators.", "tendons": "Pinocchio's model has no tendons.",
+        "surfaces": "Pinocchio's shapes have no friction.", "softness": "Pinocchio's reader leaves solref out.",
     }  # fmt: skip
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
-    precision = 0.0
 
     def __init__(self, path: str, urdf: bool) -> None:
         import pinocchio as pin
@@ -60,12 +59,14 @@ class _Robot:
                 pin.buildGeomFromMJCF(self._m, path, of))  # fmt: skip
             self._shapes = list(read.geometryObjects)
         except Exception as error:  # shapes are read by a call of their own
-            self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes: {error}"}
+            said = str(error).strip().rpartition("message:")[2].strip().rstrip(".")
+            self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes gives up: {said}."}
+            self.refused = ("shapes",)
         self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
         self._last: dict[int, str] = {}
         self.joints = [joint for i in range(1, self._m.njoints) for joint in self._joints(i)]
-        self.actuators: dict[str, list[str]] = {}
         self.numbers = self._numbers()
+        self.keys = {one.key(): one.data().tolist() for one in self._m.referenceConfigurations}
 
     def _joints(self, i: int) -> list[tuple[str, str, str, int, int]]:
         """Return the joints that one of Pinocchio's is: several of one body are a composite."""
@@ -89,6 +90,7 @@ class _Robot:
                 "armature": m.armature[dof], "damping": m.damping[dof], "friction": m.upperDryFrictionLimit[dof],
                 "lower": m.lowerPositionLimit[at] if bounded else -np.inf,
                 "upper": m.upperPositionLimit[at] if bounded else np.inf,
+                "least force": m.lowerEffortLimit[first], "most force": m.upperEffortLimit[first],
             }  # fmt: skip
             for key, value in values.items():
                 values_ = np.atleast_1d(value).astype(float)

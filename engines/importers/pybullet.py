@@ -20,14 +20,13 @@ class _Robot:
         "rest": "PyBullet's joints have no springs.", "actuators": "PyBullet drives joints, not actuators of a file.",
         "damping v|v|": "PyBullet's dampers are linear.", "damping v^3": "PyBullet's dampers are linear.",
         "stiffness x^2": "PyBullet's joints have no springs.", "stiffness x^3": "PyBullet's joints have no springs.",
-        "tendons": "PyBullet has no tendons.",
+        "tendons": "PyBullet has no tendons.", "softness": "PyBullet's rows have no solref.",
     }  # fmt: skip
     unseen = {  # noqa: RUF012
         "energy": "PyBullet tells no energy.", "contacts": "PyBullet does not tell which of its shapes may touch.",
+        "surfaces": "PyBullet does not tell which of its shapes may touch.",
     }  # fmt: skip
-    tendons: dict[str, list[float]] = {}  # noqa: RUF012
     precision = 1e-5
-    loops: list[Any] = []  # noqa: RUF012
 
     def __init__(self, path: str) -> None:
         from importlib.metadata import version
@@ -51,7 +50,6 @@ class _Robot:
         ]  # fmt: skip
         self._moving = [info[0] for info in infos if info[2] != FIXED]
         self.nq = self.nv = len(self.joints)
-        self.actuators: dict[str, list[str]] = {}
         self.numbers = self._numbers()
         if any(SHAPES.get(one[2], "") in ("", "mesh") for i in range(-1, len(infos)) for one in self._solids(i)):
             self.unseen = self.unseen | {"shapes": "PyBullet does not show the corners of meshes."}
@@ -63,6 +61,7 @@ class _Robot:
             values = {
                 "damping": info[6], "friction": info[7],
                 "lower": info[8] if bounded else -np.inf, "upper": info[9] if bounded else np.inf,
+                "least force": -info[10], "most force": info[10],
             }  # fmt: skip
             for key, value in values.items():
                 told.setdefault(key, {})[info[1].decode()] = [float(value)]
@@ -79,18 +78,12 @@ class _Robot:
     def bias(self) -> Any:
         return np.array(self._lib.calculateInverseDynamics(self._id, self._q, self._v, [0.0] * self.nv))
 
-    def energy(self) -> float:
-        return float("nan")
-
     def frames(self) -> Any:
         told = {self._lib.getBodyInfo(self._id)[0].decode(): (np.zeros(3), np.eye(3))}  # it is fixed where it is loaded
         for i, name in enumerate(self._links):
             state = self._lib.getLinkState(self._id, i, computeForwardKinematics=True)
             told[name] = (np.array(state[4]), np.array(self._lib.getMatrixFromQuaternion(state[5])).reshape(3, 3))
         return told
-
-    def ends(self) -> Any:
-        return []
 
     def _solids(self, link: int) -> Any:
         return self._lib.getCollisionShapeData(self._id, link)

@@ -7,6 +7,7 @@ the integrator's first stage: mj_forward, then the integrator alone, instead of 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -28,10 +29,10 @@ SAME_INSTANT = 100
 def integrator(model: Any, data: Any) -> Callable[[], None]:
     """Return what mj_step does after its forward pass, for the integrator that the model names."""
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-        return lambda: mujoco.mj_RungeKutta(model, data, 4)
+        return partial(mujoco.mj_RungeKutta, model, data, 4)
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
-        return lambda: mujoco.mj_Euler(model, data)
-    return lambda: mujoco.mj_implicit(model, data)
+        return partial(mujoco.mj_Euler, model, data)
+    return partial(mujoco.mj_implicit, model, data)
 
 
 class March:

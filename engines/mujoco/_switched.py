@@ -234,6 +234,7 @@ class Switched(Rows):
             return None
         drift, curved = Drift(self.scene, self.model, self.touching), self.cubic[: self.always]
         laid = lru_cache(LAYOUTS)(lambda present, armed: self._laid(present, armed, bent))
+        option = self.model.opt  # to ask for it costs more than to set a number in it
         loops, all_straight = slice(self.always), not self.cubic[self.always :].any()
         surface, cubic = self.surface.tolist(), self.cubic.tolist()
         bends, few = bool(curved.any()), 0 if bent or self.touching.count else FEW
@@ -252,7 +253,7 @@ class Switched(Rows):
             if bends:
                 aref[loops] += data.efc_R[loops] * self.last[loops] - curved * data.efc_pos[loops] ** 3
             present = self.present()
-            model.opt.tolerance = 0.0 if present else self.converged
+            option.tolerance = 0.0 if present else self.converged
             if not present:
                 return None
             if len(present) <= few:

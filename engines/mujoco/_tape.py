@@ -10,7 +10,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Log, Modes
 
-STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)  # as its own type it costs three times the copy
 """time, qpos, qvel, act, ...: what a step starts from, inputs apart."""
 
 

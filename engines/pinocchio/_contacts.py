@@ -165,21 +165,25 @@ class Points:
 
     A contact is a point without friction between its shapes. A coordinate that is held is an anchor where it has its
     value, whose other components the joint keeps anyway.
+
+    Attributes:
+        steady: whether M and the constraints' Jacobians are the same everywhere: where all slides, and no normal turns.
     """
 
-    def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
+    def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]], straight: bool) -> None:
         self.model, self.data = model, model.createData()
+        self.steady = straight and all(joint.type == "slide" for joint in scene.joints)
         loops = [loop for loop in scene.loops if loop.type == "joint" and not loop.second]
         self.contacts, self.placed = Contacts(by_shapes(scene)), placed
         self.anchors = [self._anchor(model.getJointId(loop.first), loop.polynomial[0]) for loop in loops]
 
-    def __call__(self, q: Floats) -> list[Any]:
-        """Return the constraints."""
-        found = list(self.anchors)
-        if not self.contacts.count:
+    def __call__(self, q: Floats, rows: Sequence[int]) -> list[Any]:
+        """Return the constraints of some rows."""
+        found, held = [self.anchors[row] for row in rows if row < len(self.anchors)], len(self.anchors)
+        if len(found) == len(rows):
             return found
         pin.forwardKinematics(self.model, self.data, q)
-        met = self.contacts.touches(self._pose)
+        met = self.contacts.touches(self._pose, [row - held for row in rows[len(found) :]])
         for gap, normal, point, *bodies in zip(met.gap, met.normal, met.point, met.first, met.second, strict=True):
             turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
             world = pin.SE3(turn, point - 0.5 * gap * normal)

@@ -268,8 +268,11 @@ def _flowing(machine: Callable[[], Machine], case: Case, scene: Scene, used: Map
 
 
 def _admm(case: Case, scene: Scene, used: Mapping[str, Any], e: list[float]) -> Integrate:
+    assert scene.points is not None
+    points = scene.points
+
     def integrate(log: Log) -> tuple[Solver, Mapping[str, int]]:
-        stepper = TimeStepper(scene.rows, scene.points, e, float(used["tol"]), log, int(used["max_steps"]))
+        stepper = TimeStepper(scene.rows, points, e, float(used["tol"]), log, int(used["max_steps"]))
         stepper.run(*_start(case, scene), case.t_end, float(used["dt"]))
         return stepper, {"iterations": stepper.iterations, "unsolved": stepper.unsolved}
 

@@ -10,10 +10,9 @@ from typing import Any
 from crossbody.cases.arrays import Floats
 from crossbody.engines._acting import Acting
 from crossbody.engines._log import Chart, Observe
+from crossbody.engines.pinocchio._contacts import Points
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._rows import PinRows
-
-Points = Sequence[Any] | Callable[[Floats], Sequence[Any]]
 
 
 def _nothing(_t: float, _q: Floats, _v: Floats) -> None:
@@ -51,8 +50,7 @@ class Scene:
 
     Attributes:
         rows: gaps, accelerations and multipliers.
-        points: every row as a constraint of Pinocchio with three components, the normal last (profile admm); or a
-            function of q that makes them, where they move along the bodies.
+        points: rows as Pinocchio's constraints (profile admm); None where no contact can be stepped.
         observe: gaps and energies of many states of the model.
         sizes: how far the coordinates move (or how deep contacts give), and how fast: numbers, or one a coordinate
             (n,). Times rtol they are the absolute tolerances.
@@ -64,7 +62,7 @@ class Scene:
     """
 
     rows: PinRows
-    points: Points = ()
+    points: Points | None = None
     observe: Observe
     sizes: tuple[float | Floats, float | Floats]
     start: tuple[Floats, Floats] | None = None

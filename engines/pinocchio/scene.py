@@ -123,27 +123,35 @@ def build(case: Case, algebra: str) -> Prepared:
     gated = None if case.gates is None else Gated(case.gates, len(case.contacts), scene.nv)
     bodies = Bodies(scene, case.force if gated is None or case.force is None else gated.force(case.force))
     model, placed, forces, to = bodies.model, bodies.placed, bodies.forces, bodies.to
-    acting = None if bodies.none else bodies.apply
     start = to.theirs(case.q0), to.back(to.theirs(case.q0), case.v0)
-    gaps = gated or Gaps(scene, forces, (model, placed), to)
-    if isinstance(gaps, Gated):
-        gaps.begin(case.q0)
-        pinned = PinRows(
-            model, lambda q: gaps.gradients(q)[1], lambda q: gaps.gradients(q)[0], lambda q, v: gaps.at(q, v)[2],
-            law=law, algebra=algebra, forces=acting, follows=gaps.gates.follows, gradient_of=gaps.gradient_of,
-        )  # fmt: skip
-        pinned.ways = gaps
-        pinned.near[:] = min(case.force.far, default=np.inf) if case.force is not None else np.inf
+    points = None
+    gaps: Gated | Gaps
+    if gated is not None:
+        gaps, pinned = gated, _of_gates(case, gated, bodies, law, algebra)
     else:
+        gaps = Gaps(scene, forces, (model, placed), to)
         pinned = _of_parts(case, gaps, bodies, law, algebra, start)
+        points = None if case.general else Points(scene, model, placed, gaps.steady)
     return Prepared(
-        rows=pinned, points=() if case.general or gated is not None else Points(scene, model, placed),
-        observe=observer(scene, bodies, gaps.recorded),
+        rows=pinned, points=points, observe=observer(scene, bodies, gaps.recorded),
         sizes=_given_sizes(case, to) or _sizes(pinned, *start),
         start=start, chart=None if to.same else lambda q, v: (to.ours(q), to.velocities(q, v)),
         world=_world(case, forces, to), audit=_audit(scene, pinned, bodies),
         coordinates=to if to.turns else None,
     )  # fmt: skip
+
+
+def _of_gates(case: Case, gated: Gated, bodies: Bodies, law: Law, algebra: str) -> PinRows:
+    """Return the rows that a case brings beside its scene."""
+    gated.begin(case.q0)
+    pinned = PinRows(
+        bodies.model, lambda q: gated.gradients(q)[1], lambda q: gated.gradients(q)[0],
+        lambda q, v: gated.at(q, v)[2], law=law, algebra=algebra, forces=None if bodies.none else bodies.apply,
+        follows=gated.gates.follows, gradient_of=gated.gradient_of,
+    )  # fmt: skip
+    pinned.ways = gated
+    pinned.near[:] = min(case.force.far, default=np.inf) if case.force is not None else np.inf
+    return pinned
 
 
 def _of_parts(
@@ -152,7 +160,7 @@ def _of_parts(
     """Return the rows of a scene's own parts."""
     scene, model, placed = gaps.scene, bodies.model, bodies.placed
     pinned = PinRows(
-        model, lambda q: gaps.gradients(q)[1], gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
+        model, gaps.jacobian, gaps.heights, lambda q, v: gaps.drift_of(q, v, slice(None)),
         law=law, algebra=algebra, forces=None if bodies.none else bodies.apply, drift_of=gaps.drift_of,
         gradient_of=gaps.gradient_of,
     )  # fmt: skip
@@ -228,6 +236,10 @@ class Gaps:
             return self.rows.heights(q)
         own = [self.rows.heights(self.to.ours(q)), *(part.heights(q) for part in self.in_space)]
         return np.concatenate(own)[self.order]
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Return H (nc, nv)."""
+        return self.rows.straight if self.steady else self.gradients(q)[1]
 
     def recorded(self, q: Floats) -> Floats:
         """Return h (m, nc) of recorded positions (m, nq)."""

@@ -18,7 +18,7 @@ from crossbody.engines.equations import system_of
 from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.rk4 import march
-from crossbody.hw.models._contract import Model
+from crossbody.hw.models.contract import Model
 from crossbody.hw.windows.lift import check_measured, lift
 from crossbody.hw.windows.window import Window, overlap
 from crossbody.reference import System

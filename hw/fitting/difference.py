@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.covariance import Layout
 from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.derivative import apart
-from crossbody.hw.models._contract import Model
+from crossbody.hw.models.contract import Model
 from crossbody.hw.windows.run import run_window
 from crossbody.hw.windows.window import Window, overlap
 

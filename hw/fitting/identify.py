@@ -18,7 +18,7 @@ from crossbody.hw.fitting.difference import Differences
 from crossbody.hw.fitting.fit import Fit
 from crossbody.hw.fitting.judged import Search, judged, unjudged
 from crossbody.hw.fitting.search import search
-from crossbody.hw.models._contract import Model
+from crossbody.hw.models.contract import Model
 from crossbody.hw.reading.log import Log
 from crossbody.hw.windows.window import Window, windows
 

@@ -19,7 +19,7 @@ from crossbody.hw.fitting.information import WEIGHT, in_words, information, unse
 from crossbody.hw.fitting.profile import profiles
 from crossbody.hw.fitting.search import Found
 from crossbody.hw.fitting.start_noise import moves
-from crossbody.hw.models._contract import Model
+from crossbody.hw.models.contract import Model
 
 TOGETHER = 0.999
 """Correlation from which on two parameters are told apart by nothing but noise."""

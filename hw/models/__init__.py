@@ -12,7 +12,7 @@ from crossbody.cases.entry_points import checked_arguments
 from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:
-    from crossbody.hw.models._contract import Model as Model
+    from crossbody.hw.models.contract import Model as Model
 
 __all__ = ["chosen", "load", "names", "summary"]
 
@@ -48,6 +48,6 @@ def chosen(model: str | Model) -> Model:
         UnknownName: if there is no model of that name.
         InvalidValue: for what is neither.
     """
-    from crossbody.hw.models._contract import Model
+    from crossbody.hw.models.contract import Model
 
     return load(model) if isinstance(model, str) else arguments.instance("model", model, Model, "a model or its name")

@@ -12,7 +12,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Force
 from crossbody.cases.form import Form, formed
 from crossbody.cases.scene import Actuator, Body, Joint, Scene
-from crossbody.hw.models._contract import Model, Numbers, Segment
+from crossbody.hw.models.contract import Model, Numbers, Segment
 from crossbody.reference.systems import link_chain
 
 POLE = 25.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 from crossbody import cases
 from crossbody.cases import Case, Coordinate
 from crossbody.cases.library.bouncing_ball import PARAMETERS
-from crossbody.hw.models._contract import Model, Numbers, Segment
+from crossbody.hw.models.contract import Model, Numbers, Segment
 
 SCENE = ("height", "speed", "t_end")
 

@@ -12,7 +12,7 @@ from crossbody import cases
 from crossbody.cases import Case, Coordinate, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.library.tossed_cube import PARAMETERS
-from crossbody.hw.models._contract import Model, Numbers, Segment
+from crossbody.hw.models.contract import Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
 
 PLACE = ("px", "py", "pz")

@@ -11,7 +11,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.library.delta_tracking import PARAMETERS
 from crossbody.cases.mechanisms.delta.form import in_tree
 from crossbody.cases.mechanisms.delta.scene import JOINTS, LOOPS, NAMES, ROBOT
-from crossbody.hw.models._contract import Model, Numbers, Segment
+from crossbody.hw.models.contract import Model, Numbers, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.reference import simulate
 from crossbody.reference.delta import control, forward, jacobians, paths, scene

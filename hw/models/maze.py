@@ -11,7 +11,7 @@ from crossbody import cases
 from crossbody.cases import Case, Coordinate, Inputs, SceneError
 from crossbody.cases.library.ball_maze import PARAMETERS
 from crossbody.cases.mechanisms.maze.geometry import maze_of
-from crossbody.hw.models._contract import Model, Numbers, Segment
+from crossbody.hw.models.contract import Model, Numbers, Segment
 
 SCENE = ("ring", "side", "angle", "theta", "t_end", "controller", "seed", "noise", "noise_speed")
 

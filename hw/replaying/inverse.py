@@ -23,7 +23,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.engines.equations import system_of
 from crossbody.hw import models
-from crossbody.hw.models._contract import Model, Segment
+from crossbody.hw.models.contract import Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.windows.lift import check_measured, closed_by, lift, rows_at
 from crossbody.hw.windows.rates import DEGREE, HALF, Rows, derivatives, felt

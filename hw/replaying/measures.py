@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
@@ -23,6 +24,11 @@ EXPLAINED = 3.0
 """That angle over the one between measurement and prediction where they are most alike, up to which a maximum that is
 lower for the model's error alone may be the delay. Of 1,200 motions of three harmonics, whose amplitudes and phases the
 model has wrong by 0, 5 and 20 %, none was given a wrong delay; with 0.9 of the highest maximum alone one was."""
+WIDE, REAL = 4, 1e-9
+"""Neighbours to either side that tell how high a maximum between samples is; imaginary part of a real root."""
+UNSURE = 3.0
+"""Error of that over what one neighbour less changes: r/(1 - r) with r = sin^2(w/2), w rad a sample; 3 at 3 samples a
+period."""
 NEARER = 0.8
 """How much nearer to 0 a maximum must be than its rival on the other side."""
 
@@ -66,7 +72,7 @@ def delay(y: Floats, yhat: Floats, step: float, reach: float = REACH) -> float:
 def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = REACH) -> float:
     """How much later increments a are than increments b, s: a maximum of their cross-correlation.
 
-    The correlation is taken by FFT within each window and normalised by the energy of both at each lag; a parabola
+    The correlation is taken by FFT within each window and normalised by the energy of both at each lag; a polynomial
     through a maximum and its neighbours gives parts of a sample. (Of increments: slow drifts would hide the peak.)
     A motion that repeats itself correlates nearly as well at lags of whole periods, and what is left to tell them apart
     is the model's error: of all maxima that this error may have lowered, the one nearest to 0 is taken.
@@ -91,7 +97,9 @@ def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = 
         return math.nan
     if rho.max() < ALIKE * _ceiling(a):
         return math.nan
-    rivals = _rivals(b, most, rho, peaks[rho[peaks] >= RIVAL * rho.max()])
+    heights, unsure = np.array([_height(rho, int(k)) for k in peaks]).T
+    high = heights + unsure >= RIVAL * heights.max()
+    rivals = _rivals(b, most, peaks[high], (heights - unsure)[high])
     k = int(rivals[np.argmin(np.abs(lags[rivals]))])
     other = rivals[np.sign(lags[rivals]) == -np.sign(lags[k])]
     if len(other) and lags[k] and abs(lags[k]) > NEARER * np.min(np.abs(lags[other])):
@@ -99,32 +107,48 @@ def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = 
     return step * (float(lags[k]) + _vertex(rho, k)[0])
 
 
-def _vertex(rho: Floats, k: int) -> tuple[float, float]:
-    """Where the parabola through rho[k] and its neighbours has its maximum, in samples behind k, and how high it is."""
-    low, top, high = (float(x) for x in rho[k - 1 : k + 2])
-    bend = low - 2.0 * top + high
-    return (0.5 * (low - high) / bend, top - (low - high) ** 2 / (8.0 * bend)) if bend < 0.0 else (0.0, top)
+def _vertex(rho: Floats, k: int, wide: int = WIDE) -> tuple[float, float]:
+    """Where the polynomial through rho[k] and its neighbours is highest, in samples behind k, and how high it is.
+
+    Of a motion with few samples a period a parabola would be too low between two of them: a lag of a whole period would
+    look less alike than one that a sample happens to meet.
+    """
+    wide = min(wide, k, len(rho) - 1 - k)
+    places = np.arange(-wide, wide + 1.0)
+    curve = polynomial.polyfit(places, rho[k - wide : k + wide + 1], 2 * wide)
+    turns = polynomial.polyroots(polynomial.polyder(curve))
+    near = turns.real[(np.abs(turns.imag) < REAL) & (np.abs(turns.real) <= 1.0)]
+    places = np.concatenate([[0.0], near])
+    heights = polynomial.polyval(places, curve)
+    best = int(np.argmax(heights))
+    return float(places[best]), float(heights[best])
+
+
+def _height(rho: Floats, k: int) -> tuple[float, float]:
+    """How high the maximum near sample k is, and to what that is known, by how far off fewer neighbours would be."""
+    height = _vertex(rho, k)[1]
+    return height, UNSURE * abs(height - _vertex(rho, k, WIDE - 1)[1])
 
 
 def _angle(rho: Floats, k: int) -> float:
-    """Angle between two motions near lag k from their correlations, rad; of the highest within two samples."""
+    """Least angle between two motions near lag k from their correlations, rad; of the highest within two samples."""
     near = k - 2 + int(np.argmax(rho[k - 2 : k + 3]))
-    return math.acos(min(_vertex(rho, near)[1], 1.0))
+    return math.acos(min(sum(_height(rho, near)), 1.0))
 
 
-def _rivals(b: Sequence[Floats], most: int, rho: Floats, peaks: NDArray[np.int64]) -> NDArray[np.int64]:
+def _rivals(b: Sequence[Floats], most: int, peaks: NDArray[np.int64], heights: Floats) -> NDArray[np.int64]:
     """Those maxima that are the delay if the highest is so by the model's error alone.
 
     The prediction moved to the one and to the other lag are phi apart. If it were the lower one, the model's error
     would have to lie along their difference for the higher one to be nearer than phi: by chance for small angles only.
     Windows shorter than twice the lags cannot be held against themselves: all maxima stay.
     """
-    best = int(peaks[np.argmax(rho[peaks])])
+    best = int(peaks[np.argmax(heights)])
     reach = 2 * most + 4
     if len(peaks) == 1 or reach >= min(map(len, b)):
         return peaks
     alone = _lagged(b, b, reach)[1]
-    limit = max(REPEATS, EXPLAINED * math.acos(min(_vertex(rho, best)[1], 1.0)))
+    limit = max(REPEATS, EXPLAINED * math.acos(min(float(heights.max()), 1.0)))
     return np.array([k for k in peaks if k == best or _angle(alone, reach + int(k) - best) <= limit])
 
 

@@ -21,7 +21,7 @@ from crossbody.cases import (
 from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.hw import models
-from crossbody.hw.models._contract import Model
+from crossbody.hw.models.contract import Model
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.comparison import Comparison, Prediction
 from crossbody.hw.replaying.starts import fitted_starts

@@ -9,7 +9,7 @@ import numpy as np
 
 from crossbody.cases import Value
 from crossbody.hw.fitting.derivative import Exact
-from crossbody.hw.models._contract import Model
+from crossbody.hw.models.contract import Model
 from crossbody.hw.windows.rates import HALF
 from crossbody.hw.windows.window import Window
 

@@ -15,7 +15,7 @@ from crossbody.cases import Value
 from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.engines.equations import system_of
-from crossbody.hw.models._contract import Model, Segment
+from crossbody.hw.models.contract import Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.inverse import Inferred, noise_of, pushed, shift_of
 from crossbody.hw.windows.lift import check_measured

@@ -8,7 +8,7 @@ from typing import Any
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Trajectory, Value
 from crossbody.engines.equations import system_of
-from crossbody.hw.models._contract import Model
+from crossbody.hw.models.contract import Model
 from crossbody.hw.windows.window import Window
 from crossbody.reference import simulate
 

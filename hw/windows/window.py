@@ -10,7 +10,7 @@ import numpy as np
 
 from crossbody.cases import InvalidValue, SceneError, arguments
 from crossbody.cases.arrays import Floats
-from crossbody.hw.models._contract import Model, Segment
+from crossbody.hw.models.contract import Model, Segment
 from crossbody.hw.reading.log import Log
 from crossbody.hw.windows.impacts import impacts, least_of
 from crossbody.hw.windows.rates import rates_by_fit

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.core._struct import bundle_type, opener
+from crossbody.reference.core.bundles import bundle_type, opener
 from crossbody.reference.core.dop853_table import DENSE_STAGES, DENSE_TERMS
 from crossbody.reference.kinds import Bytes, Bytes2, Floats, Floats2, Index, Index2
 

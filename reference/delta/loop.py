@@ -18,9 +18,9 @@ from crossbody.reference.delta.model import system
 from crossbody.reference.delta.robot import Robot
 from crossbody.reference.delta.statics import gravity_torque
 from crossbody.reference.kinds import Floats
-from crossbody.reference.linear._linearise import linearise
-from crossbody.reference.linear._model import LinearModel
 from crossbody.reference.linear.differences import differences
+from crossbody.reference.linear.linearisation import linearise
+from crossbody.reference.linear.model import LinearModel
 
 STEP = 1e-3
 AXES = "xyz"

@@ -14,8 +14,8 @@ from crossbody.reference._indices import different
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._kalman import Filter
-from crossbody.reference.linear._linearise import point
 from crossbody.reference.linear._unmeasured import LARGEST, Estimate, Record, Unknown
+from crossbody.reference.linear.linearisation import point
 
 
 @checked_arguments

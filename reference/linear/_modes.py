@@ -13,7 +13,7 @@ from crossbody.cases.arguments import instance
 from crossbody.cases.arrays import frozen, is_number
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference.kinds import Array, Floats
-from crossbody.reference.linear._model import Complex, LinearModel
+from crossbody.reference.linear.model import Complex, LinearModel
 
 RANK = 1e-9
 """Part of the largest singular value below which a direction counts as none."""

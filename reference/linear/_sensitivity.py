@@ -17,7 +17,6 @@ from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._derivatives import Point, turning
-from crossbody.reference.linear._linearise import point
 from crossbody.reference.linear._variation import (
     Theta,
     bounced,
@@ -29,6 +28,7 @@ from crossbody.reference.linear._variation import (
     slopes,
     theta,
 )
+from crossbody.reference.linear.linearisation import point
 
 ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
 GRAZING = 1e-12  # part of the terms of g_x f below which an event is only grazed

@@ -14,7 +14,7 @@ from crossbody.reference._indices import different
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear._derivatives import STEP, Point, directions, terms
-from crossbody.reference.linear._linearise import point
+from crossbody.reference.linear.linearisation import point
 
 STEPS = 50
 SETTLED = 1e-13  # part of the terms of an equation that may be left

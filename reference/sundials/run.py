@@ -31,7 +31,7 @@ from crossbody.reference.sundials.folds import Folds
 from crossbody.reference.sundials.frozen_machine import FrozenMachine
 from crossbody.reference.sundials.level_machine import LevelMachine, View
 from crossbody.reference.sundials.quiet import quiet
-from crossbody.reference.systems import _none
+from crossbody.reference.systems import absent
 
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
 ROUNDS = 100  # of rows and discrete variables that switch each other at one instant
@@ -305,7 +305,7 @@ class SundialsRun:
     def _record(self, lam: Floats) -> None:
         s, e = self.state, self.equations
         gap, energy = e.gaps(s.t, s.q, s.v)[0].copy(), e.energy(s.q, s.v)
-        if not isfinite(gap.sum() + (0.0 if self.system.energy is _none.energy else energy.sum())):
+        if not isfinite(gap.sum() + (0.0 if self.system.energy is absent.energy else energy.sum())):
             raise Ended(Outcome.NOT_FINITE)
         self.rows.append((s.t, s.q, s.v, gap, lam, energy, [int(m) for m in self.machine.modes], s.z))
 

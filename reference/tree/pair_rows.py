@@ -23,14 +23,14 @@ LEAST_COSINE = math.sqrt(1.0 - STEEPEST**2)
 
 
 @kernels.helper
-def _point(p: Array, w: Array, o: int) -> Any:
+def origin(p: Array, w: Array, o: int) -> Any:
     """Return the origin of the shape at p[o:] and its motion."""
     k = o + layout.POSE + 9
     return point(p, w, int(p[o + layout.NODE].real), p[k], p[k + 1], p[k + 2])
 
 
 @kernels.helper
-def _axis(p: Array, w: Array, o: int, column: int) -> Any:
+def axis(p: Array, w: Array, o: int, column: int) -> Any:
     """Return an axis of the shape at p[o:] and its motion."""
     k = o + layout.POSE + column
     return direction(w, int(p[o + layout.NODE].real), p[k], p[k + 3], p[k + 6])
@@ -46,7 +46,7 @@ def _sign(place: int, bit: int) -> float:
 def _over_plane(p: Array, w: Array, o: int, row: int, P: Any, N: Any) -> Any:
     """Return gap, normal and lowest point of the shape at p[o:] over a plane, in the place of the row at p[row:]."""
     if int(p[o].real) == layout.ELLIPSOID:
-        C, s, X, Y, Z = _point(p, w, o), o + layout.SIZE, _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2)
+        C, s, X, Y, Z = origin(p, w, o), o + layout.SIZE, axis(p, w, o, 0), axis(p, w, o, 1), axis(p, w, o, 2)
         return planes.ellipsoid(P, N, C, X, Y, Z, (p[s], p[s + 1], p[s + 2]))
     k = row + layout.POINT
     C = point(p, w, int(p[o + layout.NODE].real), p[k], p[k + 1], p[k + 2])
@@ -66,10 +66,10 @@ def _side(p: Array, pair: int, kind: int, which: int) -> int:
 def bend(p: Array, w: Array, pair: int, which: int) -> tuple[float, float]:
     """Return a coordinate of the sphere of the pair at p[pair:] in its solid, and the size at which its gap bends."""
     o = pair + layout.SECOND
-    D, kind = apart(_point(p, w, pair + layout.FIRST), _point(p, w, o)), int(p[o].real)
+    D, kind = apart(origin(p, w, pair + layout.FIRST), origin(p, w, o)), int(p[o].real)
     if kind == layout.BOX:
-        return dot(_axis(p, w, o, which), D)[0], p[o + layout.SIZE + which]
-    s = dot(_axis(p, w, o, 2), D)[0]
+        return dot(axis(p, w, o, which), D)[0], p[o + layout.SIZE + which]
+    s = dot(axis(p, w, o, 2), D)[0]
     if which == 0:
         return s, p[o + layout.SIZE + 1]
     return dot(D, D)[0] - s * s, p[o + layout.SIZE] ** 2  # about the axis: squares
@@ -79,15 +79,15 @@ def bend(p: Array, w: Array, pair: int, which: int) -> tuple[float, float]:
 def _from_solid(p: Array, w: Array, pair: int, C: Any) -> Any:
     """Return the distance of a point from the surface of the second shape of a pair, and the direction to the point."""
     o = pair + layout.SECOND
-    kind, M, s = int(p[o].real), _point(p, w, o), o + layout.SIZE
+    kind, M, s = int(p[o].real), origin(p, w, o), o + layout.SIZE
     if kind == layout.SPHERE:
         d, n = solids.point(C, M)
         return shifted(d, -p[s]), n
     sides = (_side(p, pair, kind, 0), _side(p, pair, kind, 1), _side(p, pair, kind, 2))
     if kind == layout.BOX:
-        X, Y, Z = _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2)
+        X, Y, Z = axis(p, w, o, 0), axis(p, w, o, 1), axis(p, w, o, 2)
         return solids.box(C, M, X, Y, Z, (p[s], p[s + 1], p[s + 2]), sides)
-    A = _axis(p, w, o, 2)
+    A = axis(p, w, o, 2)
     if kind == layout.CYLINDER:
         return solids.cylinder(C, M, A, p[s], p[s + 1], sides)
     d, n = solids.segment(C, M, A, p[s + 1], sides)
@@ -97,8 +97,8 @@ def _from_solid(p: Array, w: Array, pair: int, C: Any) -> Any:
 @kernels.helper
 def _tilt(p: Array, w: Array, o: int) -> Any:
     """Return a plane's normal in the axes of the cylinder over it."""
-    N, two = _axis(p, w, o + layout.FIRST, 2), o + layout.SECOND
-    x, y, z = dot(N, _axis(p, w, two, 0)), dot(N, _axis(p, w, two, 1)), dot(N, _axis(p, w, two, 2))
+    N, two = axis(p, w, o + layout.FIRST, 2), o + layout.SECOND
+    x, y, z = dot(N, axis(p, w, two, 0)), dot(N, axis(p, w, two, 1)), dot(N, axis(p, w, two, 2))
     return x[0].real, y[0].real, z[0].real
 
 
@@ -115,8 +115,8 @@ def _crossed(p: Array, w: Array, o: int) -> float:
     if int(p[one].real) == layout.PLANE:
         x, y, _ = _tilt(p, w, o)
         return float(np.sqrt(x * x + y * y) / p[o + layout.SINE].real - 1.0)
-    M, A, a = _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1].real
-    N, B, b = _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1].real
+    M, A, a = origin(p, w, one), axis(p, w, one, 2), p[one + layout.SIZE + 1].real
+    N, B, b = origin(p, w, two), axis(p, w, two, 2), p[two + layout.SIZE + 1].real
     sine, beside = solids.crossing(A, B, apart(N, M)), solids.overlap(M, A, a, N, B, b)
     steep = LEAST_COSINE - abs(dot(A, B)[0].real)
     return float(max(sine / p[o + layout.SINE].real - 1.0, -beside / a, steep))
@@ -156,9 +156,9 @@ def turn(p: Array, w: Array, o: int, now: int) -> float:
     if now != layout.CROSSED:
         return float(layout.BAND - _crossed(p, w, o))
     one, two = o + layout.FIRST, o + layout.SECOND
-    D, plane = apart(_point(p, w, two), _point(p, w, one)), int(p[one].real) == layout.PLANE
+    D, plane = apart(origin(p, w, two), origin(p, w, one)), int(p[one].real) == layout.PLANE
     reach = 2.0 * (p[two + layout.SIZE] + p[o + layout.MARGIN]).real + p[two + layout.SIZE + 1].real
-    if plane and dot(D, _axis(p, w, one, 2))[0].real > reach:
+    if plane and dot(D, axis(p, w, one, 2))[0].real > reach:
         return 1.0
     reach += 2.0 * p[one + layout.SIZE].real + p[one + layout.SIZE + 1].real
     if not plane and dot(D, D)[0].real > reach * reach:
@@ -174,8 +174,8 @@ def _cylinder(p: Array, w: Array, o: int, place: int) -> Any:
     the least tilt.
     """
     one, two = o + layout.FIRST, o + layout.SECOND
-    P, N, r, now = _point(p, w, one), _axis(p, w, one, 2), p[two + layout.SIZE], lies(p, w, o)
-    C, X, Y, Z = _point(p, w, two), _axis(p, w, two, 0), _axis(p, w, two, 1), _axis(p, w, two, 2)
+    P, N, r, now = origin(p, w, one), axis(p, w, one, 2), p[two + layout.SIZE], lies(p, w, o)
+    C, X, Y, Z = origin(p, w, two), axis(p, w, two, 0), axis(p, w, two, 1), axis(p, w, two, 2)
     if now == layout.CROSSED:
         E = moved(C, _sign(place, 1) * p[two + layout.SIZE + 1], Z)
         h, n, at = planes.rim(P, N, E, X, Y, -_sign(place, 0) * r)
@@ -190,8 +190,8 @@ def _cylinder(p: Array, w: Array, o: int, place: int) -> Any:
 def _capsules(p: Array, w: Array, o: int, place: int) -> Any:
     """Return the same of two capsules: side by side they meet where they end, crossed at one place."""
     one, two = o + layout.FIRST, o + layout.SECOND
-    M, A, a = _point(p, w, one), _axis(p, w, one, 2), p[one + layout.SIZE + 1]
-    N, B, b = _point(p, w, two), _axis(p, w, two, 2), p[two + layout.SIZE + 1]
+    M, A, a = origin(p, w, one), axis(p, w, one, 2), p[one + layout.SIZE + 1]
+    N, B, b = origin(p, w, two), axis(p, w, two, 2), p[two + layout.SIZE + 1]
     if lies(p, w, o) == layout.ALONG:
         K, L = solids.ends(M, A, a, N, B, b, _sign(place, 0))
     elif place == 0:
@@ -219,10 +219,10 @@ def touch(p: Array, w: Array, o: int, row: int) -> Any:
     if first == layout.PLANE and second == layout.CYLINDER:
         return _cylinder(p, w, o, place)
     if first == layout.PLANE:
-        h, n, at = _over_plane(p, w, two, row, _point(p, w, one), _axis(p, w, one, 2))
+        h, n, at = _over_plane(p, w, two, row, origin(p, w, one), axis(p, w, one, 2))
         return shifted(h, -p[o + layout.MARGIN]), n, at
     if first == layout.SPHERE:
-        C, r = _point(p, w, one), p[one + layout.SIZE]
+        C, r = origin(p, w, one), p[one + layout.SIZE]
         d, m = _from_solid(p, w, o, C)
         c = value(C)
         return shifted(d, -r - p[o + layout.MARGIN]), (-m[0], -m[1], -m[2]), (

@@ -33,7 +33,7 @@ from crossbody.reference.pairs.jets import (
     value,
 )
 from crossbody.reference.tree import layout as tree
-from crossbody.reference.tree.pair_rows import _axis, _point
+from crossbody.reference.tree.pair_rows import axis, origin
 from crossbody.reference.tree.points import direction, field, point, pull
 
 POLE = ((0.8, -0.6, 0.0), (0.48, 0.64, -0.6), (0.36, 0.48, 0.8))
@@ -56,12 +56,12 @@ def _times(k: Jet, r: Vector) -> Vector:
 def _lowest(p: Array, w: Array, o: int, row: int, N: Vector) -> Vector:
     """Return the lowest point of the shape at p[o:] over a plane with normal N, in the place of the row at p[row:]."""
     if int(p[o].real) == layout.ELLIPSOID:
-        X, Y, Z, s = _axis(p, w, o, 0), _axis(p, w, o, 1), _axis(p, w, o, 2), o + layout.SIZE
+        X, Y, Z, s = axis(p, w, o, 0), axis(p, w, o, 1), axis(p, w, o, 2), o + layout.SIZE
         x, y, z = dot(N, X), dot(N, Y), dot(N, Z)
         a, b, c = scaled(p[s] ** 2, x), scaled(p[s + 1] ** 2, y), scaled(p[s + 2] ** 2, z)
         far = scaled(-1.0, root(add(add(times(a, x), times(b, y)), times(c, z))))
         out = along(along(_times(over(a, far), X), over(b, far), Y), over(c, far), Z)
-        return along(_point(p, w, o), shifted(scaled(0.0, x), 1.0), out)
+        return along(origin(p, w, o), shifted(scaled(0.0, x), 1.0), out)
     k = row + layout.POINT
     C = point(p, w, int(p[o + layout.NODE].real), p[k], p[k + 1], p[k + 2])
     return moved(C, -p[row + layout.RADIUS], N)
@@ -98,9 +98,9 @@ def meeting(p: Array, w: Array, o: int, row: int) -> tuple[Vector, Vector, Vecto
     """Return where the pair at p[o:] meets in the place of the row at p[row:], and the frame across its normal."""
     one, two = o + layout.FIRST, o + layout.SECOND
     if int(p[one].real) == layout.PLANE:
-        return _lowest(p, w, two, row, _axis(p, w, one, 2)), _axis(p, w, one, 0), _axis(p, w, one, 1)
-    C = _point(p, w, one)
-    D = apart(_point(p, w, two), C)
+        return _lowest(p, w, two, row, axis(p, w, one, 2)), axis(p, w, one, 0), axis(p, w, one, 1)
+    C = origin(p, w, one)
+    D = apart(origin(p, w, two), C)
     n = _spread(D, root(dot(D, D)))
     first, second = _frame(p, w, two, n)
     return moved(C, p[one + layout.SIZE], n), first, second

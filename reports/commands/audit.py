@@ -18,7 +18,7 @@ from crossbody.reports import voice
 from crossbody.reports.importers import told
 from crossbody.reports.importers.audit import Audit, audited
 from crossbody.reports.importers.causes import advice, explained, parts
-from crossbody.reports.importers.compare import FAILED, OK, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
+from crossbody.reports.importers.compare import FAILED, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
 from crossbody.reports.importers.fix import MARK, fixed
 from crossbody.reports.importers.lines import files_of
 
@@ -108,14 +108,13 @@ def _fix(ask: Ask, out: Path) -> int:
 def read_by_all(ask: Ask) -> tuple[Audit, list[Row]]:
     """Return the audit of a file and the rows of every importer that is there, in the order asked for."""
     wanted, found, rows = importers.known(ask.engines), None, list[Row]()
-    for audit_of, name, own in audited(ask.path, wanted, ask.without, ask.seconds):
+    for audit_of, _, own in audited(ask.path, wanted, ask.without, ask.seconds):
         found = audit_of
         rows += own
         if len(wanted) > 1:
-            voice.note(textwrap.shorten(f"{name}: {summary(own)}", _width() - len("crossbody: "), placeholder=" ..."))
+            voice.note(textwrap.shorten(told.verdict(own), _width() - len("crossbody: "), placeholder=" ..."))
     if found is None:
-        asked = ", ".join(wanted)
-        raise EngineUnavailable(f"None of these is installed: {asked}; pip install 'crossbody[engines]' brings two.")
+        raise EngineUnavailable(importers.missing(wanted))
     if all(row.quantity == "reading" and row.verdict == UNSUPPORTED for row in rows):
         why = " ".join(told.sentence(row) for row in rows)
         raise EngineUnavailable(f"No reader that was asked, and is there, reads {ask.path}. {why}")
@@ -130,29 +129,21 @@ def _write(path: Path, text: str) -> None:
         raise OutputError(f"{path} cannot be written: {error.strerror}.") from None
 
 
-def summary(rows: Sequence[Row]) -> str:
-    """Return in a few words what one importer makes of a file."""
-    if rows[0].verdict != OK:
-        return f"{rows[0].verdict}: {rows[0].why}"
-    wrong = [row.quantity for row in rows if row.verdict == WRONG]
-    return f"reads {', '.join(wrong)} differently" if wrong else "reads the same robot"
-
-
 def _show(found: Audit, rows: Sequence[Row]) -> None:
     if not voice.quiet():
         scene = found.scene
         counts = {"joints": len(scene.joints), "degrees of freedom": scene.nv, "loops": len(scene.loops),
                   "actuators": len(scene.actuators), "states": len(found.job["states"])}  # fmt: skip
-        _say(f"{found.path.name}: {', '.join(f'{count} {name}' for name, count in counts.items())}")
+        _say(f"{found.path.name}: {told.verdict(rows)}.")
+        _say(", ".join(f"{count} {name}" for name, count in counts.items()))
         for text in (*found.findings, *filter(None, found.strange.values())):
             _say(text)
         print("\n".join(table(rows, _width())))
     for row in rows:
         if row.verdict in (WRONG, FAILED) or (row.verdict in (UNSUPPORTED, UNSEEN) and not voice.quiet()):
             _say(told.sentence(row))
-    for name, why in sorted(found.absent.items()):
-        if not voice.quiet():
-            _say(f"{name} is not there: {why}")
+    if found.absent and not voice.quiet():
+        _say(importers.missing(sorted(found.absent)))
 
 
 def _explain(path: Path, rows: Sequence[Row]) -> None:

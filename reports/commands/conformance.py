@@ -75,6 +75,6 @@ def _show(rows: pd.DataFrame, absent: dict[str, str], out: Path) -> None:
                 f"{counts[word]} {word}" for word in (OK, WRONG, UNSUPPORTED, UNSEEN, FAILED) if counts[word]
             )
             print(f"{engine} {version}: {told}")
-        for engine, why in sorted(absent.items()):
-            print(f"{engine} is not there: {why}")
+        if absent:
+            print(importers.missing(sorted(absent)))
     where(out)

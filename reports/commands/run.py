@@ -10,9 +10,10 @@ from pathlib import Path
 import click
 
 from crossbody.cases import Case, InvalidValue, installed
+from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports import voice
 from crossbody.reports.commands.run_shown import counted, show
-from crossbody.reports.commands.shared import OF_USERS, identity, key, where
+from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.verdict import Row, exit_code
 from crossbody.reports.measuring.truth import TRUTH
@@ -120,7 +121,8 @@ def repeat(
     case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
 ) -> str:
     """The command that reproduces the rows of one case, but for its engine."""
-    own = (name for name in names if name.endswith(OF_USERS) and case.name in (Path(name).stem, Path(name).name))
+    files = (name for name, _ in map(parted, names) if name.endswith(OF_USERS))
+    own = (name for name in files if case.name in (Path(name).stem, Path(name).name))
     source = next(own, case.name)
     words = ["crossbody", "run", source, "--variant", case.variant]
     words += [word for pair in pairs for word in ("--set", pair)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import Case, installed
-from crossbody.cases.files.reading import SUFFIXES
+from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports import voice
 from crossbody.reports.pages import site
 from crossbody.reports.runs import output, study
@@ -17,13 +17,10 @@ from crossbody.reports.runs.provenance import code
 if TYPE_CHECKING:
     import pandas as pd
 
-OF_USERS = (".py", *SUFFIXES)
-"""How names of files end that are cases."""
-
 
 def identity(kind: str, cases: Sequence[Case], names: Sequence[str], **more: Any) -> dict[str, Any]:
     """What decides what a command computes: the sources too, and case files of one's own."""
-    paths = [*(name for name in names if name.endswith(OF_USERS)), *_acting(cases)]
+    paths = [*(name for name, _ in map(parted, names) if name.endswith(OF_USERS)), *_acting(cases)]
     own = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in paths]
     scenes = [[case.label, dict(case.parameters)] for case in cases]
     return {"kind": kind, "code": code(), "cases": scenes, "files": own, "plugins": installed.digests(), **more}

@@ -17,7 +17,7 @@ from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.runs import jobs, watch
 from crossbody.reports.runs.provenance import provenance
-from crossbody.reports.suites._contract import Suite
+from crossbody.reports.suites.contract import Suite
 from crossbody.reports.sweep import draw, pools
 from crossbody.reports.sweep.map import stability_map, summary
 from crossbody.reports.sweep.minimise import failures, reproducers

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -31,8 +32,6 @@ from crossbody.reports.importers.solids import SINGLE
 
 FIRST, BEHIND = "mujoco", 5
 """Reader whose answer is to be there first, as the other yardstick, and how much nicer the others are to it and us."""
-KEYS = 4
-"""Keyframes at which importers are compared beside the random states."""
 
 
 @dataclass(slots=True)
@@ -77,9 +76,7 @@ def audited(
         SceneError: for a file that cannot be the yardstick, before any importer is asked.
     """
     check_text(path)
-    left_out = {word.strip() for word in without.split(",")}
-    if is_urdf(path):
-        left_out.add("actuators")  # of transmissions, which move nothing by themselves
+    left_out = _left_out(path, without)
     with TemporaryDirectory(prefix="crossbody-audit-") as folder:
         given = meshless(path, Path(folder)) if is_urdf(path) and without_meshes(without) else path
         readings = [Reading(name, given, is_urdf(path), seconds, int(name != FIRST) * BEHIND) for name in engines]
@@ -91,6 +88,16 @@ def audited(
             raise
         with Forms(path, lambda form: opened(form, without, found.job)) as forms:
             yield from _answered(found, readings, left_out, forms)
+
+
+def _left_out(path: Path, without: str) -> set[str]:
+    """Return the quantities to which no reader is held: readers have the whole file."""
+    found = {word.strip().partition(":")[0].removesuffix("s") + "s" for word in without.split(",")}
+    if is_urdf(path):
+        return found | {"actuators"}  # of transmissions, which move nothing by themselves
+    if "tendons" in found and read(path)[0].tendon_armature.any():
+        found |= {"M", "energy"}
+    return found | {"friction", "surfaces"} if "frictions" in found else found
 
 
 def meshless(path: Path, folder: Path) -> Path:
@@ -139,7 +146,8 @@ def opened(path: Path, without: str = "", job: dict[str, Any] | None = None) -> 
         raise SceneError(f"{path} has no joint: there is no motion in which readers could differ; valid: one at least.")
     own = {} if is_urdf(path) else of_shapes(path)
     scene = with_closed_forms(scene, own)
-    keys = [np.array(key) for key in model.key_qpos[:KEYS]]
+    of_key = mjcf.names(model, "key")
+    keys = {of_key(i): np.array(q) for i, q in enumerate(model.key_qpos)}
     paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
     meets = [bool(one) or i in paired for i, one in enumerate(model.geom_contype | model.geom_conaffinity)]
     named = mjcf.names(model, "geom")
@@ -149,9 +157,9 @@ def opened(path: Path, without: str = "", job: dict[str, Any] | None = None) -> 
     found.wanted["precision"] = SINGLE if None in own.values() else 0.0
     if is_urdf(path):
         found.wanted["planar"] = planar(path)
-        found.wanted["contacts"] = None  # which of its links may touch each other a URDF does not say
-        for name, both in bounds(path).items():
-            for key, value in zip(("lower", "upper"), both, strict=True):
+        found.wanted["contacts"], found.wanted["softness"] = None, {}  # of which a URDF says nothing
+        for name, own_bounds in bounds(path).items():
+            for key, value in own_bounds.items():
                 if name in found.wanted["numbers"][key]:
                     found.wanted["numbers"][key][name] = [value]
     return found
@@ -170,7 +178,7 @@ def with_closed_forms(scene: Scene, own: Mapping[str, Inertia | None]) -> Scene:
 
 
 def of_scene(
-    path: Path, scene: Scene, keys: Sequence[Floats] = (), findings: tuple[str, ...] = (),
+    path: Path, scene: Scene, keys: Mapping[str, Floats] = MappingProxyType({}), findings: tuple[str, ...] = (),
     touching: Sequence[str] | None = None, job: dict[str, Any] | None = None,
 ) -> Audit:  # fmt: skip
     """Return the audit of a file of which a scene says what it means; without `touching` shapes are not compared."""

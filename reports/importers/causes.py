@@ -23,7 +23,7 @@ from crossbody.reports.importers.forms import Forms, removed
 from crossbody.reports.importers.lines import Node, Place, names, with_lines
 
 TELLS = "The engine reads it as something else; say it in the engine."
-PLAIN = ("arm", "URDF: arm", "URDF: link without mass", "URDF: inertia of the root")
+PLAIN = ("arm", "shapes that may touch", "URDF: arm", "URDF: link without mass", "URDF: inertia of the root")
 """What every robot has: without it nothing would be left to differ."""
 AND, PAIRED = " together with ", 5
 """Between the names of two causes that act together; of how many features pairs are tried."""
@@ -59,7 +59,7 @@ def uses(path: Path, urdf: bool) -> list[Use]:
     found = []
     for feature in FEATURES:
         if (feature.format == "urdf") == urdf:
-            nodes = sorted({node for way in feature.finds for node in _at(root, places, way)}, key=order.__getitem__)
+            nodes = sorted({node for way in feature.paths for node in _at(root, places, way)}, key=order.__getitem__)
             if nodes:
                 named = tuple(frozenset(names(node, around)) for node in nodes)
                 found.append(Use(feature, tuple(places[node] for node in nodes), named))
@@ -84,9 +84,10 @@ def left_out(features: Sequence[Feature], root: Node, places: Mapping[Node, Plac
 
     Where something is not said, that is said which the format takes for it.
     """
-    for way in [way for feature in features for way in feature.finds]:
+    for way in [way for feature in features for way in feature.paths]:
         path, _, without = way.partition("!")
-        told = re.findall(r"@(\w+)", path.rpartition("/")[2])
+        last = path.rpartition("/")[2]
+        told = re.findall(r"@(\w+)\]", last) or re.findall(r"@(\w+)", last)  # a value selects, where another is named
         for node in _at(root, places, way):
             for key in told:
                 node.attrib.pop(key, None)
@@ -218,10 +219,10 @@ def _agrees(row: Row, told: Sequence[Row]) -> bool:
 
     Shapes agree where there are none: what leaves them out explains nothing of them.
     """
-    for one in told if row.quantity not in ("bodies", "shapes", "contacts") else ():
+    of_shapes = row.quantity in ("bodies", "shapes", "contacts", "surfaces")
+    for one in told if row.verdict == FAILED or not of_shapes else ():
         if one.quantity == row.quantity:
-            same = one.why == row.why if row.quantity == "reading" else one.verdict not in (OK, NONE)
-            return not same
+            return one.why != row.why if row.quantity == "reading" else one.verdict in (OK, NONE)[: 2 - of_shapes]
     return False
 
 
@@ -231,9 +232,9 @@ def _places(row: Row) -> list[str]:
 
 
 def _blamed(row: Row, causes: Sequence[tuple[Use, ...]], doubt: str) -> Row:
-    """Return a row with its cause: of several that which is used at the joint or body."""
+    """Return a row with its cause: of several that which is used at the joint or body, and in the fewest places."""
     places = _places(row)
-    cause = min(causes, key=lambda group: not any(use.at(places) for use in group))
+    cause = min(causes, key=lambda group: (not any(use.at(places) for use in group), sum(len(u.places) for u in group)))
     file, line = next((place for use in cause for place in use.at(places)), cause[0].places[0])
     names = AND.join(use.feature.name for use in cause)
     return replace(row, cause=names, file=str(file), line=line, doubt=doubt)

@@ -16,7 +16,8 @@ TOLERANCE = 1e-9
 OK, WRONG, UNSUPPORTED, FAILED, NONE, UNSEEN = "ok", "wrong", "unsupported", "failed", "-", "not shown"
 QUANTITIES = (
     "reading", "coordinates", "bodies", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping",
-    "springs", "limits", "friction", "tendons", "loops", "actuators", "shapes", "contacts",
+    "springs", "limits", "friction", "effort", "tendons", "loops", "actuators", "shapes", "contacts", "surfaces",
+    "softness", "keyframes",
 )  # fmt: skip
 """Of rows, in their order."""
 SAID = re.compile(r"unsupported|not (yet )?(been )?(supported|implemented)|(will be |is |are )?ignored|ignoring", re.I)
@@ -25,7 +26,9 @@ GENERAL = re.compile(r"the tag '\w+' found as a child of '\w+'", re.I)
 """How one says that it leaves all of a tag out, once; the line of the file is that of the first."""
 WORDS = {
     "armature": "armature|rotor", "damping": "damping", "springs": "stiffness|spring", "limits": "range|limit",
-    "friction": "friction", "loops": "equality|connect|weld|mimic|constraint",
+    "friction": "friction(loss)?", "effort": "actuatorfrcrange|effort", "keyframes": "keyframe",
+    "surfaces": "friction|condim|margin", "softness": "solref|solimp|solreflimit|solimplimit|timestep",
+    "loops": "equality|connect|weld|mimic|constraint",
     "actuators": "actuator|motor|transmission", "coordinates": "joint", "tendons": "tendon|spatial",
     "shapes": "mesh|shape|collision", "contacts": "exclude|contype|conaffinity|pair",
 }  # fmt: skip
@@ -151,7 +154,8 @@ def _row(
     if own is None:
         return Row(**common, verdict=NONE)
     if quantity in unseen:
-        return Row(**common, verdict=UNSEEN, why=unseen[quantity])
+        verdict = FAILED if quantity in found.get("refused", ()) else UNSEEN
+        return Row(**common, verdict=verdict, why=unseen[quantity])
     told = sorted(own, key=lambda gap: -gap.size)
     off = [gap for gap in told if not gap.size <= tolerance]
     if not off:

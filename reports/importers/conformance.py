@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from crossbody.cases.files.conformance import Feature
 from crossbody.engines.importers import SECONDS, answers
 from crossbody.reports.importers.audit import Audit, of_scene, opened
@@ -31,6 +33,16 @@ def written(feature: Feature, folder: Path) -> Path:
     return path
 
 
+def audit_of(feature: Feature, path: Path) -> Audit:
+    """Return the audit of the file of a feature, by the scene that it means."""
+    scene, shapes = feature.scene, [shape.name for shape in feature.scene.shapes]
+    found = of_scene(path, scene, feature.keys, touching=shapes or None)
+    if feature.heavier:
+        for state in found.wanted["states"]:
+            state["M"] = (np.array(state["M"]) + feature.heavier).tolist()
+    return found
+
+
 def judged(feature: Feature, engine: str, seconds: float = SECONDS) -> Row | str:
     """Return the one row that tells what an importer makes of a feature, or why it is not there."""
     return judged_all([feature], engine, seconds)[0]
@@ -43,7 +55,7 @@ def judged_all(features: Sequence[Feature], engine: str, seconds: float = SECOND
         own = [feature for feature in features if feature.format == kind]
         with tempfile.TemporaryDirectory(prefix="crossbody-feature-") as folder:
             paths = [written(feature, Path(folder) / str(k)) for k, feature in enumerate(own)]
-            audits = [of_scene(path, feature.scene) for path, feature in zip(paths, own, strict=True)]
+            audits = [audit_of(feature, path) for path, feature in zip(paths, own, strict=True)]
             told = answers(engine, paths, kind == "urdf", [audit.job for audit in audits], seconds)
             for feature, audit, answer in zip(own, audits, told, strict=True):
                 found[feature.name] = _told(feature, engine, audit, answer)
@@ -55,7 +67,7 @@ def _told(feature: Feature, engine: str, audit: Audit, answer: dict[str, Any]) -
         return str(answer["why"])
     with Forms(audit.path, lambda form: opened(form, job=audit.job)) as forms:
         found = excused(rows(engine, answer, audit.wanted, audit.job["joints"]), answer, audit, forms)
-    about = [row for row in found if row.quantity in ("reading", *feature.about) and not _follows(row)]
+    about = [row for row in found if row.quantity in ("reading", "coordinates", *feature.about) and not _follows(row)]
     worst = min(about, key=lambda row: WORST.index(row.verdict))
     return replace(worst, version=answer.get("version", ""), cause=feature.name)
 

@@ -5,38 +5,40 @@ It has the form of an importer's answer (`crossbody.engines.importers`), so that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
-from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Scene, Shape, Tendon
-from crossbody.engines.importers.process import boxes, composite, posed
-from crossbody.reports.scenes._kinematics import body_poses
+from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Pair, Scene, Shape, Tendon
+from crossbody.engines.importers.beside.solids import boxes, composite, posed
+from crossbody.reports.scenes.kinematics import body_poses
 
-SEED, DRAWN = 20241123, 4
-"""Of the random states, and their number."""
+SEED, DRAWN, KEYS = 20241123, 4, 4
+"""Of the random states, their number, and how many keyframes stand beside them."""
 
 
-def job_of(scene: Scene, starts: Sequence[Floats] = ()) -> dict[str, Any]:
-    """Return joints and states at which importers are compared: random ones, and those given, with random velocities.
+def job_of(scene: Scene, keys: Mapping[str, Floats] = MappingProxyType({})) -> dict[str, Any]:
+    """Return joints, keyframes, and states at which importers are compared: at random and at the first keyframes.
 
     Args:
         scene: whose coordinates they are.
-        starts: positions (nq,), keyframes say.
+        keys: name of every keyframe -> positions (nq,).
     """
     draw = np.random.default_rng(SEED)
     joints = [[joint.name, joint.body, joint.type] for joint in scene.joints]
     positions = [[_drawn(joint, draw) for joint in scene.joints] for _ in range(DRAWN)]
     ends = np.cumsum([0, *(WIDTHS[joint.type][0] for joint in scene.joints)])
-    positions += [[q[a:b].tolist() for a, b in pairwise(ends)] for q in starts]
+    held = {name: [np.asarray(q)[a:b].tolist() for a, b in pairwise(ends)] for name, q in keys.items()}
+    positions += [*held.values()][:KEYS]
     widths = [WIDTHS[joint.type][1] for joint in scene.joints]
     states = [{"q": q, "v": [draw.normal(size=width).tolist() for width in widths]} for q in positions]
-    return {"joints": joints, "states": states}
+    return {"joints": joints, "states": states, "keys": held}
 
 
 def _drawn(joint: Joint, draw: np.random.Generator) -> list[float]:
@@ -68,6 +70,7 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
     solids = [shape for shape in scene.shapes if shape.name in (touching or ())]
     numbers, by = {shape.name: k for k, shape in enumerate(solids)}, moved_by(scene)
     moved = {joint.name: joint.body for joint in scene.joints}
+    pairs = [pair for pair in scene.pairs if pair.first in numbers and pair.second in numbers]
     of_states = [
         at | {"frames": here, "ends": _ends(scene, here),
               "tendons": {part.name: _length(part, scene, q, here) for part in scene.tendons}}
@@ -84,9 +87,11 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
                     for part in scene.tendons},
         "shapes": [[shape.name, "mesh" if shape.corners else shape.type, by.get(shape.body, ""),
                     _boxes(shape, frames[0], moved.get(by.get(shape.body, "")))] for shape in solids],
-        "contacts": [[numbers[pair.first], numbers[pair.second]] for pair in scene.pairs if pair.first in numbers
-                     and pair.second in numbers],
+        "contacts": [[numbers[pair.first], numbers[pair.second]] for pair in pairs],
+        "surfaces": [_surface(pair) for pair in pairs],
+        "softness": _softness(scene, pairs),
         "inertias": _inertias(scene, frames[0]),
+        "keys": {name: [np.concatenate(q).tolist()] * 2 for name, q in job["keys"].items()},
         "states": of_states,
     }  # fmt: skip
 
@@ -94,6 +99,20 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
 def _standing(frame: Any, position: Sequence[float], orientation: Sequence[float]) -> tuple[Floats, Floats]:
     p, R = map(np.array, frame)
     return p + R @ np.array(position), R @ matrices(np.array(orientation))
+
+
+def _surface(pair: Pair) -> list[float]:
+    """Return the friction of a pair that is in force, and its margin."""
+    return [*(mu if k < pair.dimension - 1 else 0.0 for k, mu in enumerate(pair.friction)), pair.margin]
+
+
+def _softness(scene: Scene, pairs: Sequence[Pair]) -> dict[str, list[float]]:
+    """Return a0 and a1 of all rows."""
+    parts: tuple[Joint | Tendon, ...] = (*scene.joints, *scene.tendons)
+    bounded = [part for part in parts if not set(part.range) <= set(UNBOUNDED)]
+    laws = {part.name: part.law for part in bounded} | {loop.name: loop.law for loop in scene.loops}
+    laws |= {":".join(sorted((pair.first, pair.second))): pair.law for pair in pairs}
+    return {name: [law.a0, law.a1] for name, law in laws.items()}
 
 
 WORLD = [[0.0] * 3, np.eye(3).tolist()]
@@ -144,6 +163,7 @@ def _numbers(scene: Scene) -> dict[str, dict[str, list[float]]]:
         "stiffness x^2": lambda j: j.stiffness[1], "stiffness x^3": lambda j: j.stiffness[2],
         "rest": lambda j: j.rest if any(j.stiffness) and j.type != "free" else (),
         "lower": lambda j: j.range[0] if single(j) else -np.inf, "upper": lambda j: j.range[1],
+        "least force": lambda j: j.force_range[0], "most force": lambda j: j.force_range[1],
     }  # fmt: skip
     return {key: {joint.name: _listed(value(joint)) for joint in scene.joints} for key, value in of.items()}
 
@@ -178,6 +198,12 @@ def _placed(body: Body, frame: Any) -> tuple[float, Floats, Floats]:
     return body.mass, p + R @ np.array(body.com), R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
 
 
+def _light(scene: Scene) -> Scene:
+    """Return the scene with bodies of unit inertia and no weight, in whose forces those of actuators lose no digits."""
+    unit: dict[str, Any] = {"mass": 1.0, "com": (0.0,) * 3, "inertia": (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)}
+    return scene.replace(bodies=tuple(replace(body, **unit) for body in scene.bodies), gravity=(0.0,) * 3)
+
+
 def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Sequence[Any]) -> list[dict[str, Any]]:
     """Return M, bias, gravity and energy at every state."""
     from crossbody.reference.tree import mechanism
@@ -193,21 +219,21 @@ def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Seq
         tendons=tuple(replace(part, **slack) for part in scene.tendons),
         actuators=tuple(replace(part, **plain) for part in scene.actuators),
     )  # fmt: skip
-    table, n = tabulate(bare), scene.nv
-    w, none, units = np.zeros(table.scratch), np.zeros(len(scene.actuators)), np.eye(len(scene.actuators))
+    heavy, light, n = tabulate(bare), tabulate(_light(bare)), scene.nv
+    none, units = np.zeros(len(scene.actuators)), np.eye(len(scene.actuators))
     widths = [WIDTHS[joint.type][1] for joint in scene.joints]
     motors = np.repeat([value for (value,) in _numbers(scene)["armature"].values()], widths)
     own = np.repeat([joint.armature for joint in scene.joints], widths)
 
-    def of(q: Floats, v: Floats, u: Floats) -> tuple[Floats, Floats]:
+    def of(q: Floats, v: Floats, u: Floats, table: Any = heavy) -> tuple[Floats, Floats]:
         M, f = np.zeros((n, n)), np.zeros(n)
-        mechanism.dynamics(0.0, q, v, u, table.p, M, f, w)
+        mechanism.dynamics(0.0, q, v, u, table.p, M, f, np.zeros(table.scratch))
         return M + np.diag(motors - own), f
 
     found = []
     for (q, v), here in zip(states, frames, strict=True):
         M, free = of(q, v, np.zeros(0))
-        held = of(q, v, none)[1]
+        held, alone = (of(q, v, u, light)[1] for u in (none, np.zeros(0)))
         weight = sum(m * np.array(scene.gravity) @ c for m, c, _ in (_placed(b, here[b.name]) for b in scene.bodies))
         found.append(
             {
@@ -216,9 +242,9 @@ def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Seq
                 "gravity": (-of(q, np.zeros(n), np.zeros(0))[1]).tolist(),
                 "energy": float(v @ M @ v / 2 - weight),
                 "v": v.tolist(),
-                "held": (held - free).tolist(),
+                "held": (held - alone).tolist(),
                 "driven": {
-                    part.name: (of(q, v, unit)[1] - held).tolist()
+                    part.name: (of(q, v, unit, light)[1] - held).tolist()
                     for part, unit in zip(scene.actuators, units, strict=True)
                 },
             }

@@ -15,7 +15,7 @@ from crossbody.reports.importers.plain_urdf import urdf
 from crossbody.reports.importers.same_model import check_model
 
 SAME = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "armature", "damping", "springs", "limits",
-        "friction", "loops", "actuators")  # fmt: skip
+        "friction", "effort", "loops", "actuators", "contacts", "surfaces", "softness", "keyframes")  # fmt: skip
 """What the new file means as the old one does; bodies that are fixed to the world may have other frames."""
 MARK = "Written by the option fix of crossbody audit"
 """What a file begins with that may be written over; no comment of XML may have two dashes."""

@@ -46,3 +46,7 @@ def gaps(
         of = solids.matched(found, wanted)
         yield "shapes", solids.shapes(found, wanted, of)
         yield "contacts", solids.contacts(found, wanted, of)
+        yield "surfaces", solids.surfaces(found, wanted, of)
+    if not off:
+        yield "softness", parts.softness(found, wanted)
+        yield "keyframes", parts.keyframes(found, wanted)

@@ -14,10 +14,10 @@ from crossbody.reports.importers.gap import Gap, apart, lacks, reach
 NUMBERS = {
     "armature": ("armature",), "damping": ("damping", "damping v|v|", "damping v^3"),
     "springs": ("stiffness", "stiffness x^2", "stiffness x^3", "rest"), "limits": ("lower", "upper"),
-    "friction": ("friction",),
+    "friction": ("friction",), "effort": ("least force", "most force"),
 }  # fmt: skip
 """Quantity -> numbers of joints that make it up."""
-USUAL = {"lower": -math.inf, "upper": math.inf}
+USUAL = {"lower": -math.inf, "upper": math.inf, "least force": -math.inf, "most force": math.inf}
 """What such a number is where nothing is said; of others 0."""
 
 
@@ -108,6 +108,30 @@ def _end_gap(kind: str, ends: Sequence[tuple[Any, Any]]) -> float:
             between.append(np.concatenate([np.array(p) - turn @ np.array(p_2), turn.ravel()]))
         worst = max(worst, float(np.abs(between[0] - between[1]).max()))
     return worst
+
+
+def softness(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
+    """Return a gap for every row that has a law: a0 and a1."""
+    told = []
+    for name, theirs in wanted["softness"].items():
+        mine = found["softness"].get(name, [0.0, 0.0])
+        worst = max(zip(theirs, mine, ("a0", "a1"), strict=True), key=lambda part: apart(*part[:2]))
+        told.append(Gap(apart(*worst[:2]), f"{name}: {worst[2]}", worst[1], worst[0], part=name))
+    return told or None
+
+
+def keyframes(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
+    """Return a gap for the positions of every keyframe, in the engine's own coordinates."""
+    told, counts = [], (len(found["keys"]), len(wanted["keys"]))
+    for name in wanted["keys"]:
+        if name not in found["keys"]:
+            told.append(Gap(1.0, f"{name} is missing", *counts, part=name))
+            continue
+        mine, theirs = map(np.array, found["keys"][name])
+        off = np.nan_to_num(np.abs(mine - theirs) / np.maximum(1.0, np.abs(theirs)), nan=math.inf)
+        k = int(np.argmax(off))
+        told.append(Gap(float(off[k]), f"{name}: position {k}", float(mine[k]), float(theirs[k]), part=name))
+    return told or None
 
 
 def actuators(found: Mapping[str, Any], wanted: Mapping[str, Any], names: Sequence[str]) -> list[Gap] | None:

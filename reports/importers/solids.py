@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reports.importers.gap import Gap, reach
+from crossbody.reports.importers.gap import Gap, apart, lacks, reach
 
 SINGLE = 1e-6
 """Part of the reach within which corners of meshes are the same: files and engines have them in single precision."""
@@ -58,7 +58,32 @@ def contacts(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[in
     mine = {frozenset((there[i], there[j])) for i, j in found["contacts"] if i in there and j in there}
     theirs = {frozenset(pair) for pair in wanted["contacts"] if set(pair) <= of.keys()}
     if not mine and not theirs:
-        return None
+        return [] if lacks(found, "contacts") and len(wanted["shapes"]) > 1 else None
     told = [*((pair, "may not touch") for pair in theirs - mine), *((pair, "may touch") for pair in mine - theirs)]
     named = sorted((" and ".join(sorted(name[k] for k in pair)), how) for pair, how in told)
     return [Gap(1.0, f"{both} {how}", len(mine), len(theirs)) for both, how in named]
+
+
+PARTS = ("slide", "slide", "spin", "roll", "roll", "margin")
+"""Of what is told of a pair that may touch: friction along two tangents, about the normal and about them, margin."""
+
+
+def surfaces(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[int, tuple[int, float]]) -> Any:
+    """Friction and margin of every pair of shapes that may touch, of those that both have."""
+    if not wanted["contacts"]:
+        return None
+    name, by, told = [shape[0] for shape in wanted["shapes"]], [shape[2] for shape in wanted["shapes"]], list[Gap]()
+    if lacks(found, "surfaces"):
+        return [Gap(1.0)]
+    mine = {frozenset(pair): own for pair, own in zip(found["contacts"], found["surfaces"], strict=False)}
+    for pair, theirs in zip(wanted["contacts"], wanted["surfaces"], strict=True):
+        own = mine.get(frozenset(of[k][0] for k in pair if k in of))
+        if own is None:  # which may touch is another quantity
+            continue
+        where, part = " and ".join(name[k] for k in pair), next(filter(None, (by[k] for k in pair)), "")
+        if np.isnan(own).any():
+            told.append(Gap(1.0, f"The engine shows nothing of {where}.", unseen=True))
+            continue
+        for key, x, y in zip(PARTS, theirs, own, strict=True):
+            told.append(Gap(apart(x, y), f"{where}: {key}", y, x, part=part, key=key, lacks=y == 0.0))
+    return told or None

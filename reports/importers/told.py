@@ -31,6 +31,41 @@ def sentence(row: Row) -> str:
     return f"{row.engine}: {row.quantity}: {row.where} is {value}, and {expected} in the file."
 
 
+NAMED = 3
+"""Quantities that are named of an engine in the first sentence."""
+
+
+WAYS = {
+    "": ("reads the robot that the file describes", "read the robot that the file describes"),
+    "partly": ("reads it but for what it lacks or does not show", "read it but for what they lack or do not show"),
+    "another": ("reads another robot", "read another robot"), "failed": ("fails on it", "fail on it"),
+    "unread": ("does not read such a file", "do not read such a file"),
+}  # fmt: skip
+"""What is said of one engine, and of several."""
+
+
+def verdict(rows: Sequence[Row]) -> str:
+    """Return in one sentence which engines read the robot that the file describes, and which do not, and in what."""
+    of: dict[str, list[Row]] = {}
+    for row in rows:
+        of.setdefault(row.engine, []).append(row)
+    groups: dict[str, list[str]] = {"": [], "partly": [], "another": [], "failed": [], "unread": []}
+    for name, own in of.items():
+        off = [row.quantity for row in own if row.verdict in (WRONG, FAILED)]
+        lacks = any(row.verdict in (UNSUPPORTED, UNSEEN) for row in own)
+        kind = "another" if off else "partly" if lacks else ""
+        if own[0].verdict in (FAILED, UNSUPPORTED):
+            kind = "failed" if off else "unread"
+        more = [f"{len(off) - NAMED} more"] if len(off) > NAMED + 1 else off[NAMED:]
+        groups[kind].append(f"{name} ({_listed([*off[:NAMED], *more])})" if kind == "another" else name)
+    told = [f"{_listed(names)} {WAYS[key][len(names) > 1]}" for key, names in groups.items() if names]
+    return "; ".join(told)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
 def cell(row: Row | None) -> str:
     """Return a row in a few letters: the largest difference where it is wrong."""
     if row is None:
@@ -59,13 +94,11 @@ def markdown(path: Path, rows: Sequence[Row]) -> str:
     names = [f"{name} {number}".strip() for name, number in zip(heading, versions, strict=True)]
     table = [names, ["---"] * len(names), *lines]
     told = [f"- {sentence(row)}{_where(row)}" for row in rows if row.verdict in (WRONG, FAILED)]
-    said = "" if told else "Every reader that is there makes the same robot of it.\n"
     return (
-        f"### {path.name}\n\n"
+        f"### {path.name}\n\n{verdict(rows)}.\n\n"
         + "\n".join(f"| {' | '.join(line)} |" for line in table)
         + "\n\n"
         + "\n".join(told)
-        + said
         + f"\n\n<!-- {MARK} -->\n"
     )
 

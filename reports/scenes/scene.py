@@ -7,7 +7,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import quaternions
@@ -18,7 +17,7 @@ from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.engines.nearest import Places, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
-from crossbody.reports.scenes._kinematics import Pose, body_poses, placed
+from crossbody.reports.scenes.kinematics import Pose, body_poses, placed
 
 MOST = 500
 """Bodies that are drawn."""
@@ -160,6 +159,8 @@ def _solid(shape: SceneShape, body: int) -> dict[str, Any]:
 
 def _sides(corners: Floats) -> tuple[tuple[int, ...], ...]:
     """Return the corners of each side of a hull, seen from outside against the clock."""
+    from scipy.spatial import ConvexHull  # a third of a second, which only hulls need
+
     hull = ConvexHull(corners)
     sides: dict[tuple[float, ...], set[int]] = {}
     for triangle, plane in zip(hull.simplices, np.round(hull.equations, FLAT), strict=True):

@@ -86,7 +86,8 @@ CONFORMANCE_TEXT = (
     "One feature a file, each read by the engine's own reader in a process of its own, and compared with a scene that "
     "was written by hand: coordinates, inertias, M, gravity, bias, energy and frames at random states, or what the "
     "feature is about. ok: alike to 1e-9 (to 2e-4 for a reader in single precision). unsupported: the engine says that "
-    "it leaves it out, or has no such thing. wrong: it reads something else without a word. failed: it gives up."
+    "it leaves it out, or has no such thing. not shown: it may have it, but nobody can look. wrong: it reads something "
+    "else without a word. failed: it gives up."
 )
 DETAILS = columns(
     feature="Feature", engine="Engine", version="Version", verdict=("Verdict", Kind.VERDICT), quantity="Quantity",

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases.own_file import from_file
 from crossbody.cases.registry import Registry
-from crossbody.reports.suites._contract import Suite
 from crossbody.reports.suites._own import SUITES
+from crossbody.reports.suites.contract import Suite
 
 if TYPE_CHECKING:
     from crossbody.cases import Value

@@ -12,7 +12,7 @@ from crossbody import cases
 from crossbody.cases import Case, Parameter, Value
 from crossbody.cases.loading import module
 from crossbody.reports.suites._axis import Axis, Levels, Linear, Log
-from crossbody.reports.suites._contract import Family, Suite
+from crossbody.reports.suites.contract import Family, Suite
 
 LAW: Mapping[str, Axis] = {"a0": Log(1e2, 1e6), "a1": Log(1.0, 1e3)}
 SHORT = 0.5

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from crossbody.reports.suites import _scenes as scenes
 from crossbody.reports.suites._axis import Axis, Levels, Linear, Log, Whole, decades
-from crossbody.reports.suites._contract import TIGHT, Family, Ladder, Suite
+from crossbody.reports.suites.contract import TIGHT, Family, Ladder, Suite
 
 ball = partial(Family, case="bouncing_ball", variant="linear", scene=scenes.damped)
 cubic = partial(Family, case="bouncing_ball", variant="listing")

@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import CrossbodyError
-from crossbody.reports.suites._contract import Drawn
+from crossbody.reports.suites.contract import Drawn
 
 if TYPE_CHECKING:
     import numpy as np

@@ -17,7 +17,7 @@ from scipy.stats import qmc
 from crossbody.cases import InvalidValue, UnknownName, Value
 from crossbody.cases.loading import module
 from crossbody.reports.runs.jobs import Pick
-from crossbody.reports.suites._contract import Family, Suite
+from crossbody.reports.suites.contract import Family, Suite
 from crossbody.reports.sweep.spec import Spec
 
 SHARE = 400

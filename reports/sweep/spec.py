@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from crossbody.cases import Value, installed
-from crossbody.reports.suites._contract import Ladder
+from crossbody.reports.suites.contract import Ladder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

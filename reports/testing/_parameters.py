@@ -11,6 +11,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import CrossbodyError
+from crossbody.cases.loading import parted
 from crossbody.reports.runs import jobs
 from crossbody.reports.runs.jobs import Pick
 
@@ -51,7 +52,7 @@ def scenes(config: pytest.Config, mark: pytest.Mark | None = None) -> list[Any]:
     """
     texts = mark.args if mark is not None and mark.args else _asked(config, "case")
     try:
-        found = [scene for text in texts for scene in _variants(*_split(str(text)), _base(config, mark))]
+        found = [scene for text in texts for scene in _variants(*parted(str(text)), _base(config, mark))]
     except CrossbodyError as error:
         raise pytest.Collector.CollectError(str(error)) from None
     return list(dict.fromkeys(found)) or [pytest.param(None, id="no-case", marks=pytest.mark.skip(reason=NONE))]
@@ -79,12 +80,6 @@ def _base(config: pytest.Config, mark: pytest.Mark | None) -> Path:
     """The folder that relative paths start from: where the command was typed, or the configuration stands."""
     typed = bool(config.getoption("--crossbody-case")) and not (mark is not None and mark.args)
     return config.invocation_params.dir if typed else config.rootpath
-
-
-def _split(text: str) -> tuple[str, str | None]:
-    """CASE or CASE:VARIANT; the colon of a drive is none."""
-    name, colon, variant = text.rpartition(":")
-    return (name, variant) if colon and not text.endswith(".py") else (text, None)
 
 
 def _variants(name: str, variant: str | None, base: Path) -> list[Scene]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from crossbody.cases import InvalidValue
+from crossbody import cases
+from crossbody.cases import InvalidValue, UnknownName
 from crossbody.cases.parameters import NumberOrWord, Numbers, spread
-from crossbody.reports.runs.jobs import parse_settings
+from crossbody.reports.runs.jobs import load_cases, parse_settings
 
 MASSES = Numbers(default="0.1", unit="kg", low=0.0, open_low=True)
 HORIZON = NumberOrWord(default="auto", unit="s", low=0.0, open_low=True, choices=("auto",))
@@ -61,3 +63,29 @@ def test_a_word_stands_for_a_number() -> None:
     for wrong in ("soon", 0.0, -1.0):
         with pytest.raises(InvalidValue, match="or: auto"):
             HORIZON.checked("t_end", wrong)
+
+
+ROBOT = """<mujoco><worldbody><body><joint name="j" type="slide"/><geom size=".1"/></body></worldbody>
+<keyframe><key name="low" qpos="-1"/><key name="high" qpos="2"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("name", cases.names())
+def test_a_case_and_its_variant_are_one_word_wherever_a_case_is_taken(name: str) -> None:
+    for variant in cases.variants(name):
+        both = f"{name}:{variant}"
+        assert cases.variants(both) == (variant,)
+        assert cases.load(both).label == cases.load(name, variant).label == cases.load(both, variant).label == both
+        assert [case.label for case in load_cases([both], None, {})] == [both]
+    with pytest.raises(UnknownName, match="variant of"):
+        cases.load(f"{name}:nope")
+    with pytest.raises(InvalidValue, match="give one of them"):
+        cases.load(both, "nope")
+
+
+def test_so_are_a_robots_file_and_its_keyframe(tmp_path: Path) -> None:
+    path = tmp_path / "with:colon.xml"
+    path.write_text(ROBOT)
+    assert [cases.load(f"{path}:{key}").q0[0] for key in ("low", "high")] == [-1.0, 2.0]
+    assert len(load_cases([str(path)], None, {})) > 1
+    with pytest.raises(UnknownName, match="nope"):
+        cases.load(f"{path}:nope")

@@ -14,7 +14,7 @@ from crossbody.cases.form import Form
 from crossbody.engines._force import acting
 from crossbody.engines._formed import form_of, on_scene
 from crossbody.hw import models
-from crossbody.hw.models._contract import Segment
+from crossbody.hw.models.contract import Segment
 
 SMALL = 1e-6
 SHIPPED = [

@@ -12,7 +12,7 @@ from robot_readers import BAD, importer
 from crossbody.cases import installed
 from crossbody.engines import importers
 from crossbody.engines.importers import Reading
-from crossbody.engines.importers.process import matched
+from crossbody.engines.importers.beside.robot import matched
 from crossbody.reports.importers.audit import audited
 from crossbody.reports.importers.compare import FAILED, UNSUPPORTED, WRONG
 

@@ -10,7 +10,7 @@ from crossbody import cases, engines, hw
 from crossbody.cases import InvalidValue, UnknownName
 from crossbody.hw import models
 from crossbody.hw.fitting.derivative import SETTLED, Exact, apart
-from crossbody.hw.models._contract import Segment
+from crossbody.hw.models.contract import Segment
 from crossbody.hw.windows.window import windows
 
 TRUE = {"k1": 5e-4, "s1": 8e-4, "k2": 2e-4, "s2": 3e-4, "slip": 0.05}

@@ -15,7 +15,7 @@ from rig_data import PENDULUM, channels, log_of, needs_pendulum
 
 from crossbody import engines, hw
 from crossbody.cases import InvalidValue, Limit
-from crossbody.hw.models._contract import Segment
+from crossbody.hw.models.contract import Segment
 from crossbody.reports.cli import main
 from crossbody.reports.commands import replay as command
 from crossbody.reports.replay.comparison import verdicts

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from crossbody import engines, hw
 from crossbody.cases import SceneError
-from crossbody.hw.models._contract import Segment
+from crossbody.hw.models.contract import Segment
 from crossbody.hw.windows.window import windows
 
 

@@ -25,7 +25,7 @@ from crossbody.reference import core, linear, systems
 from crossbody.reference._fingerprint import Unreadable, fingerprint
 from crossbody.reference._parts import WholePasses
 from crossbody.reference.cache import Lean
-from crossbody.reference.core._struct import bundle_type
+from crossbody.reference.core.bundles import bundle_type
 from crossbody.reference.kernels import NAMES, helper
 
 MODULES = ("hw.fitting.rk4",)

@@ -30,7 +30,7 @@ from crossbody.cases import (
 )
 from crossbody.cases.scene import Actuator, Body, Joint, Push, Scene
 from crossbody.reference import ensemble, kernels, linear, simulate
-from crossbody.reference.systems import _none
+from crossbody.reference.systems import absent
 from crossbody.reference.tree.system import system
 from crossbody.reports.bench.ladder import Ladder
 from crossbody.reports.bench.measure import Effort, bench
@@ -372,7 +372,7 @@ def test_derivatives_and_ensembles_refuse_what_is_sampled() -> None:
 
 def test_a_scene_without_a_controller_has_none_in_its_kernels() -> None:
     plain = system(ARM, NO_LAW)
-    assert plain.kernels["control"] is _none.control
+    assert plain.kernels["control"] is absent.control
     assert (plain.memory, plain.tick) == (0, 0.0)
 
 

@@ -80,6 +80,13 @@ def test_all_within_is_zero(capsys: pytest.CaptureFixture[str]) -> None:
     assert f"Report: {Path('out/index.html').absolute()}" in said
 
 
+def test_a_case_is_taken_with_its_variant() -> None:
+    assert call("run", "bouncing_ball:linear", "-e", "fake:exact") == 0
+    rows = pd.read_parquet("out/verdicts.parquet")
+    assert set(rows["variant"]) == {"linear"}
+    assert rows["command"][0].startswith("crossbody run bouncing_ball --variant linear")
+
+
 def test_outside_is_one() -> None:
     assert call(*LINEAR, "-e", "fake:nan") == 1
 
@@ -131,6 +138,8 @@ def test_the_folder_holds_the_same_rows_three_times_with_provenance() -> None:
     [
         (("run", "bouncing_bal"), "Did you mean 'bouncing_ball'"),
         (("run", "--variant", "nope"), "listing"),
+        (("run", "bouncing_ball:nope"), "listing"),
+        (("run", "bouncing_ball:linear", "--variant", "listing"), "give one of them"),
         (("run", "-e", "nope"), "fake"),
         (("run", "-e", "fake:nope"), "exact"),
         (("run", "--set", "stiffness=1"), "a0"),

@@ -12,9 +12,9 @@ import pytest
 import yaml
 from places import ROBOTS, ROOT
 from robot_damage import damaged
-from robot_readers import ARM, rows_of, run
+from robot_readers import ARM, HEAD, rows_of, run
 
-from crossbody.cases import CrossbodyError
+from crossbody.cases import CrossbodyError, installed
 from crossbody.reference import code_store
 from crossbody.reports.importers.audit import audited, opened
 from crossbody.reports.importers.causes import advice, explained
@@ -43,9 +43,26 @@ def test_a_table_of_80_columns_and_what_is_wrong_beneath_it(tmp_path: Path, caps
     code, out, err = run(["audit", str(path), "-e", "mujoco", "-e", "pinocchio"], capsys)
     assert code == 0, out + err
     assert max(map(len, out.splitlines())) <= 80
-    assert "mujoco: reads the same robot" in err
+    assert "mujoco reads the robot that the file describes" in err
     lines = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.startswith(("M ", "loops "))}
     assert lines == {"M": ["ok", "ok"], "loops": ["-", "-"]}
+
+
+def test_the_first_sentence_says_who_reads_the_robot_and_one_line_what_is_not_installed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, lacking = tmp_path / "arm.xml", [tmp_path / f"{name}.py" for name in ("one", "two")]
+    path.write_text(ARM.replace("<worldbody>", '<option gravity="0 0 -3"/><worldbody>'))
+    for reader in lacking:
+        reader.write_text(HEAD.replace('"numpy", "numpy"', '"no-package", "no_package"') + "    import no_package\n")
+    monkeypatch.setattr(installed, "_FILES", {})
+    installed.use(lacking)
+    code, out, _ = run(["audit", str(path), *(f"-e{name}" for name in ("one", "pinocchio", "two", "mujoco"))], capsys)
+    text = " ".join(out.split())
+    assert code == 1
+    assert text.startswith("arm.xml: mujoco reads the robot that the file describes; pinocchio (gravity, bias and ")
+    assert text.count("Not installed") == 1
+    assert "Not installed: one, two. pip install no-package" in text
 
 
 def test_rows_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -220,6 +237,18 @@ def test_a_large_number_of_one_joint_hides_no_difference_of_another(
 ) -> None:
     here, there = (TWO.format(kind="slide", of1=own, of2=other.format(x)) for x in (0.2, 0.0035))
     assert rows_of(tmp_path / "two.xml", "mujoco", here, there)[quantity] == WRONG
+
+
+def test_a_mass_far_out_hides_no_force_of_an_actuator(tmp_path: Path) -> None:
+    """Its bias is 1e18 N m, of which a force of 3 N m is no digit."""
+    far = '<inertial pos="0 0 1e9" mass="1" diaginertia=".1 .1 .1"/>'
+    here, there = (
+        TWO.format(kind="slide", of1="", of2="").replace('<geom size=".1" pos="0 0 .5" mass="1"/>', far).replace(
+            "</worldbody>", f'</worldbody><actuator><position joint="j2" kp="10" kv="{kv}" gear="3"/></actuator>')
+        for kv in (1, 1.01)
+    )  # fmt: skip
+    assert rows_of(tmp_path / "two.xml", "mujoco", here, here)["actuators"] == OK
+    assert rows_of(tmp_path / "two.xml", "mujoco", here, there)["actuators"] == WRONG
 
 
 def test_a_ball_joint_has_a_bound_that_is_compared(tmp_path: Path) -> None:

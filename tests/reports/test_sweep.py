@@ -24,7 +24,7 @@ from crossbody.reports.cli import main
 from crossbody.reports.commands.stress import Ask, Pool, plan, sweep
 from crossbody.reports.runs.output import folder
 from crossbody.reports.suites._axis import Log
-from crossbody.reports.suites._contract import Family, Suite
+from crossbody.reports.suites.contract import Family, Suite
 from crossbody.reports.sweep import draw, pools
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.store import Store, identity
@@ -128,7 +128,7 @@ def test_a_contradictory_grid_is_one_sentence(
     path = tmp_path / "mine.py"
     path.write_text(
         "from crossbody.reports.suites._axis import Levels, Log\n"
-        "from crossbody.reports.suites._contract import Family, Suite\n"
+        "from crossbody.reports.suites.contract import Family, Suite\n"
         f"SUITE = Suite(families=(Family(case='bouncing_ball', variant='linear', {axes}),))\n"
     )
     assert call("stress", str(path), "--out", str(tmp_path / "out")) == 2

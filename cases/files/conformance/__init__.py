@@ -3,11 +3,11 @@
 Most are an arm of two links, told in another way; what it is to be stands beside as changes of that arm.
 """
 
-from crossbody.cases.files.conformance import forces, inertias, joints, poses, rows, urdf
+from crossbody.cases.files.conformance import contacts, forces, inertias, joints, poses, rows, urdf
 from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.files.conformance.urdf import TETRAHEDRON
 
 __all__ = ["FEATURES", "TETRAHEDRON", "Feature"]
 
-FEATURES = tuple(one for part in (joints, poses, inertias, forces, rows, urdf) for one in part.features())
+FEATURES = tuple(one for part in (joints, poses, inertias, forces, rows, contacts, urdf) for one in part.features())
 """All of them, in the order of the table."""

@@ -19,6 +19,11 @@ LOWER = Body(
     name="lower", parent="upper", position=(0.0, 0.05, -0.4), mass=1.0, com=(0.01, 0.03, -0.15),
     inertia=(0.02, 0.03, 0.015, 0.0, 0.0, 0.0),
 )  # fmt: skip
+HAND = Body(
+    name="hand", parent="lower", position=(0.0, 0.1, -0.3), mass=0.5, com=(0.02, 0.0, 0.01),
+    inertia=(0.003, 0.004, 0.005, 0.0, 0.0, 0.0),
+)  # fmt: skip
+"""What is put on the lower link by a joint that moves nothing."""
 SHOULDER = Joint(name="shoulder", body="upper", type="hinge", axis=(0.0, 1.0, 0.0))
 ELBOW = Joint(name="elbow", body="lower", type="hinge", axis=(1.0, 0.0, 0.0))
 UPPER_INERTIAL = '<inertial pos=".05 .02 -.2" mass="2" diaginertia=".04 .05 .02"/>'
@@ -31,6 +36,16 @@ def arm(upper: Any = (), lower: Any = (), shoulder: Any = (), elbow: Any = (), *
     bodies = (replace(UPPER, **dict(upper)), replace(LOWER, **dict(lower)))
     joints = (replace(SHOULDER, **dict(shoulder)), replace(ELBOW, **dict(elbow)))
     return Scene(**({"bodies": bodies, "joints": joints} | more))
+
+
+SECOND = f'<body name="other" pos="2 0 1"><joint name="other" axis="0 1 0"/>{LOWER_INERTIAL}</body>'
+
+
+def two_trees(**more: Any) -> Scene:
+    """Return the arm, and a lower link like its own that stands beside it (`SECOND`)."""
+    other = replace(LOWER, name="other", parent="", position=(2.0, 0.0, 1.0))
+    joint = Joint(name="other", body="other", type="hinge", axis=(0.0, 1.0, 0.0))
+    return arm(bodies=(UPPER, LOWER, other), joints=(SHOULDER, ELBOW, joint), **more)
 
 
 def mjcf(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.files.conformance.arm import arm, mjcf
-from crossbody.cases.files.conformance.feature import Feature, written
+from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.files.conformance.joints import AXIS_RULE
 from crossbody.cases.scene import Actuator
 
@@ -17,50 +17,49 @@ def features() -> list[Feature]:
     """Return the features of gravity and what acts at joints."""
 
     def elbow(
-        name: str,
-        attributes: str,
-        finds: str,
-        change: dict[str, Any],
-        about: str,
-        rule: str = "",
-        rewrite: str = "",
-        head: str = "",
-        tail: str = "",
-    ) -> Feature:
-        text = mjcf(head=head, elbow=f'<joint name="elbow" axis="1 0 0" {attributes}/>', tail=tail)
-        return written(name, text, arm(elbow=change), finds, rule, rewrite, (about,))
+        name: str, attributes: str, finds: str, change: dict[str, Any], about: str, *words: Any, **more: str
+    ) -> Feature:  # fmt: skip
+        text = mjcf(elbow=f'<joint name="elbow" axis="1 0 0" {attributes}/>', **more)
+        return replace(Feature(name, text, arm(elbow=change), finds, *words), about=(about,))
 
     motor = '<actuator><motor name="m" joint="elbow"/></actuator>'
     geared, turn = Actuator(name="m", joint="elbow", gear=(3.0,)), np.pi / 180
     return [
-        written("gravity", mjcf(head='<option gravity="1 -2 -3"/>'), arm(gravity=(1.0, -2.0, -3.0)),
+        Feature("gravity", mjcf(head='<option gravity="1 -2 -3"/>'), arm(gravity=(1.0, -2.0, -3.0)),
             "option[@gravity]", "Gravity is a vector of the option.", "Set gravity in the engine."),
-        written("gravity switched off", mjcf(head='<option><flag gravity="disable"/></option>'), arm(gravity=(0.0,
+        Feature("gravity switched off", mjcf(head='<option><flag gravity="disable"/></option>'), arm(gravity=(0.0,
             0.0, 0.0)), "option/flag[@gravity]", "The flag gravity switches it off.", "Set gravity in the engine."),
-        written("weight that is taken off", mjcf(lower='pos="0 .05 -.4" gravcomp=".5"'),
+        Feature("weight that is taken off", mjcf(lower='pos="0 .05 -.4" gravcomp=".5"'),
             arm(lower={"weightless": 0.5}), ".//body[@gravcomp]", "gravcomp is a force against the weight.",
             "Apply that force in the engine.", ("gravity",)),
+        *(Feature(f"weight that actuators take off{name}", mjcf(lower='pos="0 .05 -.4" gravcomp=".5"',
+            elbow='<joint name="elbow" axis="1 0 0" actuatorgravcomp="true"/>', tail=tail),
+            arm(lower={"weightless": 0.5}, actuators=motors), ".//joint[@actuatorgravcomp]",
+            "With actuatorgravcomp the force against the weight is one of the actuators', and is there without any.",
+            "Write gravcomp without actuatorgravcomp.", ("gravity",))
+            for name, tail, motors in (("", motor, (Actuator(name="m", joint="elbow", gear=(1.0,)),)),
+                                       (", of which there are none", "", ()))),
         elbow("armature", 'armature=".1"', ".//joint[@armature]", {"armature": 0.1}, "armature",
             "Armature belongs to the joint, driven or not.", "Drive the joint by a motor, or set it in the engine."),
-        written("armature of a driven joint",
+        Feature("armature of a driven joint",
             mjcf(elbow='<joint name="elbow" axis="1 0 0" armature=".1"/>', tail=motor),
             arm(elbow={"armature": 0.1}, actuators=(Actuator(name="m", joint="elbow", gear=(1.0,)),)),
             ".//joint[@armature]", "Armature belongs to the joint.", about=("armature",)),
-        *(written(f"{name} of an actuator",
+        *(Feature(f"{name} of an actuator",
             mjcf(tail=f'<actuator><motor name="m" joint="elbow" gear="3" {name}=".1"/></actuator>'),
             arm(actuators=(heavy,)), f".//motor[@{name}]",
             f"The {name} of an actuator counts at its joint, times the square of the gear.",
             "Write it at the joint, times the square of the gear.", (name,))
             for name, heavy in (("armature", replace(geared, armature=0.1)),
                                 ("damping", replace(geared, damping=0.1)))),
-        written("armature of a class", mjcf(head='<default><joint armature=".1"/></default>'),
+        Feature("armature of a class", mjcf(head='<default><joint armature=".1"/></default>'),
             arm(shoulder={"armature": 0.1}, elbow={"armature": 0.1}), ".//default/joint[@armature]", AXIS_RULE,
             "Write it at the joint itself.", ("armature",)),
         elbow("damping", 'damping=".7"', ".//joint[@damping]", {"damping": (0.7, 0.0, 0.0)}, "damping"),
-        written("damping of a ball joint", mjcf(elbow='<joint name="elbow" type="ball" damping=".7"/>'),
+        Feature("damping of a ball joint", mjcf(elbow='<joint name="elbow" type="ball" damping=".7"/>'),
             arm(elbow={"type": "ball", "damping": (0.7, 0.0, 0.0)}), ".//joint[@type='ball'][@damping]",
             about=("damping",)),
-        written("damping of a class", mjcf(head='<default><joint damping=".7"/></default>'),
+        Feature("damping of a class", mjcf(head='<default><joint damping=".7"/></default>'),
             arm(shoulder={"damping": (0.7, 0.0, 0.0)}, elbow={"damping": (0.7, 0.0, 0.0)}),
             ".//default/joint[@damping]", AXIS_RULE, "Write it at the joint itself.", ("damping",)),
         elbow("spring", 'stiffness="5"', ".//joint[@stiffness]", {"stiffness": (5.0, 0.0, 0.0)}, "springs",
@@ -72,6 +71,9 @@ def features() -> list[Feature]:
         elbow("rest of a spring", 'stiffness="5" springref="20"', ".//joint[@springref]", {"stiffness": (5.0, 0.0,
             0.0), "rest": (20 * turn,)}, "springs", "springref is in the compiler's unit.",
             "Apply the spring in the engine."),
+        elbow("bound of the forces of actuators", 'actuatorfrcrange="-3 4"', ".//joint[@actuatorfrcrange]",
+            {"force_range": (-3.0, 4.0)}, "effort", "actuatorfrcrange bounds the sum of the actuators on a joint.",
+            "Bound it in the engine."),
         elbow("dry friction", 'frictionloss=".3"', ".//joint[@frictionloss]", {"friction_loss": 0.3}, "friction"),
         elbow("bounds in degrees", 'range="-30 60" limited="true"', ".//joint[@range]", {"range": (-30 * turn,
             60 * turn)}, "limits", "Angles are in degrees unless the compiler says radian.",
@@ -82,18 +84,18 @@ def features() -> list[Feature]:
             "limits", "A joint with a range is bounded (autolimits).", 'Write limited="true".'),
         elbow("range that is not in force", 'range="-30 60" limited="false"', ".//joint[@limited='false']", {},
             "limits", 'limited="false" leaves the range without effect.', "Leave the range out."),
-        written("bounds of a slide",
+        Feature("bounds of a slide",
             mjcf(elbow='<joint name="elbow" type="slide" axis="1 0 0" range="-.2 .3" limited="true"/>'),
             arm(elbow={"type": "slide", "range": (-0.2, 0.3)}), ".//joint[@type='slide'][@range]", about=("limits",)),
         elbow("bounds beside a reference", 'range="-30 60" ref="20"', ".//joint[@ref][@range]",
             {"range": (-30 * turn, 60 * turn), "reference": 20 * turn}, "limits",
             "A range is that of the coordinate, which is ref at the pose of the file.", "Leave ref out."),
-        written("bounds of the class around a class",
+        Feature("bounds of the class around a class",
             mjcf(head='<default><default class="a"><joint range="-30 60"/><default class="b"><geom type="box"/>'
             "</default></default></default>", elbow='<joint name="elbow" class="b" axis="1 0 0"/>'),
             arm(elbow={"range": (-30 * turn, 60 * turn)}), ".//default/default/default!joint=", AXIS_RULE,
             "Write it at the joint itself.", ("limits",)),
-        written("bounds of a class", mjcf(head='<default><joint range="-30 60"/></default>'),
+        Feature("bounds of a class", mjcf(head='<default><joint range="-30 60"/></default>'),
             arm(shoulder={"range": (-30 * turn, 60 * turn)}, elbow={"range": (-30 * turn, 60 * turn)}),
             ".//default/joint[@range]", AXIS_RULE, "Write it at the joint itself.", ("limits",)),
     ]  # fmt: skip

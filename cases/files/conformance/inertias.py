@@ -15,7 +15,7 @@ from crossbody.cases.files.conformance.arm import (
     rotation,
     weighing,
 )
-from crossbody.cases.files.conformance.feature import MOTION, Feature, written
+from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.files.inertias import placed, solid
 
 SHAPE_RULE = "A body without <inertial> has the inertia of its geoms: volume times density (1000), or their mass."
@@ -30,15 +30,13 @@ def _shapes() -> list[Feature]:
         "box": (0.05, 0.1, 0.15),
         "ellipsoid": (0.05, 0.1, 0.15),
     }
-    found = []
-    for kind, size in sizes.items():
-        geom = f'<geom type="{kind}" size="{" ".join(map(str, size))}" pos="0 .02 -.15"/>'
-        found.append(Feature(
-            name=f"inertia of a {kind}", text=mjcf(lower_inertial=geom),
-            scene=arm(lower=weighing(of_shape(kind, size, position=(0.0, 0.02, -0.15)))), about=MOTION,
-            finds=(f".//geom[@type='{kind}']",), rule=SHAPE_RULE, rewrite=SHAPE_WAY,
-        ))  # fmt: skip
-    return found
+    return [
+        Feature(f"inertia of a {kind}",
+            mjcf(lower_inertial=f'<geom type="{kind}" size="{" ".join(map(str, size))}" pos="0 .02 -.15"/>'),
+            arm(lower=weighing(of_shape(kind, size, position=(0.0, 0.02, -0.15)))), f".//geom[@type='{kind}']",
+            SHAPE_RULE, SHAPE_WAY)
+        for kind, size in sizes.items()
+    ]  # fmt: skip
 
 
 def features() -> list[Feature]:
@@ -54,7 +52,7 @@ def features() -> list[Feature]:
         rewrite: str = SHAPE_WAY,
         **more: Any,
     ) -> Feature:
-        return written(name, mjcf(head=head, lower_inertial=inertial, **more), arm(lower=lower), finds, rule, rewrite)
+        return Feature(name, mjcf(head=head, lower_inertial=inertial, **more), arm(lower=lower), finds, rule, rewrite)
 
     tilted = placed(1.0, np.diag([0.02, 0.03, 0.015]), (0.01, 0.03, -0.15), rotation("x", 40))
     ball, box = (
@@ -101,7 +99,7 @@ def features() -> list[Feature]:
         of("geoms of some groups",
             '<geom type="sphere" size=".1" pos="0 0 -.1" group="1"/><geom type="box" size=".05 .1 .15" group="3"/>',
             weighing(ball), "compiler[@inertiagrouprange]", head='<compiler inertiagrouprange="0 2"/>'),
-        written("inertia from geoms although it is given", mjcf(head='<compiler inertiafromgeom="true"/>',
+        Feature("inertia from geoms although it is given", mjcf(head='<compiler inertiafromgeom="true"/>',
             upper_inertial=UPPER_INERTIAL + '<geom type="box" size=".05 .1 .15" pos="0 .2 0"/>',
             lower_inertial=LOWER_INERTIAL + '<geom type="sphere" size=".1" pos="0 0 -.1"/>'), arm(upper=weighing(box),
             lower=weighing(ball)), "compiler[@inertiafromgeom='true']",
@@ -120,7 +118,7 @@ def features() -> list[Feature]:
         of("balanced inertia", '<inertial pos=".01 .03 -.15" mass="1" diaginertia=".01 .02 .06"/>', {"inertia": (0.03,
             0.03, 0.03, 0.0, 0.0, 0.0)}, "compiler[@balanceinertia]", head='<compiler balanceinertia="true"/>',
             rule="Moments of no rigid body are replaced by their mean.", rewrite="Write moments of a rigid body."),
-        written("total mass", mjcf(head='<compiler settotalmass="6"/>'), arm(upper={"mass": 4.0, "inertia": (0.08,
+        Feature("total mass", mjcf(head='<compiler settotalmass="6"/>'), arm(upper={"mass": 4.0, "inertia": (0.08,
             0.1, 0.04, 0.0, 0.0, 0.0)}, lower=weights), "compiler[@settotalmass]",
             "All masses and inertias are scaled to a sum.", "Write the scaled numbers."),
     ]  # fmt: skip

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import LOWER, LOWER_INERTIAL, UPPER, arm, mjcf, turned
-from crossbody.cases.files.conformance.feature import Feature, written
+from crossbody.cases.files.conformance.arm import HAND, LOWER, LOWER_INERTIAL, UPPER, arm, mjcf, turned
+from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.scene import Body
 
 POSE_RULE = (
@@ -21,7 +21,7 @@ def features() -> list[Feature]:
     """Return the features of where bodies stand."""
 
     def of(name: str, lower: str, turns: dict[str, Any], finds: str, head: str = "") -> Feature:
-        return written(
+        return Feature(
             name, mjcf(head=head, lower=f'pos="0 .05 -.4" {lower}'), arm(lower=turns), finds, POSE_RULE, POSE_WAY
         )
 
@@ -29,15 +29,7 @@ def features() -> list[Feature]:
     root = Body(name="root", position=(0.3, 0.0, 0.1), **turned(("x", 40), ("z", 30)))
     w, x, y, z = root.orientation
     fixed = f'<body name="root" pos=".3 0 .1" quat="{w!r} {x!r} {y!r} {z!r}">'
-    hand = Body(
-        name="hand",
-        parent="lower",
-        position=(0.0, 0.1, -0.3),
-        mass=0.5,
-        com=(0.02, 0.0, 0.01),
-        inertia=(0.003, 0.004, 0.005, 0.0, 0.0, 0.0),
-        **turned(("y", 50)),
-    )
+    hand = replace(HAND, **turned(("y", 50)))
     hw, hx, hy, hz = hand.orientation
     return [
         of("quaternion", f'quat="{c!r} 0 {s!r} 0"', {"orientation": (c, 0.0, s, 0.0)}, ".//body[@quat]"),
@@ -55,20 +47,20 @@ def features() -> list[Feature]:
         of("two axes", 'xyaxes="0 1 0 -1 0 0"', turned(("z", 90)), ".//body[@xyaxes]"),
         of("two axes that are not perpendicular", 'xyaxes="0 2 0 -1 1 0"', turned(("z", 90)), ".//body[@xyaxes]"),
         of("direction of z", 'zaxis="1 0 0"', turned(("y", 90)), ".//body[@zaxis]"),
-        written("fixed body with a pose under the world", mjcf(before=fixed, behind="</body>"),
+        Feature("fixed body with a pose under the world", mjcf(before=fixed, behind="</body>"),
             arm().replace(bodies=(root, replace(UPPER, parent="root"), LOWER)),
             "worldbody/body[@pos]!joint,freejoint | worldbody/body[@quat]!joint,freejoint",
             "A body without joints stands in its parent at its pose.", "Put its pose into that of the bodies on it."),
-        written("fixed body in the tree",
+        Feature("fixed body in the tree",
             mjcf(lower_inertial=LOWER_INERTIAL + f'<body name="hand" pos="0 .1 -.3" quat="{hw!r} {hx!r} {hy!r} '
             f'{hz!r}"><inertial pos=".02 0 .01" mass=".5" diaginertia=".003 .004 .005"/></body>'),
             arm().replace(bodies=(UPPER, LOWER, hand)), ".//body/body!joint,freejoint",
             rule="A body without joints is part of its parent."),
-        written("frame", mjcf(inside='<frame pos="0 0 -.1" euler="0 0 90">',
+        Feature("frame", mjcf(inside='<frame pos="0 0 -.1" euler="0 0 90">',
             behind="").replace("</body>\n    </body>", "</body></frame>\n    </body>"), arm(lower={"position": (-0.05,
             0.0, -0.5)} | turned(("z", 90))), ".//frame", "A <frame> moves what stands in it.",
             "Put its pose into that of what stands in it."),
-        written("included file", mjcf(inside="", lower_inertial='<include file="part.xml"/>'), arm(), ".//include",
+        Feature("included file", mjcf(inside="", lower_inertial='<include file="part.xml"/>'), arm(), ".//include",
             "A file stands where it is included.", "Write one file.",
             files={"part.xml": f"<mujocoinclude>{LOWER_INERTIAL}</mujocoinclude>"}),
     ]  # fmt: skip

@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, arm, mjcf
-from crossbody.cases.files.conformance.feature import Feature, written
+from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, SECOND, arm, mjcf, two_trees
+from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.scene import Actuator, Loop, Tendon
+
+WEIGHT = "The armature a of a tendon adds a J'J to M, J the rates of its length."
+WEIGHT_WAY = "Add it to M in the engine, or leave it out."
 
 
 def features() -> list[Feature]:
     """Return the features of equalities and actuators."""
 
     def row(name: str, equality: str, loop: Loop, finds: str, before: str = "", inside: str = "") -> Feature:
-        return written(
+        return Feature(
             name,
             mjcf(tail=f"<equality>{equality}</equality>", lower_inertial=LOWER_INERTIAL + before, inside=inside),
             arm(loops=(loop,)),
@@ -25,7 +28,7 @@ def features() -> list[Feature]:
         )
 
     def driven(name: str, actuator: str, finds: str, **more: Any) -> Feature:
-        return written(
+        return Feature(
             name,
             mjcf(tail=f"<actuator>{actuator}</actuator>"),
             arm(actuators=(Actuator(name="m", joint="elbow", gear=(1.0,), **more),)),
@@ -59,7 +62,7 @@ def features() -> list[Feature]:
             bias=(0.0, 0.0, -2.0)),
         driven("general actuator", '<general name="m" joint="elbow" gainprm="10"/>', ".//general",
             gain=(10.0, 0.0, 0.0)),
-        *(written(f"{what} of a tendon", mjcf(tail=both.replace('"t"', f'"t" {attributes}')),
+        *(Feature(f"{what} of a tendon", mjcf(tail=both.replace('"t"', f'"t" {attributes}')),
             arm(tendons=(replace(tendon, **change),)), f".//fixed[@{finds}]", about=("tendons",),
             rule="A fixed tendon is a sum of joints.", rewrite="Apply its force at the joints in the engine.")
             for what, attributes, finds, change in (
@@ -69,7 +72,14 @@ def features() -> list[Feature]:
                  "rest": (-0.1, 0.2)}),
                 ("damping", 'damping=".7"', "damping", {"damping": (0.7, 0.0, 0.0)}),
                 ("bound", 'range="-.5 1" limited="true"', "range", {"range": (-0.5, 1.0)}))),
-        written("actuator on a tendon", mjcf(tail=both + '<actuator><motor name="m" tendon="t"/></actuator>'),
+        Feature("armature of a tendon", mjcf(tail=both.replace('"t"', '"t" armature=".1"')), arm(tendons=(tendon,)),
+            ".//fixed[@armature]", WEIGHT, WEIGHT_WAY, ("M",), heavier=((0.1, 0.2), (0.2, 0.4))),
+        Feature("armature of a tendon across branches",
+            mjcf(behind=SECOND, tail=both.replace('"elbow"', '"other"').replace('"t"', '"t" armature=".1"')),
+            two_trees(tendons=(replace(tendon, joints=("shoulder", "other")),)),
+            ".//fixed[@armature]", WEIGHT, WEIGHT_WAY, ("M",),
+            heavier=((0.1, 0.0, 0.2), (0.0, 0.0, 0.0), (0.2, 0.0, 0.4))),
+        Feature("actuator on a tendon", mjcf(tail=both + '<actuator><motor name="m" tendon="t"/></actuator>'),
             arm(tendons=(tendon,), actuators=(Actuator(name="m", tendon="t", gear=(1.0,)),)),
             ".//motor[@tendon] | .//general[@tendon]", about=("actuators",), rule="A fixed tendon is a sum of joints.",
             rewrite="Drive the joints in the engine."),

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import arm, quaternion, rotation, weighing
-from crossbody.cases.files.conformance.feature import MOTION, Feature, written
+from crossbody.cases.files.conformance.arm import HAND, arm, quaternion, rotation, weighing
+from crossbody.cases.files.conformance.feature import MOTION, Feature
 from crossbody.cases.files.inertias import placed
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Loop, Scene
@@ -72,16 +72,8 @@ MESHED = (
 def features() -> list[Feature]:
     """Return the features of URDF."""
 
-    def of(
-        name: str,
-        text: str,
-        scene: Scene,
-        finds: str = "",
-        rule: str = "",
-        rewrite: str = "",
-        about: tuple[str, ...] = MOTION,
-    ) -> Feature:
-        return written(f"URDF: {name}", text, scene, finds, rule, rewrite, about, format="urdf")
+    def of(name: str, *words: Any, **more: Any) -> Feature:
+        return replace(Feature(f"URDF: {name}", *words, **more), format="urdf")
 
     def elbow(more: str, kind: str = "revolute") -> str:
         return urdf_joint("elbow", "upper", "lower", more, kind)
@@ -93,15 +85,8 @@ def features() -> list[Feature]:
         )
     )
     tilted = placed(1.0, np.diag([0.02, 0.03, 0.015]), (0.01, 0.03, -0.15), fixed_rpy)
-    hand = Body(
-        name="hand",
-        parent="lower",
-        position=(0.0, 0.1, -0.3),
-        mass=0.5,
-        com=(0.02, 0.0, 0.01),
-        inertia=(0.003, 0.004, 0.005, 0.0, 0.0, 0.0),
-        orientation=quaternion(fixed_rpy),
-    )
+    hand = replace(HAND, orientation=quaternion(fixed_rpy))
+    stand = Body(name="stand", position=(0.3, 0.0, 0.5), orientation=quaternion(fixed_rpy))
     hung = link("hand", ".02 0 .01", 0.5, moments(0.003, 0.004, 0.005)) + urdf_joint(
         "grip", "lower", "hand", '<origin xyz="0 .1 -.3" rpy=".3 .4 .5"/>', "fixed"
     )
@@ -128,6 +113,12 @@ def features() -> list[Feature]:
         of("floating joint", urdf(shoulder=urdf_joint("shoulder", "base", "upper", UPPER_AT, "floating")),
             urdf_arm(shoulder={"type": "free", **free}, base=False), "joint[@type='floating']",
             "A floating joint has six degrees of freedom, and stands at its origin where they are 0."),
+        of("floating joint below a fixed one", urdf(base='<link name="base"/><link name="stand"/>' + urdf_joint("post",
+            "base", "stand", '<origin xyz=".3 0 .5" rpy=".3 .4 .5"/>', "fixed"), shoulder=urdf_joint("shoulder",
+            "stand", "upper", '<origin xyz=".1 .2 1" rpy=".3 0 0"/>', "floating")),
+            urdf_arm(shoulder={"type": "free", **free}, base=False).replace(bodies=(stand, *arm().bodies)),
+            "joint[@type='fixed']", "What floats on a link that is fixed to the root is free in the world.",
+            "Let it float on the root."),
         of("axis not given", urdf(elbow=elbow(LOWER_AT)), plain, "joint!axis=xyz=1 0 0",
             rule="A joint without axis has 1 0 0.", rewrite="Write the axis."),
         of("axis not of length 1", urdf(elbow=elbow(LOWER_AT + '<axis xyz="3 0 4"/>')), urdf_arm(elbow={"axis": (0.6,
@@ -142,6 +133,10 @@ def features() -> list[Feature]:
             urdf_arm(elbow={"friction_loss": 0.3}), ".//dynamics[@friction]", about=("friction",)),
         of("bounds", urdf(elbow=elbow(LOWER_AT + x + '<limit lower="-.5" upper="1" effort="10" velocity="1"/>')),
             urdf_arm(elbow={"range": (-0.5, 1.0)}), ".//limit[@lower]", about=("limits",)),
+        of("bound of a force",
+            urdf(elbow=elbow(LOWER_AT + x + '<limit lower="-3" upper="3" effort="7" velocity="1"/>')),
+            urdf_arm(elbow={"force_range": (-7.0, 7.0)}, shoulder={"force_range": (-100.0, 100.0)}),
+            ".//limit[@effort]", "effort is the largest force of a joint.", "Bound it in the engine.", ("effort",)),
         of("safety limits",
             urdf(elbow=elbow(LOWER_AT + x + '<safety_controller soft_lower_limit="-.1" soft_upper_limit=".1" '
             'k_velocity="1"/>')),
@@ -160,10 +155,10 @@ def features() -> list[Feature]:
         of("root that is called world", urdf(base='<link name="world"/>', shoulder=urdf_joint("shoulder", "world",
             "upper", UPPER_AT + '<axis xyz="0 1 0"/>')), urdf_arm(base=False), "link[@name='world']",
             "A link called world is the world."),
-        written("URDF: mesh of a package", urdf(more=MESHED), plain.replace(bodies=(*plain.bodies, tip)),
+        of("mesh of a package", urdf(more=MESHED), plain.replace(bodies=(*plain.bodies, tip)),
             "link/visual/geometry/mesh/../.. | link/collision/geometry/mesh/../..",
             "package://NAME/FILE is a file of the package NAME, which a reader has to be told of.",
-            "Write where it is from the file, as --fix does.", ("reading",), format="urdf",
+            "Write where it is from the file, as --fix does.", ("reading",),
             files={"conformance/part.obj": TETRAHEDRON}),
         of("transmission",
             urdf(more='<transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint '

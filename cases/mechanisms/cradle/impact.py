@@ -41,14 +41,17 @@ def sequential(masses: Floats, v: Floats, touching: Touching, e: float, slow: fl
         slow: rate below which a gap stands still, m/s.
     """
     tie = TIE * float(np.max(np.abs(v), initial=0.0))
+    rates, last = np.where(touching, np.diff(v), np.inf), len(touching) - 1
     while True:
-        rates = np.where(touching, np.diff(v), np.inf)
         worst = float(rates.min())
         if worst >= -slow:
             return
         row = int(np.argmax(rates <= worst + tie))
         a, b = masses[row : row + 2]
         yield _push(masses, v, {row: float((1.0 + e) * a * b / (a + b) * (v[row] - v[row + 1]))})
+        for i in range(max(row - 1, 0), min(row + 1, last) + 1):  # no other has changed
+            if touching[i]:
+                rates[i] = v[i + 1] - v[i]
 
 
 def _push(masses: Floats, v: Floats, impulses: Impulses) -> Impulses:

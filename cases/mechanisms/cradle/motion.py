@@ -82,16 +82,17 @@ class Motion:
 
         A collision is told of a row that closed; one that stood still and passes an impulse on has none of its own.
         """
-        before, rates = len(course.events), np.diff(v)
-        course.fastest = max(course.fastest, float(np.abs(rates).max()))
+        before, rates, last = len(course.events), np.diff(v).tolist(), len(touching) - 1
+        course.fastest = max(course.fastest, *map(abs, rates))
         for impulses in self.impact(self.row.masses, v, touching, self.row.e, STILL * course.fastest):
-            after = np.diff(v)
-            for row, impulse in impulses.items():
-                work[row] += 0.5 * impulse * (rates[row] + after[row])
             closed = {i: p for i, p in impulses.items() if p > 0.0 and rates[i] < -STILL * course.fastest}
             course.events += _collisions(t, closed)
-            course.fastest = max(course.fastest, float(np.abs(after).max()))
-            rates = after
+            for row, impulse in impulses.items():
+                work[row] += 0.5 * impulse * (rates[row] + float(v[row + 1] - v[row]))
+            changed = {near for row in impulses for near in (row - 1, row, row + 1) if 0 <= near <= last}
+            for row in changed:
+                rates[row] = float(v[row + 1] - v[row])
+                course.fastest = max(course.fastest, abs(rates[row]))
             if len(course.events) >= 2 * MAX_IMPACTS:
                 break
         return len(course.events) > before

@@ -22,7 +22,7 @@ from crossbody.reference import kernels
 from crossbody.reference._program import ADDRESSES, address, at_address, bound
 from crossbody.reference._system import System
 from crossbody.reference.cache import compiled
-from crossbody.reference.core._struct import TABLE, bundle_type, opener, table
+from crossbody.reference.core.bundles import TABLE, bundle_type, opener, table
 from crossbody.reference.kinds import Array, Floats, Floats2, Index
 
 # What is asked of `evaluate`.

@@ -16,7 +16,7 @@ from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.linear._analytic import check_analytic
 from crossbody.reference.linear._derivatives import Derivatives, Point, check_held, derivatives, turning
 from crossbody.reference.linear._driven import driven
-from crossbody.reference.linear._model import LinearModel
+from crossbody.reference.linear.model import LinearModel
 
 OUTPUTS = ("q", "v", "gap", "lam")
 
