@@ -78,13 +78,14 @@ class LevelMachine:
     Args:
         rows: of the mechanism.
         rtol: to which positions are known; rows that close touch together where it cannot tell which comes first.
-        fast: rate that counts as seen from the start, of bodies that move along their rows and not against them.
+        fast: rate that counts as seen from the start, of bodies that move along their rows and not against them: what
+            is let go there, as far as positions are known, does not touch before it closes.
     """
 
     def __init__(self, rows: Rows, rtol: float = 0.0, fast: float = 0.0) -> None:
         self.rows, self.rtol = rows, rtol
         self.own = switched(rows)
-        self.slow = SLOW * fast
+        self.slow, self.along = SLOW * fast, fast > 0.0
         self._closed: set[int] = set()
         self._unmoved: set[int] = set()
         self._order: dict[Modes, tuple[NDArray[np.intp], list[int]]] = {}
@@ -128,7 +129,7 @@ class LevelMachine:
         h[[i for i, which in fired if which == GAP]] = 0.0
         modes, more, cycle = self._iterate(q, v, h, hd, modes)
         near = self._closed | {i for i, before, after, _ in (*passed, *more) if before != FREE == after}
-        known = self._known(q)  # whether what is let go is just above its surface or just below is rounding
+        known = self._known(q) if self.along else 0.0  # just above its surface or just below is rounding
         self._closed = {i for i in self.own if h[i] <= 0.0 or (i in near and h[i] <= known)}
         return Settled(modes, v, (*passed, *more), cycle=cycle)
 
