@@ -196,8 +196,8 @@ class _Walk:
 
     def numba_type(self, kind: types.Type) -> None:
         """Add a type of numba by its name; one that a module of ours or of a user defines with that module's code."""
-        self.put("type", str(kind))
         home = type(kind).__module__
+        self.put("type", home, str(kind))
         if home.partition(".")[0] in LIBRARIES:
             return
         for name, value in sorted(vars(kind).items()):

@@ -168,7 +168,9 @@ class _Overloads:
     def key(self, content: str, sig: Any) -> str:
         """Return the name of a file: readable, then a digest of all that the code depends on."""
         function, options = self._dispatcher.py_func, sorted(self._dispatcher.targetoptions.items())
-        what = (str(function.__module__), function.__qualname__, content, str(sig), repr(options), *machine())
+        args, _ = sigutils.normalize_signature(sig)
+        homes = " ".join(type(kind).__module__ for kind in args)  # by which what is kept finds its types again
+        what = (str(function.__module__), function.__qualname__, content, str(sig), homes, repr(options), *machine())
         digest = hashlib.sha256("\0".join(what).encode("utf-8", "surrogatepass")).hexdigest()[:32]
         return f"{re.sub(r'[^A-Za-z0-9_.-]', '', function.__name__)[:40]}-{digest}"
 

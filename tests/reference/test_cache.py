@@ -18,6 +18,7 @@ import numba.core.config as numba_config
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from numba.core import types
 
 from crossbody.reference import code_store, kernels
 from crossbody.reference.code_store import CODE, LOCK, Store
@@ -134,6 +135,15 @@ def test_code_of_two_versions_from_two_processes_is_told_apart(tmp_path):
     assert _run(tmp_path, 1) == ([(1.0, 0.0)], "")
     assert _run(tmp_path, 2) == ([(2.0, 0.0)], "")
     assert _run(tmp_path, 1, 2, 3, 1) == ([(1.0, 1.0), (2.0, 1.0), (3.0, 0.0), (1.0, 1.0)], "")
+
+
+def test_a_type_that_has_moved_to_another_module_is_another_key():
+    """What is kept names the modules of its types: two versions that share a folder would drop each other's files."""
+    kept = kernels.helper(lambda x: x)._cache
+    kinds = [type("Kind", (types.Type,), {"__module__": home})("kind") for home in ("here", "there")]
+    one, other = (kept.key("content", (kind,)) for kind in kinds)
+    assert str(kinds[0]) == str(kinds[1])
+    assert one != other
 
 
 def test_a_constant_and_a_helper_of_another_file_are_never_stale(tmp_path):
