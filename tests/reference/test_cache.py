@@ -21,6 +21,7 @@ from click.testing import CliRunner
 from numba.core import types
 
 from crossbody.reference import code_store, kernels
+from crossbody.reference.cache import Compiled
 from crossbody.reference.code_store import CODE, LOCK, Store
 from crossbody.reports.cli import cli
 
@@ -139,7 +140,7 @@ def test_code_of_two_versions_from_two_processes_is_told_apart(tmp_path):
 
 def test_a_type_that_has_moved_to_another_module_is_another_key():
     """What is kept names the modules of its types: two versions that share a folder would drop each other's files."""
-    kept = kernels.helper(lambda x: x)._cache
+    kept = Compiled(lambda x: x)._cache
     kinds = [type("Kind", (types.Type,), {"__module__": home})("kind") for home in ("here", "there")]
     one, other = (kept.key("content", (kind,)) for kind in kinds)
     assert str(kinds[0]) == str(kinds[1])
