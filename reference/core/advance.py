@@ -38,6 +38,7 @@ from crossbody.reference.core.layout import (
     LOST,
     MODE_CYCLE,
     MORE,
+    NO_CONSISTENT_MODES,
     NODES,
     NOT_FINITE,
     PAINLEVE,
@@ -59,7 +60,7 @@ from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
-JAMMING = 1e-5  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
+JAMMING = 1e-3  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
 
 
 class Kernels(NamedTuple):
@@ -201,6 +202,8 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             if settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
                 return LOST
     code = _restart(K, s, m, w, b)
+    if jam and code == NO_CONSISTENT_MODES:
+        return PAINLEVE
     if jam and code == 0 and not s.indeterminate:  # other modes go on from there, and no law says which
         s.indeterminate, s.determined_until = 1, s.t
     if code == 0 and s.audited:

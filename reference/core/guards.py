@@ -254,6 +254,8 @@ def root(
             x3, f3, x2, f2 = x2, f2, x1, f1
         x1, f1 = x, f
         part = _next_part(x1, f1, x2, f2, x3, f3)
+    if kind == JAM:  # behind it a multiplier that grows without bound has the other sign
+        return x1 if f1 > 0.0 else x2
     return x2 if f1 > 0.0 else x1
 
 

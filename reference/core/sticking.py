@@ -237,7 +237,7 @@ def _weakest(s: Any, m: Model, w: Work) -> float:
     it could; else the weakest slides, with those that are as weak.
     """
     found = np.inf
-    for j in range(s.na if s.dependent_rows > 0 else 0):
+    for j in range(s.na if s.dependent_rows > 0 and s.leeway == 0.0 else 0):
         i = w.idx[j]
         if has_friction(m, i) and w.state[i] == STICK and not is_dry(m, i):
             endured = ENDURED * m.alpha[m.tangent[i], 1] * most_drift(s)
@@ -583,8 +583,8 @@ def decide(s: Any, m: Model, w: Work) -> int:
     s.leeway = 0.0
     _look(s, m, w)
     if not _found(s, m, w):
-        s.leeway = _most_pull(s, m, w)
-        if not (s.leeway > 0.0 and _found(s, m, w)):
+        s.leeway = max(_most_pull(s, m, w), decided_to(s))
+        if not _found(s, m, w):
             return _mark(s, m, w)
     _count_others(s, m, w)
     for j in range(s.na):
