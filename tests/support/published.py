@@ -111,7 +111,7 @@ def rows_as_in_pinocchio(model: Any, scene: Scene) -> None:
     to, carried, forces = Coordinates(scene), tree(scene), Forces(scene)
     forces.spans = spans(scene, *carried, to)
     theirs, table, rng = Gaps(scene, forces, carried, to), tabulate(scene), np.random.default_rng(7)
-    count, seen, step, u = len(rows_of(scene)[0]), 0, 1e-30, np.zeros(len(scene.inputs))
+    count, seen, rated, step, u = len(rows_of(scene)[0]), 0, 0, 1e-30, np.zeros(len(scene.inputs))
     meets = _meets(scene, count)
     h, qd = np.zeros((2, count), dtype=complex), np.zeros(scene.nq)
     for _ in range(STATES if count else 0):
@@ -129,8 +129,11 @@ def rows_as_in_pinocchio(model: Any, scene: Scene) -> None:
         mechanism.velocity(0.0, q, v, table.p, qd)
         mechanism.gaps(0.0, q + 1j * step * qd, v.astype(complex), table.p.astype(complex), *h)
         size = np.maximum(1.0, np.abs(H).max(axis=1)) * np.abs(v).max() ** 2
-        assert (np.abs(h[1].imag / step - Hdv)[sure] <= SAME * np.maximum(size, np.abs(Hdv))[sure]).all()
-    assert not count or seen / count >= SEEN * STATES
+        off = np.abs(h[1].imag / step - Hdv)
+        known = sure & np.isfinite(off)  # a row of two middles that meet has no direction
+        rated += known.sum()
+        assert (off[known] <= SAME * np.maximum(size, np.abs(Hdv))[known]).all()
+    assert not count or min(seen, rated) / count >= SEEN * STATES
 
 
 def _with_directions(model: Any, scene: Scene) -> Scene:
