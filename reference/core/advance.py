@@ -25,7 +25,7 @@ from crossbody.reference.core import (
 )
 from crossbody.reference.core.acceleration import GENERAL, accelerate, scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
-from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, NOTHING, RENEW, ask, has_friction, is_dry
+from crossbody.reference.core.friction import BEGIN_SLIP, NOTHING, RENEW, ask
 from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
     DONE,
@@ -38,15 +38,11 @@ from crossbody.reference.core.layout import (
     LOST,
     MODE_CYCLE,
     MORE,
-    NO_CONSISTENT_MODES,
     NODES,
     NOT_FINITE,
     PAINLEVE,
     ROWS_FULL,
     SHORT,
-    SLIP,
-    STEP_TOO_SMALL,
-    STICK,
     TOO_LONG,
     Buffers,
     Model,
@@ -59,8 +55,6 @@ from crossbody.reference.core.machine import active_mode
 from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
-
-JAMMING = 1e-3  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
 
 
 class Kernels(NamedTuple):
@@ -176,19 +170,16 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
-    moved, touched, stopped = False, False, False
-    jam = s.frictional and _slip_or_jam(K, s, m, w)
+    moved, touched = False, False
+    if s.frictional and _slip_or_jam(K, s, m, w, b):
+        return PAINLEVE
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
-            stopped = stopped or w.kind[i] == guards.STOP
             if after != b.mode[i]:
                 touched = touched or b.mode[i] == FREE
                 journal.move(s, b, i, after)
                 moved = True
-    for i in range(s.nc if stopped else 0):
-        if events.stops_too(s, m, w, b.mode, i):
-            journal.move(s, b, i, STICK)
     for i in range(s.nc if touched else 0):
         if events.touches_too(s, m, w, b.mode, i):
             journal.move(s, b, i, active_mode(s, m, w, i))
@@ -202,10 +193,6 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             if settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
                 return LOST
     code = _restart(K, s, m, w, b)
-    if jam and code == NO_CONSISTENT_MODES:
-        return PAINLEVE
-    if jam and code == 0 and not s.indeterminate:  # other modes go on from there, and no law says which
-        s.indeterminate, s.determined_until = 1, s.t
     if code == 0 and s.audited:
         code = audit.account(K, s, m, w)
     if code == 0:
@@ -214,37 +201,24 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @compiled
-def _slip_or_jam(K: Any, s: Any, m: Model, w: Work) -> bool:
-    """Let contacts that begin to slide do so against what held them; whether some have jammed.
+def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked.
 
     Leaves in s.jumps whether loads do: not where a force reaches its bound or vanishes.
     """
-    slips, jam, s.jumps = False, False, 0
+    slips, s.jumps = False, 0
     for i in range(s.nc):
-        if w.hit[i] <= s.theta:
-            s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
-            jam = jam or w.kind[i] == guards.JAM
-            slips = slips or w.kind[i] == guards.CONE
+        s.jumps |= w.hit[i] <= s.theta and w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
+        if w.hit[i] <= s.theta and w.kind[i] == guards.JAM:
+            marks = b.history[len(b.history) - 1]
+            marks[:] = 0
+            marks[i] = 1
+            return True
+        slips = slips or (w.hit[i] <= s.theta and w.kind[i] == guards.CONE)
     nq = s.nq
     if slips and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
         ask(BEGIN_SLIP, s, m, w, NOTHING)
-    return jam
-
-
-@compiled
-def _jams(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Whether forces of contacts that slide grow without bound, so that no step is short enough; it marks these.
-
-    Before they jam their forces do, unless what drives them vanishes as well.
-    """
-    nq, found, marks = s.nq, False, b.history[len(b.history) - 1]
-    marks[:] = 0
-    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
-        for i in range(s.nc):
-            slides = has_friction(m, i) and b.mode[i] == SLIP and not is_dry(m, i)
-            if slides and ask(DETERMINANT, s, m, w, i) < JAMMING:
-                marks[i], found = 1, True
-    return found
+    return False
 
 
 @compiled
@@ -259,8 +233,6 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.method = EXPLICIT
         before = s.method
         code = stepping.attempt(K, s, m, w, b)
-    if code == STEP_TOO_SMALL and s.frictional and _jams(K, s, m, w, b):
-        return PAINLEVE
     if code != 0:
         return code
     code = events.scan(K, s, m, w, b.mode)

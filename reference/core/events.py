@@ -15,17 +15,7 @@ from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
-from crossbody.reference.core.friction import (
-    NOTHING,
-    TURNS_ASIDE,
-    WATCH,
-    ask,
-    has_begun,
-    has_friction,
-    is_dry,
-    slip,
-    small_slip,
-)
+from crossbody.reference.core.friction import NOTHING, TURNS_ASIDE, WATCH, ask, is_dry
 from crossbody.reference.core.guards import (
     CATCH,
     CONE,
@@ -279,16 +269,6 @@ def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
 
 @compiled
-def stops_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
-    """Whether contact i slides no faster than what has no direction, where another one stops: they stop together.
-
-    Rounding has one of them stop first. One that has just begun to slide goes on.
-    """
-    slides = has_friction(m, i) and mode[i] == SLIP and not has_begun(w, i)
-    return bool(slides and slip(m, w, i, w.rate) <= small_slip(s))
-
-
-@compiled
 def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
     """The mode that the fired guard of row i leads to.
 
@@ -309,8 +289,6 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return SLIP
     if kind == STOP:
         return STICK
-    if kind == JAM:
-        return int(mode[i])  # whether any other set of modes goes on is decided with all of them
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
         return int(mode[i])
     if s.frozen and m.beta[i, 0] > 0.0:

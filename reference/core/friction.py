@@ -22,7 +22,7 @@ DRIFT = 10.0  # times as much as has no direction, from which on a contact that 
 TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes may be off
 
 (
-    BEGIN, FACTOR, SOLVE, RESPOND, DETERMINANT, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS,
+    BEGIN, FACTOR, SOLVE, RESPOND, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS,
     HOLDS_ON, BEGIN_SLIP, DECIDE,
 ) = np.arange(15)  # fmt: skip
 NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun

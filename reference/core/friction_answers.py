@@ -9,7 +9,6 @@ from crossbody.reference.core.friction import (
     BEGIN,
     BEGIN_SLIP,
     DECIDE,
-    DETERMINANT,
     FACTOR,
     HOLDS_ON,
     MARGIN,
@@ -17,6 +16,7 @@ from crossbody.reference.core.friction import (
     RESPOND,
     SOLVE,
     STANDS,
+    STIFFNESS,
     TURN_PART,
     TURNING_RATE,
     TURNS_ASIDE,
@@ -33,7 +33,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     FACTOR          A from G; i = 1 if directions of slip turn; 1 if it is not finite
     SOLVE           w.la from w.r
     RESPOND         likewise, but for what slides with a bound of its own: how multipliers change with w.r
-    DETERMINANT     how far the contacts that contact i, which slides, bears on are from a jam
+    STIFFNESS       what a multiplier of contact i does to its own gap
     MARGIN          how far contact i is from sliding
     WATCH           either of all contacts, into w.cones[i]
     TURNING_RATE    fastest rate at which a slip turns, i = 1 of those that have just begun
@@ -52,8 +52,8 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         coulomb.solve(s, m, w, w.r, w.la)
     elif what == RESPOND:
         coulomb.respond(s, m, w, w.r, w.la)
-    elif what == DETERMINANT:
-        return float(coulomb.determinant(s, m, w, w.listed[i]))
+    elif what == STIFFNESS:
+        return float(coulomb.stiffness(s, m, w, w.listed[i]))
     elif what == MARGIN:
         coulomb.without_pull(s, m, w)
         return float(coulomb.margin(m, w, i, w.la))

@@ -33,9 +33,9 @@ HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to C
 SETS = 64  # of modes that are remembered while those of friction are decided
 OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
-    "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among", "seen",
-    "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by",
-    "turning", "turned", "pushed",
+    "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight",
+    "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
+    "pushed",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -320,9 +320,6 @@ class Work:
     matrix: Floats2  # the system that is solved, and its factors
     down: Index
     across: Index
-    reached: Bytes  # places of rows that bear on each other,
-    among: Index  # the unknowns among them,
-    seen: Bytes  # and what is counted of these; scratch
     first: Floats2  # the same of the normal rows alone,
     second: Floats2  # and of what they leave of the sticking ones
     down2: Index

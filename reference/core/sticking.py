@@ -19,14 +19,13 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import factor_lu, solve_lu
-from crossbody.reference.core.coulomb import determinant, factor_set, note_speed, respond, solve, without_pull
+from crossbody.reference.core.coulomb import factor_set, note_speed, respond, solve, stiffness, without_pull
 from crossbody.reference.core.friction import (
     bound,
     count_from_none,
     decided_to,
     has_friction,
     is_dry,
-    most_drift,
     slip,
     small_slip,
 )
@@ -42,8 +41,6 @@ MOST_TURN = 0.5  # rad, of one of them
 AROUND, HALVINGS = 24, 50  # directions that are looked at where that leads nowhere, and halvings between two
 MOST_SETS = 256
 FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
-ENDURED = 0.5  # part of the drift at which a contact that sticks is known not to
-AS_WEAK = 1e-6  # part by which bounds may differ and count as equal
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 DIFFERENT = 1e-6  # part of the largest acceleration by which motions differ
 
@@ -230,26 +227,9 @@ def _turn(s: Any, m: Model, w: Work) -> float:
 
 
 @compiled
-def _weakest(s: Any, m: Model, w: Work) -> float:
-    """The bound up to which contacts that stick have to slide since not all can stick together; -1 if all can.
-
-    Those of a body that rocks on several contacts cannot. What the pull on sticking rows keeps slow enough counts as if
-    it could; else the weakest slides, with those that are as weak.
-    """
-    found = np.inf
-    for j in range(s.na if s.dependent_rows > 0 and s.leeway == 0.0 else 0):
-        i = w.idx[j]
-        if has_friction(m, i) and w.state[i] == STICK and not is_dry(m, i):
-            endured = ENDURED * m.alpha[m.tangent[i], 1] * most_drift(s)
-            if _size(m, w, i, w.excess) > max(endured, decided_to(s)):
-                found = min(found, bound(m, i, w.la[j]))
-    return float(found * (1.0 + AS_WEAK)) if found < np.inf else -1.0
-
-
-@compiled
 def _worst(s: Any, m: Model, w: Work) -> int:
     """The contact that violates its mode most, -1 if none does; w.wants has the modes that all would rather have."""
-    found, most, weakest = -1, decided_to(s), _weakest(s, m, w)
+    found, most = -1, decided_to(s)
     for j in range(s.na):
         i = w.idx[j]
         if not has_friction(m, i):
@@ -264,8 +244,6 @@ def _worst(s: Any, m: Model, w: Work) -> int:
             other, then = -1.0, STICK
             if w.state[i] == STICK:
                 other, then = (_size(m, w, i, w.la) - bound(m, i, max(w.la[j], 0.0))) * w.gram[j, j], SLIP
-                if bound(m, i, w.la[j]) <= weakest:
-                    other = max(other, _size(m, w, i, w.excess))
             elif w.stands[i]:
                 other = max(-_ahead(m, w, i), abs(_aside(m, w, i)))
             if other > missing:
@@ -279,15 +257,11 @@ def _worst(s: Any, m: Model, w: Work) -> int:
 
 @compiled
 def _change(m: Model, w: Work, i: int, becomes: int) -> None:
-    """Put contact i in another mode; one that begins to slide does so against the force that held it.
-
-    One that its force would hold, but that cannot stick beside others, goes where they drive it.
-    """
+    """Put contact i in another mode; one that begins to slide does so against the force that held it."""
     if becomes == SLIP and w.stands[i]:
-        size, moved = _size(m, w, i, w.la), _size(m, w, i, w.excess)
-        driven = moved > 0.0 and size <= bound(m, i, w.la[w.listed[i]])
+        size = _size(m, w, i, w.la)
         for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
-            w.way[w.idx[c]] = w.excess[c] / moved if driven else -w.la[c] / size
+            w.way[w.idx[c]] = -w.la[c] / size
     _put(m, w, i, becomes)
 
 
@@ -583,8 +557,8 @@ def decide(s: Any, m: Model, w: Work) -> int:
     s.leeway = 0.0
     _look(s, m, w)
     if not _found(s, m, w):
-        s.leeway = max(_most_pull(s, m, w), decided_to(s))
-        if not _found(s, m, w):
+        s.leeway = _most_pull(s, m, w)
+        if not (s.leeway > 0.0 and _found(s, m, w)):
             return _mark(s, m, w)
     _count_others(s, m, w)
     for j in range(s.na):
@@ -620,17 +594,13 @@ def _mark(s: Any, m: Model, w: Work) -> int:
 
 @compiled
 def _jammed(s: Any, m: Model, w: Work) -> int:
-    """The contact that slides and that bears most of what is jammed as the set stands; -1 if nothing is.
+    """The contact that slides and that its own force does not press, as the set stands; -1 if there is none.
 
     One that no forces bring onto its law is at the very edge of that.
     """
-    found, most, value, known = -1, -np.inf, 0.0, False
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i) and w.state[i] == SLIP and not is_dry(m, i):
-            if not (known and w.reached[j]):
-                value, known = determinant(s, m, w, j), True
-            off = abs(w.excess[j]) > DIFFERENT * s.push_scale
-            if (off or not value > 0.0) and w.la[j] > most:
-                found, most = int(i), w.la[j]
-    return found
+        off = abs(w.excess[j]) > DIFFERENT * s.push_scale
+        if has_friction(m, i) and w.state[i] == SLIP and not is_dry(m, i) and (off or not stiffness(s, m, w, j) > 0.0):
+            return int(i)
+    return -1

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import islice, product
 
 import numpy as np
 from scipy.optimize import root
@@ -22,7 +21,7 @@ from scipy.optimize import root
 from crossbody.cases import Mode, Outcome
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Floats
-from crossbody.reference.sundials.equations import ULP, Ended, Equations
+from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import LevelMachine, View
 from crossbody.reference.sundials.sliding import Seen, Sliding
 
@@ -32,11 +31,6 @@ STILL = 10.0  # times that: a slip that stops there, stops
 GRAZE = 0.1  # of that: a slip may pass zero by so much and go on
 AGREES = 1e-10  # part of the largest acceleration by which a set of modes may be off
 ROUNDS, SWEEPS = 40, 3000
-MOST_SETS = 4096
-DRIFTS = 5.0  # times a slip without a direction: what sticks may move as fast where not all of it can stick
-ALIKE = 1e-6  # part by which bounds may differ and count as equal
-JAMMING = 1e-3  # likewise, where no step is short enough for forces that grow without bound
-JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
 FAR = 1e6  # times what one row alone would ask for: sweeps that lead there diverge
 SETTLED = 1e-14  # part of the largest multiplier by which the last sweep changes any
 WITHIN = 1e-7  # part of its bound by which a force must stay below it to count as that of a contact that sticks
@@ -78,7 +72,7 @@ class FrictionMachine(LevelMachine):
         self.rows = sorted({*self.rows, *self.sliding.dry})
         self._joining, self._stops, self._begins = set(self.sliding.dry), set[int](), dict[int, Floats]()
         self._stopped = set[int]()
-        self._jump, self._rounds, self._at, self._limit = True, 0, -np.inf, 0.0
+        self._jump, self._rounds, self._at = True, 0, -np.inf
 
     @property
     def small(self) -> float:
@@ -131,13 +125,6 @@ class FrictionMachine(LevelMachine):
                 found[i] = size, self.sliding.mu[i] * lam[seen.at[i]] * light / size
         return found
 
-    def jamming(self, t: float, q: Floats, v: Floats) -> list[int]:
-        """The contacts that slide and are about to jam, where their forces grow without bound."""
-        seen = self.see(t, q, v)
-        modes, ways = self._modes_of(seen), self._ways_of(seen)
-        found = {i: self.sliding.jam(seen, modes, ways, i) for i in ways.keys() - self.sliding.dry}
-        return sorted(i for i, values in found.items() if (np.abs(values) < JAMMING).any())
-
     def renew(self, q: Floats, v: Floats, t: float) -> None:
         """Take the slip velocities' directions at the end of a step for those of reference."""
         _, rate = self.equations.gaps(t, q, v)
@@ -169,13 +156,20 @@ class FrictionMachine(LevelMachine):
             raise Ended(Outcome.NOT_FINITE)
         self.renew(q, v, t)
         joins = self._joining | {i for i in self.rows if self._meets(i, gap, rate, q)}
-        if self.contacts() or joins:
-            self._decide(t, q, v, joins, gap, rate)
-        while joins := {i for i in self.rows if self._catches(i, t, q, v, gap, rate)}:  # what changed lets others in
-            self._rounds += 1
-            if self._rounds > ROUNDS:
-                raise Ended(Outcome.MODE_CYCLE, sorted({*self.contacts(), *joins}))
-            self._decide(t, q, v, joins, gap, rate)
+        trying = sorted({*self.contacts(), *joins})
+        if trying:
+            seen = self.see(t, q, v, trying)
+            found = self._decided(seen, joins)
+            for i in trying:
+                mode = found.modes[i]
+                off = self.modes[i] if self.modes[i] not in ON else Mode.FREE if gap[i] > 0.0 else Mode.BALLISTIC
+                if off == Mode.FREE and gap[i] <= 0.0 and (rate[i] < -self.slow or gap[i] < -self.deep):
+                    off = Mode.BALLISTIC
+                self._become(t, i, off if mode == Mode.FREE else mode)
+            for i, way in found.ways.items():
+                if found.modes[i] == Mode.SLIP and (i not in self.ways or i in self._stands):
+                    self.ways[i] = way
+                    self.begun |= {i} & self._stands
         self._joining, self._stops, self._stopped, self._begins, self._jump = set(), set(), set(), {}, True
         self.redundant = self.sliding.redundant
         vd, lam = self.accelerate(t, q, v)
@@ -183,30 +177,9 @@ class FrictionMachine(LevelMachine):
         none = np.zeros(len(lam))
         return View(gap, rate, vd, lam, none, none, lam)
 
-    def _decide(self, t: float, q: Floats, v: Floats, joins: set[int], gap: Floats, rate: Floats) -> None:
-        """Put the contacts that press, and those that join, in modes that agree with their forces."""
-        trying = sorted({*self.contacts(), *joins})
-        found = self._decided(self.see(t, q, v, trying), joins)
-        for i in trying:
-            mode = found.modes[i]
-            off = self.modes[i] if self.modes[i] not in ON else Mode.FREE if gap[i] > 0.0 else Mode.BALLISTIC
-            if off == Mode.FREE and gap[i] <= 0.0 and (rate[i] < -self.slow or gap[i] < -self.deep):
-                off = Mode.BALLISTIC
-            self._become(t, i, off if mode == Mode.FREE else mode)
-        for i, way in found.ways.items():
-            if found.modes[i] == Mode.SLIP and (i not in self.ways or i in self._stands):
-                self.ways[i] = way
-                self.begun |= {i} & self._stands
-
-    def _catches(self, i: int, t: float, q: Floats, v: Floats, gap: Floats, rate: Floats) -> bool:
-        """Whether an open contact below the surface closes and would move below its law."""
-        closing = self.modes[i] == Mode.BALLISTIC and gap[i] <= 0.0 and rate[i] < -self.slow
-        return closing and self._above_law(i, t, q, v) < 0.0
-
     def _become(self, t: float, i: int, after: Mode) -> None:
         if after != self.modes[i] or i in self._stopped:  # one that turns has stopped too
             self._switch(t, i, after)
-            self._stopped.discard(i)
         for way in (*self.sliding.ways.get(i, ()), *self.sliding.tied.get(i, ())):
             self.modes[way] = after
         if after != Mode.SLIP:
@@ -237,11 +210,9 @@ class FrictionMachine(LevelMachine):
         for i, way in self._begins.items():
             modes[i], ways[i] = Mode.SLIP, way
         limit = AGREES * float(np.abs(seen.bare).max(initial=0.0))
-        self._limit = limit
         found = self._pivoted(seen, modes, ways, limit) or self._swept(seen, modes, ways, limit)
-        found = found or self._searched(seen, modes, ways, limit)
         if found is None:
-            jammed = self._jammed(seen, modes, ways)
+            jammed = [i for i in ways if self.sliding.stiffness(seen, modes, ways, i) <= 0.0]
             raise Ended(Outcome.PAINLEVE if jammed else Outcome.NO_CONSISTENT_MODES, jammed or contacts)
         return found
 
@@ -271,18 +242,16 @@ class FrictionMachine(LevelMachine):
 
     def _forces(self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats]) -> Floats:
         """Multipliers of a set, some of whose contacts may be off."""
-        part, lam = self._part(seen, modes), np.zeros(len(seen.rows))
-        sliding = {i: way for i, way in ways.items() if modes[i] == Mode.SLIP}
-        lam[[seen.at[row] for row in part.rows]] = self.sliding.forces(part, modes, sliding, pulled=False)
-        return lam
-
-    def _part(self, seen: Seen, modes: Mapping[int, Mode]) -> Seen:
-        """Only the rows of contacts that press in a set of modes."""
-        keep = [k for k, row in enumerate(seen.rows) if modes[self._contact_of(row)] != Mode.FREE]
-        return Seen(
+        on = [i for i, mode in modes.items() if mode != Mode.FREE]
+        keep = [k for k, row in enumerate(seen.rows) if self._contact_of(row) in on]
+        part = Seen(
             [seen.rows[k] for k in keep], {seen.rows[k]: j for j, k in enumerate(keep)}, seen.G[np.ix_(keep, keep)],
             seen.bare[keep], seen.pull[keep], seen.rate[keep], seen.X[:, keep], seen.vd,
         )  # fmt: skip
+        lam = np.zeros(len(seen.rows))
+        sliding = {i: way for i, way in ways.items() if modes[i] == Mode.SLIP}
+        lam[keep] = self.sliding.forces(part, modes, sliding, pulled=False)
+        return lam
 
     def _contact_of(self, row: int) -> int:
         leader = self.follows[row]
@@ -295,7 +264,7 @@ class FrictionMachine(LevelMachine):
 
     def _violated(self, seen: Seen, tried: Tried, limit: float) -> dict[int, tuple[float, Mode]]:
         """By how much contacts violate their modes, m/s^2, and the modes that they would rather have."""
-        found, weakest = dict[int, tuple[float, Mode]](), self._weakest(seen, tried, limit)
+        found: dict[int, tuple[float, Mode]] = {}
         for i, mode in tried.modes.items():
             k, heavy = seen.at[i], seen.G[seen.at[i], seen.at[i]]
             if mode == Mode.FREE:
@@ -307,10 +276,7 @@ class FrictionMachine(LevelMachine):
                 ways = [seen.at[t] for t in self.sliding.ways.get(i, ())]
                 if mode == Mode.STICK:
                     force = float(np.linalg.norm(tried.lam[ways]))
-                    bound = self.sliding.bound(seen, tried.lam, i)
-                    off.append(((force - max(bound, 0.0)) * heavy, Mode.SLIP))
-                    if bound <= weakest:
-                        off.append((float(np.linalg.norm(tried.excess[ways])), Mode.SLIP))
+                    off.append(((force - max(self.sliding.bound(seen, tried.lam, i), 0.0)) * heavy, Mode.SLIP))
                 elif mode == Mode.SLIP and i in self._stands:
                     off.append((-float(tried.ways[i] @ tried.excess[ways]), Mode.STICK))
                     if len(ways) > 1:
@@ -319,19 +285,6 @@ class FrictionMachine(LevelMachine):
             if worst[0] > limit:
                 found[i] = worst
         return found
-
-    def _weakest(self, seen: Seen, tried: Tried, limit: float) -> float:
-        """Bound up to which contacts that should stick have to slide, -1 if they can all stick together.
-
-        Contacts of a body that rocks cannot; what the pull on them keeps as slow as a slip without a direction may.
-        """
-        found = np.inf
-        for i in (i for i, mode in tried.modes.items() if mode == Mode.STICK and i not in self.sliding.dry):
-            ways = self.sliding.ways[i]
-            moved = float(np.linalg.norm(tried.excess[[seen.at[t] for t in ways]]))
-            if moved > max(DRIFTS * self.sliding.slow[ways[0], 1] * self.small, limit):
-                found = min(found, self.sliding.bound(seen, tried.lam, i))
-        return found * (1.0 + ALIKE) if np.isfinite(found) else -1.0
 
     def _pivoted(
         self, seen: Seen, modes: dict[int, Mode], ways: dict[int, Floats], limit: float, alone: bool = False
@@ -344,53 +297,16 @@ class FrictionMachine(LevelMachine):
             tried = self._tried(seen, modes, ways, limit)
             wrong = self._violated(seen, tried, limit)
             if not wrong:
-                return None if self._jammed(seen, tried.modes, tried.ways) else tried
+                return tried
             ways = dict(tried.ways)
             changing = [max(wrong, key=lambda i: wrong[i][0])] if alone else list(wrong)
             modes = dict(modes)
             for i in changing:
                 modes[i] = wrong[i][1]
                 if modes[i] == Mode.SLIP and i in self._stands:
-                    places = [seen.at[t] for t in self.sliding.ways[i]]
-                    force, size = tried.lam[places], float(np.linalg.norm(tried.lam[places]))
-                    driven = size <= self.sliding.bound(seen, tried.lam, i)
-                    ways[i] = tried.excess[places] / np.linalg.norm(tried.excess[places]) if driven else -force / size
+                    force = tried.lam[[seen.at[t] for t in self.sliding.ways[i]]]
+                    ways[i] = -force / np.linalg.norm(force)
         return None
-
-    def _jammed(self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats]) -> list[int]:
-        """The contacts that slide and jam, with others or alone."""
-        part, sliding = self._part(seen, modes), {i: way for i, way in ways.items() if modes[i] == Mode.SLIP}
-        found = list[int]()
-        for i in sliding.keys() - self.sliding.dry:
-            values = self.sliding.jam(part, modes, sliding, i)
-            real = values.real[np.abs(values.imag) <= ULP * np.abs(values)]
-            if not (real > JAMMED).all():
-                found.append(i)
-        return sorted(found)
-
-    def _searched(self, seen: Seen, modes: dict[int, Mode], ways: dict[int, Floats], limit: float) -> Tried | None:
-        """Try sets by the number of contacts in which they differ from those given; none of many contacts."""
-        choices = [
-            sorted({self._pressed(i, {}) if i in self._stands else modes[i], Mode.SLIP, Mode.FREE} - {modes[i]})
-            if i in self.sliding.ways and i not in self.sliding.dry else [] for i in modes
-        ]  # fmt: skip
-        sets = [dict(zip(modes, one, strict=True)) for one in islice(
-            product(*([mode, *other] for mode, other in zip(modes.values(), choices, strict=True))), MOST_SETS
-        )]  # fmt: skip
-        for one in sorted(sets, key=lambda one: sum(one[i] != modes[i] for i in modes)):
-            aims = {i: ways.get(i, self._aim(seen, i)) for i in one if one[i] == Mode.SLIP}
-            for sign in (1.0, -1.0):
-                turned = {i: way * (sign if i in self._stands else 1.0) for i, way in aims.items()}
-                tried = self._tried(seen, dict(one), turned, limit)
-                if not self._violated(seen, tried, limit) and not self._jammed(seen, tried.modes, tried.ways):
-                    return tried
-        return None
-
-    def _aim(self, seen: Seen, i: int) -> Floats:
-        """Direction in which what acts drives contact i along its surface."""
-        drive = -seen.bare[[seen.at[t] for t in self.sliding.ways[i]]]
-        size = float(np.linalg.norm(drive))
-        return drive / size if size > 0.0 else np.eye(len(drive))[0]
 
     def _swept(self, seen: Seen, modes: dict[int, Mode], ways: dict[int, Floats], limit: float) -> Tried | None:
         """Begin at what projected Gauss-Seidel converges to."""
@@ -479,7 +395,7 @@ class FrictionMachine(LevelMachine):
             elif tells == "LEAVE":
                 found.append(-gap[i])
             elif tells == "CATCH":
-                found += [rate[i], self._above_law(i, t, q, v)]
+                found += [rate[i], -self._would_press(i, t, q, v)]
             elif tells == "RELEASE":
                 found.append(lam[seen.at[i]])
             elif tells == "CONE":
@@ -490,7 +406,7 @@ class FrictionMachine(LevelMachine):
                 near = float(np.linalg.norm(slip)) - STILL * self.small if len(slip) > 1 else -1.0
                 found += [float(slip @ self.ways[i]) + self._leave(i), near]
             elif tells == "JAM":
-                found.append(float(np.prod(self.sliding.jam(seen, modes, ways, i)).real))
+                found.append(self.sliding.stiffness(seen, modes, ways, i))
             else:
                 found.append(watched[i])
         return np.array(found)
@@ -499,31 +415,31 @@ class FrictionMachine(LevelMachine):
         """By how much a slip may pass zero: one that has just begun is known no better."""
         return (1.0 if i in self.begun else GRAZE) * self.small
 
-    def _above_law(self, i: int, t: float, q: Floats, v: Floats) -> float:
-        """By how much an open contact moves faster than its law, m/s^2, the others following theirs.
-
-        It may stay open while it does. What it would press with if it stuck, or slid, says less: where several contacts
-        follow from each other, to join alone in a mode that is not the one with all of them leads back at once.
-        """
-        seen, modes = self.see(t, q, v, sorted({*self.contacts(), i})), dict[int, Mode]()
-        for k in self.rows:
-            if k in seen.at:
-                modes[k] = self.modes[k] if k != i else Mode.FREE
-        part, ways = self._part(seen, modes), self._ways_of(seen)
-        lam = self.sliding.forces(part, modes, ways)
-        k = seen.at[i]
-        others = [seen.at[row] for row in part.rows]
-        return float(seen.G[k, others] @ lam - seen.bare[k]) + 2.0 * self._limit
+    def _would_press(self, i: int, t: float, q: Floats, v: Floats) -> float:
+        """Multiplier of an open contact if it pressed now."""
+        seen = self.see(t, q, v, sorted({*self.contacts(), i}))
+        modes, ways = self._modes_of(seen), self._ways_of(seen)
+        modes[i] = self._pressed(i, {})
+        if i in self.sliding.ways:
+            slip = self.sliding.slip(seen, i)
+            size = float(np.linalg.norm(slip))
+            if size > STILL * self.small:
+                modes[i], ways[i] = Mode.SLIP, slip / size
+        return float(self.sliding.forces(seen, modes, ways, pulled=False)[seen.at[i]])
 
     def apply(self, t: float, q: Floats, v: Floats, fired: list[Alarm]) -> None:
-        """Note what fired; `settle` decides what follows from it."""
+        """Note what fired; `settle` decides what follows from it.
+
+        Raises:
+            Ended: PAINLEVE naming the contact.
+        """
         gap, rate = (a.copy() for a in self.equations.gaps(t, q, v))
         self._jump = False
         for alarm in fired:
             i, tells = alarm.row, alarm.tells
             if tells == "JAM":
-                self._jump = True  # whether other modes go on from here is decided with all of them
-            elif tells == "RELEASE":
+                raise Ended(Outcome.PAINLEVE, [i])
+            if tells == "RELEASE":
                 self._become(t, i, Mode.FREE if gap[i] > 0.0 else Mode.BALLISTIC)
             elif tells == "LEAVE":
                 self._become(t, i, Mode.FREE)
@@ -551,5 +467,3 @@ class FrictionMachine(LevelMachine):
                 slip = np.linalg.norm(all_rates[ways] - self.sliding.drift[ways])
                 if self.modes[i] == Mode.SLIP and slip <= STILL * self.small:
                     self._stops.add(i)
-                    if slip <= self.small and i not in self.begun:  # rounding has one of them stop first
-                        self._stopped.add(i)

@@ -96,9 +96,7 @@ class SlidingArc(DenseStep):
         self.t0, self.y0, self._defect = self.t1, self.y1, None
         done = self.solver.step(stop, "onestep", stop)
         if done.status < 0:
-            s = self.at(self.t0)
-            jamming = self.run.friction.jamming(s.t, s.q, s.v)
-            raise Ended(Outcome.PAINLEVE if jamming else Outcome.STEP_TOO_SMALL, jamming)
+            raise Ended(Outcome.STEP_TOO_SMALL)
         size = float(done.y.dot(done.y))
         if not size < FAR**2:
             raise Ended(Outcome.DIVERGED if np.isfinite(done.y).all() else Outcome.NOT_FINITE)

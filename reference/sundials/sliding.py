@@ -172,21 +172,9 @@ class Sliding:
             x[N] = pressed - inverse @ A[N, S] @ x[S]
         return x
 
-    def jam(self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats], i: int) -> Floats:
-        """Eigenvalues of what forces of the contacts that contact i bears on do to their rows: none jams, none is < 0.
-
-        Of one contact alone it is Painleve's p. Rows that depend on each other are moved as by springs that are alike,
-        so that only what independent ones are moved by counts.
-        """
+    def stiffness(self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats], i: int) -> float:
+        """What the multiplier of contact i does to its own gap, the others following their laws, 1/kg."""
         places, _, A, size = self.system_of(seen, modes, ways)
-        owners = [self.normal.get(row, row) for row in seen.rows]
-        moved = (seen.G != 0.0) | np.equal.outer(owners, owners)
-        reached = moved[seen.at[i]]
-        while (more := moved[reached].any(axis=0)).sum() > reached.sum():
-            reached = more
-        both = np.ix_(reached[places], reached[places])
-        A, G = A[both], (seen.G[np.ix_(places, places)] / np.outer(size, size))[both]
-        values, vectors = np.linalg.eigh(G)
-        base = vectors[:, values > DEPENDENT * values[-1]]
-        found: Floats = np.linalg.eigvals(base.T @ A @ base)
-        return found
+        k = places.index(seen.at[i])
+        inverse = np.linalg.pinv(A, rcond=DEPENDENT)[k, k]
+        return float(size[k] ** 2 / inverse) if inverse != 0.0 else np.inf
