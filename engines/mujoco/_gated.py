@@ -32,9 +32,9 @@ class GatedRows(Rows):
         self.gated, self.switches = Gated(case.gates, self.nc, model.nv), list[Switch]()
         self.follows, self.pushes = case.gates.follows, np.zeros(self.nc)
 
-    def anew(self, model: Any, data: Any) -> GatedRows:
-        """Return the same of another model."""
-        return GatedRows(self.case, self.scene, model, data)
+    def anew(self, scene: Scene, model: Any, data: Any) -> GatedRows:
+        """Return the same of another model of a scene."""
+        return GatedRows(self.case, scene, model, data)
 
     def begin(self) -> None:
         """Forget what was, at the start of a run."""

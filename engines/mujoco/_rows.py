@@ -86,9 +86,9 @@ class Rows:
         self.nc = tangent + len(self.dry)
         self._known: dict[tuple[bytes, ...], tuple[Present, ...]] = {}
 
-    def anew(self, model: Any, data: Any) -> Rows:
-        """Return the same of another model."""
-        return type(self)(self.scene, model, data)
+    def anew(self, scene: Scene, model: Any, data: Any) -> Rows:
+        """Return the same of another model of a scene."""
+        return type(self)(scene, model, data)
 
     def _rubbed(self) -> Iterator[tuple[int, int]]:
         """Return what MuJoCo calls the rows of dry friction: kind, and velocity or tendon."""

@@ -375,7 +375,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
     model = copy(model)  # rows are put on here
     data = mujoco.MjData(model)
     entered = profile == "matched" and not case.general  # of a robot the states are not those of rows that act
-    of_run, rows = rows, rows.anew(model, data)
+    of_run, rows = rows, rows.anew(scene, model, data)
     if isinstance(rows, GatedRows):
         rows.begin()
         case = _reading(case, rows)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["chosen", "load", "names", "summary"]
 
 
-_REGISTRY = Registry("model", __name__)
+_REGISTRY = Registry("model", __name__, hidden=("contract",))
 
 
 def names() -> tuple[str, ...]:

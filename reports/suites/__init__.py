@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 OWN = tuple(SUITES)
 """Names that no plug-in can take."""
-_REGISTRY = Registry("suite", __name__)
+_REGISTRY = Registry("suite", __name__, hidden=("axis", "contract"))
 
 
 def names() -> tuple[str, ...]:

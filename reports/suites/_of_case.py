@@ -11,7 +11,7 @@ import numpy as np
 from crossbody import cases
 from crossbody.cases import Case, Parameter, Value
 from crossbody.cases.loading import module
-from crossbody.reports.suites._axis import Axis, Levels, Linear, Log
+from crossbody.reports.suites.axis import Axis, Levels, Linear, Log
 from crossbody.reports.suites.contract import Family, Suite
 
 LAW: Mapping[str, Axis] = {"a0": Log(1e2, 1e6), "a1": Log(1.0, 1e3)}

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from crossbody.reports.suites import _scenes as scenes
-from crossbody.reports.suites._axis import Axis, Levels, Linear, Log, Whole, decades
+from crossbody.reports.suites.axis import Axis, Levels, Linear, Log, Whole, decades
 from crossbody.reports.suites.contract import TIGHT, Family, Ladder, Suite
 
 ball = partial(Family, case="bouncing_ball", variant="linear", scene=scenes.damped)

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeAlias
 
 from crossbody.cases import InvalidValue
-from crossbody.reports.suites._axis import Axis, Levels
+from crossbody.reports.suites.axis import Axis, Levels
 
 if TYPE_CHECKING:
     import numpy as np

@@ -12,7 +12,7 @@ from crossbody.cases import Case, InvalidValue, SceneError
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import suites
 from crossbody.reports.cli import cli
-from crossbody.reports.suites._axis import Levels, Linear
+from crossbody.reports.suites.axis import Levels, Linear
 
 HEAD = """
 from crossbody import cases

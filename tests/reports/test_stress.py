@@ -24,7 +24,7 @@ from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome, SceneE
 from crossbody.reports import suites
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.runs.jobs import Pick
-from crossbody.reports.suites._axis import Levels, Linear, Log, Whole, decades
+from crossbody.reports.suites.axis import Levels, Linear, Log, Whole, decades
 from crossbody.reports.suites.contract import Family, Ladder, Suite
 from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
@@ -120,7 +120,7 @@ def test_every_suite_can_be_drawn_and_says_what_it_stresses(name: str) -> None:
 def test_a_suite_of_ones_own_is_run_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "mine.py"
     path.write_text(
-        "from crossbody.reports.suites._axis import Log\nfrom crossbody.reports.suites.contract import Family, Suite\n"
+        "from crossbody.reports.suites.axis import Log\nfrom crossbody.reports.suites.contract import Family, Suite\n"
         "SUITE = Suite(families=(Family(case='bouncing_ball', variant='linear', axes={'a0': Log(1.0, 2.0)}),))\n"
     )
     assert suites.load(str(path)).runs == 200

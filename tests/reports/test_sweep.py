@@ -23,7 +23,7 @@ from crossbody.cases import OutputError, SchedulerUnavailable
 from crossbody.reports.cli import main
 from crossbody.reports.commands.stress import Ask, Pool, plan, sweep
 from crossbody.reports.runs.output import folder
-from crossbody.reports.suites._axis import Log
+from crossbody.reports.suites.axis import Log
 from crossbody.reports.suites.contract import Family, Suite
 from crossbody.reports.sweep import draw, pools
 from crossbody.reports.sweep.spec import Spec
@@ -127,7 +127,7 @@ def test_a_contradictory_grid_is_one_sentence(
 ) -> None:
     path = tmp_path / "mine.py"
     path.write_text(
-        "from crossbody.reports.suites._axis import Levels, Log\n"
+        "from crossbody.reports.suites.axis import Levels, Log\n"
         "from crossbody.reports.suites.contract import Family, Suite\n"
         f"SUITE = Suite(families=(Family(case='bouncing_ball', variant='linear', {axes}),))\n"
     )
