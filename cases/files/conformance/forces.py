@@ -52,6 +52,11 @@ def features() -> list[Feature]:
             "Write it at the joint, times the square of the gear.", (name,))
             for name, heavy in (("armature", replace(geared, armature=0.1)),
                                 ("damping", replace(geared, damping=0.1)))),
+        Feature("gain of an actuator that varies with the joint", mjcf(tail='<actuator><general name="m" joint="elbow" '
+            'gear="3" gaintype="affine" gainprm="2 .5 .1" biastype="affine" biasprm=".3 -.4 -.2"/></actuator>'),
+            arm(actuators=(replace(geared, gain=(2.0, 0.5, 0.1), bias=(0.3, -0.4, -0.2)),)), ".//general[@gaintype]",
+            "An affine gain is g0 + g1 l + g2 l' with the actuator's length l, and multiplies the control.",
+            about=("actuators",)),
         Feature("armature of a class", mjcf(head='<default><joint armature=".1"/></default>'),
             arm(shoulder={"armature": 0.1}, elbow={"armature": 0.1}), ".//default/joint[@armature]", AXIS_RULE,
             "Write it at the joint itself.", ("armature",)),
