@@ -132,10 +132,10 @@ def _write(path: Path, text: str) -> None:
 def _show(found: Audit, rows: Sequence[Row]) -> None:
     if not voice.quiet():
         scene = found.scene
-        counts = {"joints": len(scene.joints), "degrees of freedom": scene.nv, "loops": len(scene.loops),
+        counts = {"Joints": len(scene.joints), "degrees of freedom": scene.nv, "loops": len(scene.loops),
                   "actuators": len(scene.actuators), "states": len(found.job["states"])}  # fmt: skip
         _say(f"{found.path.name}: {told.verdict(rows)}.")
-        _say(", ".join(f"{count} {name}" for name, count in counts.items()))
+        _say(", ".join(f"{name}: {count}" for name, count in counts.items()))
         for text in (*found.findings, *filter(None, found.strange.values())):
             _say(text)
         print("\n".join(table(rows, _width())))
