@@ -17,11 +17,6 @@ Chart = Callable[[Floats, Floats], tuple[Floats, Floats]]
 Modes = tuple[int, ...]
 
 
-def charted(chart: Chart, observe: Observe) -> Observe:
-    """What an engine observes that takes the coordinates of the case."""
-    return lambda q, v: observe(*chart(q, v))
-
-
 class Log:
     """One entry an instant.
 

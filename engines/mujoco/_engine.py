@@ -150,9 +150,6 @@ class Mujoco(Engine):
         used = used | ({"dt": dt} if rounded else {})
         own = profile == "matched" and "dt" not in settings  # nobody's step was changed
         with captured() as said, _refused(case):
-            if hasattr(mechanism, "prepare"):
-                run: Run = mechanism.prepare(case, profile, used)
-                return run
             more = {name: value for name, value in used.items() if name not in ("dt", "max_steps")}
             scene: Scene = mechanism.build(case, profile, float(used["dt"]), **more)
         followed = getattr(mechanism, "followed", None)

@@ -117,10 +117,8 @@ class Pinocchio(Engine):
         if (name := module_of(case)) not in known:
             return f"Pinocchio has no model of the mechanism {name!r}; it has: {', '.join(known)}."
         own = getattr(MECHANISMS.load(name), "why_not", lambda *_: None)(case, profile)
-        if own is not None or hasattr(MECHANISMS.load(name), "prepare"):
-            return str(own) if own is not None else None
-        if profile == "admm" and not hasattr(MECHANISMS.load(name), "build"):
-            return "The profile admm steps contacts in time: the loops of this mechanism never open."
+        if own is not None:
+            return str(own)
         opens = case.law.unilateral
         closed = case.scene is not None and any(loop.in_space for loop in case.scene.loops)
         if profile == "admm" and (closed or not case.contacts):
@@ -161,9 +159,6 @@ class Pinocchio(Engine):
                 case=case, engine=self.name, profile=profile, settings=used, stepper=stepper, physics=stepper.physics()
             )
         mechanism = MECHANISMS.load(module_of(case))
-        if hasattr(mechanism, "prepare"):
-            run: Run = mechanism.prepare(case, used)
-            return run
         scene: Scene = mechanism.build(case, str(used.get("algebra", "forwardDynamics")))
         constants: dict[str, Any] = dict(zip(("a0", "a1", "a2"), scene.rows.entered, strict=True))
         if profile != "law":
