@@ -218,13 +218,17 @@ def _with_friction(case: Case) -> Case:
 
 
 def ended(case: Case, pick: Pick, why: str) -> Entry:
-    """The entry of a run that took its process with it: it got no further than its start."""
+    """The entry of a run that took its process with it."""
+    return Entry(engine=pick.engine, profile=pick.profile, run=of_start(case, why), settings={})
+
+
+def of_start(case: Case, why: str) -> Trajectory:
+    """A run that got no further than its start, and why."""
     q, v, nothing = case.q0[None], case.v0[None], np.zeros((1, len(case.contacts)))
-    run = Trajectory(
+    return Trajectory(
         t=np.zeros(1), q=q, v=v, gap=nothing, lam=nothing, energy=np.zeros((1, 2)), mode=nothing.astype(np.int8) - 1,
         outcome=Outcome.TIME_LIMIT, message=why,
     )  # fmt: skip
-    return Entry(engine=pick.engine, profile=pick.profile, run=run, settings={})
 
 
 def of_pick(settings: Mapping[str, Value], pick: Pick) -> dict[str, Value]:
