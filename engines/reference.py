@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -32,6 +33,9 @@ UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
 KEPT = "kept"
 TRACED = {KEPT: None, "yes": True, "no": False}
 """Which code of a scene's sweeps is taken: that which was compiled for this model before; or now, if need be; none."""
+_ROWS, _STATE = re.compile(r"\b[Rr]ows? \[(\d+(?:, \d+)*)\]"), re.compile(r", q = \[[^]]*\], v = \[[^]]*\]")
+LONG = 16
+"""Most numbers of a state that a message shows."""
 SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
@@ -58,6 +62,8 @@ class ReferenceRun(Run):
     def motion(self) -> Trajectory:
         """Integrate from the start, whatever shapes meet that have no rows."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
+        if not trajectory.outcome.ok:
+            trajectory = replace(trajectory, message=by_name(trajectory.message, self.case.contacts))
         scene = self.case.scene if self.case.general else None
         return trajectory if scene is None else determined(scene, trajectory)
 
@@ -68,6 +74,24 @@ class ReferenceRun(Run):
             return own | listed(self.case.scene)
         told = getattr(module(self.case.mechanism), "listed", None)
         return own | (told(self.system.p) if told else {})
+
+
+def by_name(message: str, contacts: Sequence[str]) -> str:
+    """Return a message with the names of contacts for the numbers of rows, and without a long state.
+
+    Args:
+        message: of a run of the reference, which knows rows by number, with the state at its end.
+        contacts: names of the rows.
+    """
+
+    def named(found: re.Match[str]) -> str:
+        rows = [int(text) for text in found[1].split(",")]
+        return found[0] if max(rows) >= len(contacts) else f"{found[0]} ({', '.join(contacts[i] for i in rows)})"
+
+    state = _STATE.search(message)
+    if state is not None and state[0].count(",") > LONG:
+        message = message.replace(state[0], "; its state is the last of the motion")
+    return _ROWS.sub(named, message)
 
 
 def within_the_model(case: Case, run: Trajectory) -> Trajectory:
