@@ -761,7 +761,7 @@ def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     case = cases.from_file(write(tmp_path), "raised")
-    monkeypatch.setattr(jobs, "DEAR_S", 0.0)
+    monkeypatch.setattr(jobs, "DEAR", 0.0)
     wanted = [next(iter(jobs.picks([name]))) for name in ("pinocchio", "pinocchio:law")]
     every, asked = jobs.run_case(case, wanted).entries
     assert every.run is None

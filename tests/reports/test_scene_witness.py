@@ -64,7 +64,7 @@ def test_a_wrong_tree_is_seen(wrong: Callable[[Scene], Scene], arm: Case, monkey
 
 
 def test_where_there_is_no_witness_the_truth_says_why(arm: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(judging, "WITNESS_S", 0.0)
+    monkeypatch.setattr(judging, "OF_WITNESS", 0.0)
     said = judging.truth_of(arm).source
     assert "they share the equations of the mechanism alone (Pinocchio would share the scene alone, and take" in said
 
