@@ -76,7 +76,7 @@ def test_where_there_is_no_witness_the_truth_says_why(arm: Case, monkeypatch: py
         raise EngineUnavailable("Pinocchio is not installed.")
 
     monkeypatch.setattr("crossbody.engines.load", absent)
-    assert judging._witness(arm) == "Pinocchio is not installed"
+    assert judging._witness(arm, 40.0) == "Pinocchio is not installed"
 
 
 @pytest.mark.parametrize("seed", [pytest.param(k, marks=[pytest.mark.slow] if k > 1 else []) for k in range(8)])
