@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
+    "slip_times", "stick_times", "friction_impulse", "friction_work",
     "largest position (importer)", "largest event_times (importer)",
 })  # fmt: skip
 """Metrics that compare a motion with the truth's, or those of two readers of a file: rounding grows as the motion has
