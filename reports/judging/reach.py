@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from time import process_time
+from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import Case, Outcome, Trajectory
+
+if TYPE_CHECKING:
+    from crossbody.engines import Run
 
 BUDGET = 5.0
 """Time that the tightest run of a scene may take, s; its truth is about ten such runs."""
@@ -15,6 +20,8 @@ COARSE, LEAST, MANY = 1e-9, 50, 20
 of a method of order 8 the tightest takes 3 times as many, unless rounding is what its errors are made of."""
 LADDER = (1.0, 10.0)
 """Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
+FEW, FEWEST = 4, 200
+"""Steps that tell what one of an engine costs, and how many a run takes at least, with those that choose its method."""
 SHORTEST = 1e-3
 """Part of its horizon to which a motion is cut at most: one that gets no further stands still at an instant."""
 
@@ -85,3 +92,28 @@ def _run(case: Case, rtol: float, **bound: Any) -> Trajectory:
     prepared: Any = load("reference").prepare(case, "compiled", rtol=rtol, **bound)
     found: Trajectory = prepared.motion()
     return found
+
+
+def estimated(prepare: Callable[..., Run], part: float, most: float) -> tuple[float, int]:
+    """Return about what a run takes of one processor, s, without that of choosing its method, and its first steps.
+
+    Args:
+        prepare: prepares the first part of the run, with settings.
+        part: of the horizon.
+        most: beyond it the first part is not run either.
+    """
+    prepared = prepare()
+    if "max_steps" in prepared.settings:
+        one = {"method": "Adams"} if "method" in prepared.settings else {}
+        cost, steps = _timed(prepare(max_steps=FEW, **one))
+        if cost / max(steps, 1) * FEWEST > most:
+            return cost / max(steps, 1) * FEWEST, steps
+    cost, steps = _timed(prepared)
+    return cost / part, steps
+
+
+def _timed(run: Run) -> tuple[float, int]:
+    began = process_time()
+    found = run.run()
+    used, tried = (found.counts.get(name, 0) for name in ("rhs", "tried"))
+    return (process_time() - began) * used / max(used + tried, 1) if tried else process_time() - began, found.steps

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from time import process_time
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,11 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reports.judging.answers import Answers
-from crossbody.reports.judging.reach import BUDGET, Followed, followed, tight
+from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, tight
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, before, sample_times, shortened
-
-if TYPE_CHECKING:
-    from crossbody.engines import Run
 
 SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
@@ -184,23 +181,16 @@ def _witness(case: Case, limit: float) -> Trajectory | str:
 
     try:
         pinocchio = engines.load("pinocchio")
-        part, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
-        cost, steps = seconds(pinocchio.prepare(part, "law", rtol=rtol))
-        if cost > SHARE * limit:
-            return f"Pinocchio would share the scene alone, and take about {cost / SHARE:.0f} s"
-        most = max(1000, int(limit * steps / cost))  # contacts later on may want far more steps than the first part
+        first, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
+        cost, steps = estimated(partial(pinocchio.prepare, first, "law", rtol=rtol), SHARE, limit)
+        if cost > limit:
+            return f"Pinocchio would share the scene alone, and take about {cost:.0f} s"
+        # Contacts later on may want far more steps than the first part.
+        most = max(1000, int(limit * steps / (SHARE * cost)))
         run = pinocchio.prepare(case, "law", rtol=rtol, max_steps=most).run()
     except (EngineUnavailable, CaseUnsupported) as error:
         return str(error).removesuffix(".")
     return run if run.outcome.ok else f"Pinocchio ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
-
-
-def seconds(run: Run) -> tuple[float, int]:
-    """Return the time that a run takes of one processor, s, without that of choosing its method, and its steps."""
-    began = process_time()
-    found = run.run()
-    used, tried = (found.counts.get(name, 0) for name in ("rhs", "tried"))
-    return (process_time() - began) * used / max(used + tried, 1) if tried else process_time() - began, found.steps
 
 
 def _rechecked(truth: Truth, case: Case) -> Truth:

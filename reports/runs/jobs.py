@@ -26,8 +26,8 @@ from crossbody.cases.files.case import rubbing
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
-from crossbody.reports.judging.reach import BUDGET, followed
-from crossbody.reports.judging.truth import law_of, seconds, truth_of, with_both_sides
+from crossbody.reports.judging.reach import BUDGET, estimated, followed
+from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 
@@ -330,8 +330,8 @@ def _dear(case: Case, pick: Pick, asked: Mapping[str, Value], most: float) -> st
     """Return what a run of a scene would cost where that is too much, by its first part; else nothing."""
     if not case.general or (pick.engine, pick.profile) == ("reference", "compiled"):
         return ""
-    prepared = prepare(replace(case, t_end=FIRST * case.t_end), pick, asked)
-    cost = seconds(prepared)[0] / FIRST
+    first = replace(case, t_end=FIRST * case.t_end)
+    cost, _ = estimated(lambda **more: prepare(first, pick, {**asked, **more}), FIRST, most)
     if cost <= most:
         return ""
     who = f"-e {pick.engine}:{pick.profile}"

@@ -64,11 +64,11 @@ def test_a_wrong_tree_is_seen(wrong: Callable[[Scene], Scene], arm: Case, monkey
 
 
 def test_where_there_is_no_witness_the_truth_says_why(arm: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(judging, "seconds", lambda _: (1e3, 10))
+    monkeypatch.setattr(judging, "estimated", lambda *_: (2e4, 10))
     said = judging.truth_of(arm).source
     assert "they share the equations of the mechanism alone (Pinocchio would share the scene alone, and take" in said
 
-    monkeypatch.setattr(judging, "seconds", lambda _: (1.0, 10))
+    monkeypatch.setattr(judging, "estimated", lambda *_: (1.0, 10))
     long = replace(arm, t_end=500.0)  # its first part seemed cheap: a thousand steps are all that it is given
     assert str(judging._witness(long, 40.0)).startswith("Pinocchio ends step_limit at t = ")
 
