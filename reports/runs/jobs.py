@@ -52,6 +52,8 @@ taken to cost so many times as much."""
 FIRST, DEAR = 0.02, 12.0
 """Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
 unless its profile is asked for: engines that follow the law take their steps in Python."""
+COMPILED = ("reference", "compiled")
+"""Who follows what the truth has followed."""
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
 
@@ -301,14 +303,18 @@ def _entry(
 def _ran(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
 ) -> Entry:  # fmt: skip
-    if pick.every and (dear := _dear(case, pick, asked, DEAR * budget)):
+    most = DEAR * budget
+    if pick.every and (dear := _dear(case, pick, asked, most)):
         raise CaseUnsupported(dear)
-    prepared = prepare(case, pick, asked)
+    bounded = pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
+    prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
     shown = prepared.audit()
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     began = process_time()
     natural: Trajectory = prepared.run()
+    if bounded and natural.outcome is Outcome.TIME_LIMIT:
+        raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
     run = _dense(case, pick, prepared, natural, asked)
     studied = refine and natural.outcome.ok
@@ -328,14 +334,16 @@ def _ran(
 
 def _dear(case: Case, pick: Pick, asked: Mapping[str, Value], most: float) -> str:
     """Return what a run of a scene would cost where that is too much, by its first part; else nothing."""
-    if not case.general or (pick.engine, pick.profile) == ("reference", "compiled"):
+    if not case.general or (pick.engine, pick.profile) == COMPILED:
         return ""
     first = replace(case, t_end=FIRST * case.t_end)
     cost, _ = estimated(lambda **more: prepare(first, pick, {**asked, **more}), FIRST, most)
-    if cost <= most:
-        return ""
+    return "" if cost <= most else _too_dear(pick, f"about {cost:.0f} s")
+
+
+def _too_dear(pick: Pick, cost: str) -> str:
     who = f"-e {pick.engine}:{pick.profile}"
-    return f"Too dear: it would take about {cost:.0f} s. {who} runs it all the same, as does a larger --budget."
+    return f"Too dear: it would take {cost}. {who} runs it all the same, as does a larger --budget."
 
 
 def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:

@@ -771,6 +771,16 @@ def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
     assert asked.run.outcome is Outcome.FINISHED
 
 
+def test_a_run_that_seemed_cheap_and_is_not_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jobs, "DEAR", 1e-9)
+    monkeypatch.setattr(jobs, "estimated", lambda *_: (0.0, 1))
+    wanted = jobs.picks(["reference"])
+    ours, *others = jobs.run_case(cases.from_file(write(tmp_path), "raised"), wanted).entries
+    assert ours.run is not None
+    assert ours.run.outcome is Outcome.FINISHED
+    assert all("Too dear: it would take more than" in entry.skipped for entry in others)
+
+
 def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path) -> None:
     """`default` is that of shipped cases, and each sentence names the other."""
     engine, case, shipped = engines.load("mujoco"), cases.load(write(tmp_path), "raised"), cases.load("bouncing_ball")
