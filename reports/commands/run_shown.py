@@ -102,7 +102,7 @@ def _wrong(run: EngineRun, row: Row) -> str:
 def _lost(run: EngineRun, row: Row) -> str:
     expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
     value = f"{abs(row['value'] - expected):.4g}{_unit(row)} from what is claimed, band {row['band']:.3g}"
-    return f"more than a stored run gave: {run.label} {run.who} {row['metric']} {value}"
+    return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"
 
 
 def _unit(row: Row) -> str:

@@ -85,7 +85,7 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
     floors = _floors(traces, [unit for _, unit in names])
     shown = drawn(len(names))
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
-    sheet = Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points, group=2)
+    sheet = Sheet(rows, "Coordinates, and |difference from the truth|, impacts matched", points, group=2)
     for i, trace in enumerate(traces):
         t, q = filled(trace.run, trace.quaternions)
         for place, k in enumerate(shown):
@@ -109,7 +109,7 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     shown = drawn(len(contacts))
     each = ("lam {}\n[N]", "impulse\n[N s]", "|error|\n[N s]")
     rows = [text.format(contacts[k]) for k in shown for text in each]
-    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points, group=3)
+    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference from the truth|", points, group=3)
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
     floor = floor_of(summed[0])
     true = [None if trace.truth is None else with_collisions(trace.truth, traces[0].run.events) for trace in traces]
@@ -205,13 +205,13 @@ def note(name: str, traces: Sequence[Trace]) -> str:
 
 NOTES = {
     "motion": (
-        "Impacts are matched first and the arcs between them compared; how far impacts are off is the metric "
-        "event_times. Differences end at a common floor, the rounding of the largest value of that unit: below it "
-        "nothing is left to compare. Where a solver took long steps, a cubic through q and v of both ends is drawn."
+        "Impacts are matched first, and the arcs between them compared; the errors of their times are the metric "
+        "event_times. Differences are cut off at a common floor, the rounding error of the largest value of that unit. "
+        "Across long steps of a solver, a cubic through q and v at both ends is drawn."
     ),
     "force": (
-        "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that. "
-        "Collisions that take no time are steps of the impulse."
+        "A small delay of an impact changes lam at one instant a lot, but hardly its impulse: judge by the impulse. "
+        "Instantaneous collisions are steps of the impulse."
     ),
 }
 FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int, Limits], Figure]]] = {

@@ -16,8 +16,8 @@ from crossbody.reports.runs.thin import keep
 MOST = 1500
 """Points of one engine's line."""
 TEXT = (
-    "Of the contact that carries the most: force over how deep it is. A spring is a line, damping opens it to a loop "
-    "whose area is the energy lost; what pulls stands below zero."
+    "Force over penetration depth of the contact with the largest load. A spring gives a line; damping opens it to a "
+    "loop whose area is the energy lost. A force below zero pulls."
 )
 
 

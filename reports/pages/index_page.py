@@ -66,8 +66,8 @@ def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i:
         context={
             "corner": "Case", "heads": grid.heads(shown), "lines": [_line(found, case, shown) for case in cases],
             "pages": names, "here": i, "cases": len(found.cases), "wide": False, "filtered": len(cases) > 5,
-            "says": "A cell counts the rows of its worst verdict among those judged; below: relative error of "
-            "position, run time.",
+            "says": "Each cell shows how many of its judged rows have its worst verdict, and below, the relative error "
+            "of position and the run time.",
         },
     )  # fmt: skip
 

@@ -116,12 +116,12 @@ def watched(command: Callable[[], int]) -> int:
             number = os.WTERMSIG(status)
             return _say(f"the command was ended by {_name(number)}; please report it.{_advice(number)}", 3)
         _lost[label] = _why(os.WTERMSIG(status), _diary.read())
-        _say(f"{label}: {_lost[label]} The rest goes on without it.", 1)
+        _say(f"{label}: {_lost[label]} The others continue without it.", 1)
 
 
 def _why(number: int, told: dict[str, object]) -> str:
     if number == signal.SIGKILL and time.monotonic() >= float(str(told.get("until", "inf"))):
-        return f"It did not come back within {float(str(told['seconds'])):g} s and was ended; see --time-limit."
+        return f"It did not return within {float(str(told['seconds'])):g} s and was terminated; see --time-limit."
     return f"Its process was ended by {_name(number)}.{_advice(number)}"
 
 
@@ -129,7 +129,7 @@ def _advice(number: int) -> str:
     """What to do about a signal by which code of ours or of a user's kernels has crashed."""
     if number not in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGILL, signal.SIGFPE):
         return ""
-    return " If it runs kernels of your own, CROSSBODY_DEBUG=1 in the environment makes them check every index."
+    return " If it runs your own kernels, CROSSBODY_DEBUG=1 in the environment makes them check every index."
 
 
 def _name(number: int) -> str:

@@ -270,11 +270,11 @@ def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_p
     words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", limit)
     code, said = finished(begun("run", "balls.py", "--variant", "linear", *words, cwd=tmp_path))
     assert code == 1, said
-    assert f"fake:stuck: It did not come back within {limit} s and was ended" in said
+    assert f"fake:stuck: It did not return within {limit} s and was terminated" in said
     assert "fake:crash: Its process was ended by SIGSEGV" in said
     assert "CROSSBODY_DEBUG=1" in said
     rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet").set_index("profile")
-    for profile, why in (("stuck", "did not come back"), ("crash", "SIGSEGV")):
+    for profile, why in (("stuck", "did not return"), ("crash", "SIGSEGV")):
         mine = rows.loc[[profile]]
         assert (mine["verdict"] == "outside").any()
         assert mine["why"].str.contains(why).any()
@@ -287,9 +287,9 @@ def test_an_identification_that_never_comes_back_is_ended(tmp_path: Path) -> Non
     words = ("identify", "log.parquet", "-m", "ball", "-f", "a1", "--set", "a1=20", "--time-limit", "0.25")
     code, said = finished(begun(*words, cwd=tmp_path))  # waits less than an hour, which is what it may take unasked
     assert (code, said.count("\n")) == (2, 2)
-    assert "ball identified from log.parquet: It did not come back within 2.5 s and was ended" in said
+    assert "ball identified from log.parquet: It did not return within 2.5 s and was terminated" in said
     said = said.splitlines()[1]
-    assert said.startswith("crossbody: ball identified from log.parquet: It did not come back")
+    assert said.startswith("crossbody: ball identified from log.parquet: It did not return")
     assert not (tmp_path / "out").exists()
 
 
