@@ -102,7 +102,11 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
 @cli.command()
 @options.cases
 @click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
-@click.option("--full", is_flag=True, help="Every case and every rung of every ladder; without it, a selection that takes some minutes.")
+@click.option(
+    "--full",
+    is_flag=True,
+    help="Every case and every rung of every ladder; without it, a selection that takes some minutes.",
+)
 @click.option("--minutes", type=click.FloatRange(0.1), help="Approximate total time; ladders are shortened to meet it.")
 @click.option("--against", type=options.PATH, metavar="BASE", help="Folder of an earlier benchmark.")
 @click.option("--skip", "what", flag_value="skip", help="Instead: measure the work that a scene avoids.")
@@ -149,7 +153,9 @@ def stability(**asked: Any) -> int:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all draws.")
 @click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one per processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
-@click.option("--tls-ca", default="", metavar="FILE", help="Certificates (PEM) of the authorities that may sign the scheduler's.")
+@click.option(
+    "--tls-ca", default="", metavar="FILE", help="Certificates (PEM) of the authorities that may sign the scheduler's."
+)
 @click.option("--tls-cert", default="", metavar="FILE", help="Certificate (PEM) to present to the scheduler.")
 @click.option("--tls-key", default="", metavar="FILE", help="Key of --tls-cert, if it is not in the same file.")
 @click.option("--resume", is_flag=True, help="Continue the sweep in DIR, which must exist.")
@@ -216,10 +222,16 @@ def report(folder: Path, **asked: Any) -> int:
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @click.argument("out", metavar="FILE", type=options.PATH)
 @click.option("--case", "case", metavar="CASE:V", default="", help="Case and variant; the first if not given.")
-@click.option("--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Engine whose motion is drawn.")
-@click.option("--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Time of the picture, s.")
+@click.option(
+    "--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Engine whose motion is drawn."
+)
+@click.option(
+    "--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Time of the picture, s."
+)
 @click.option("--fps", type=options.ABOVE_0, default=25.0, show_default=True, help="Frames per second of a GIF.")
-@click.option("--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Speed of a GIF, as a multiple of real time.")
+@click.option(
+    "--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Speed of a GIF, as a multiple of real time."
+)
 @speaks
 def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps: float, speed: float) -> int:
     """Draw a motion of an earlier run: one instant (FILE.svg, FILE.png) or the whole motion (FILE.gif)."""
@@ -278,7 +290,9 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 
 @cli.command()
 @options.replayed
-@click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter to fit, or delay; repeatable.")
+@click.option(
+    "--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter to fit, or delay; repeatable."
+)
 @click.option("--hold", type=int, default=2, show_default=True, help="Hold every N-th window out of the fit; 0: none.")
 @click.option(
     "--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True,
@@ -367,12 +381,6 @@ def _obey(arguments: list[str] | None) -> int:
         return _say(error.format_message())
     except CrossbodyError as error:
         return 130 if stopping() else _say(str(error))
-    except BrokenPipeError:
-        return _enough()
-    except SystemExit:  # click's own answer to a pipe that is closed, whose streams it has wrapped
-        if type(sys.stdout).__name__.endswith("PacifyFlushWrapper"):
-            return _enough()
-        raise
     except Exception as error:
         if stopping():  # what is being imported may make an ImportError of it
             return 130
@@ -391,18 +399,12 @@ REFUSED = (
 """What the system may refuse whatever a program does, paths that a user gave among it."""
 
 
-def _enough() -> int:
-    """Whoever read what is printed has read enough: let the rest go nowhere, which is no fault."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    return 0
-
-
 def _drop_what_cannot_be_printed() -> None:
     """Let what waits for a full disk go nowhere: the end of the process would try it again."""
     try:
         sys.stdout.flush()
     except OSError:
-        _enough()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _say(text: str, code: int = 2) -> int:

@@ -104,7 +104,7 @@ def parameters(command: _Work) -> _Work:
             "--control", metavar="FILE.py:NAME",
             help="Robot file: your own callable (t, q, v) -> u, or a class of such callables.",
         ),
-        click.option("--tick", type=float, metavar="S", help="Time between two calls of --control, s; 1e-3 if not given."),
+        click.option("--tick", type=float, metavar="S", help="Time between calls of --control, s; 1e-3 if not given."),
         click.option(
             "--push", type=(str, *(float,) * 5), multiple=True, metavar="BODY FX FY FZ T0 T1",
             help="Robot file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
@@ -134,7 +134,7 @@ def replayed(command: _Work) -> _Work:
         memory,
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the model; repeatable."),
         click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
-        click.option("--horizon", type=float, metavar="S", help="Length of a window, s; to the next restart if not given."),
+        click.option("--horizon", type=float, metavar="S", help="Length of a window, s; if not to the next restart."),
         click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of the measurement, s."),
         click.option(
             "--limit", "limits", metavar="NAME=V", multiple=True,

@@ -97,7 +97,7 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
         return inside if single else f"{page}.html{inside if anchor else ''}"
 
     inline = {"style": _text("page.css"), "script": _script(), "plotly": _packed_plotly()} if single else {}
-    scripts = [THEME, *((_script(), _plotly()) if single else ())]
+    scripts = [THEME, *((_script(), _text(PLOTLY)) if single else ())]
     template = environment().get_template("page.html")
     return template.render(
         pages=pages, links=links, footer=footer, href=href, drawn=any(_drawn(page) for page in pages),
@@ -131,27 +131,21 @@ def policy(scripts: Sequence[str], single: bool) -> str:
 def assets(pages_drawn: bool) -> dict[str, str]:
     """The files that all pages of a folder share, by name."""
     shared = {SCRIPT: _script(), STYLE: _text("page.css")}
-    return shared | ({PLOTLY: _plotly()} if pages_drawn else {})
+    return shared | ({PLOTLY: _text(PLOTLY)} if pages_drawn else {})
 
 
 def _drawn(page: Page) -> bool:
     return any(section.plots for section in page.sections)
 
 
+@cache
 def _text(name: str) -> str:
     return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 @cache
-def _plotly() -> str:
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())
-
-
-@cache
 def _packed_plotly() -> str:
-    return packed_text(_plotly())
+    return packed_text(_text(PLOTLY))
 
 
 @cache

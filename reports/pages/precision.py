@@ -21,12 +21,12 @@ RUNS = (
     "run crossbody bench, then crossbody report --with."
 )
 ALL = (
-    "Every engine on every case, each at its own setting; lower left is better. Click a name in the legend to hide that "
-    "engine, double-click to show it alone."
+    "Every engine on every case, each at its own setting; lower left is better. Click a name in the legend to hide "
+    "that engine, double-click to show it alone."
 )
 LADDERS = (
-    "One line for each engine, with a point for every tolerance or step; lower left is better. Choose an error, then go "
-    "up: the lowest line there is the fastest engine for that accuracy."
+    "One line for each engine, with a point for every tolerance or step; lower left is better. Choose an error, then "
+    "go up: the lowest line there is the fastest engine for that accuracy."
 )
 
 

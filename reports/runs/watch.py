@@ -9,6 +9,7 @@ may. The command is then begun again without that run; what was complete is on d
 from __future__ import annotations
 
 import ctypes
+import io
 import json
 import mmap
 import os
@@ -20,6 +21,10 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
 
 GRACE = 0.6
 """Time that an interrupted command has to put its things in order, s."""
@@ -271,6 +276,7 @@ def _obey(command: Callable[[], int]) -> None:
     code = 3
     try:
         _die_with_parent()
+        sys.stdout, sys.stderr = _unread(sys.stdout), _unread(sys.stderr)
         signal.signal(signal.SIGINT, _stop_once)
         signal.signal(signal.SIGALRM, _stop_again)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -283,6 +289,29 @@ def _obey(command: Callable[[], int]) -> None:
         traceback.print_exc()
     finally:
         _leave(code)
+
+
+class _Pipe(io.FileIO):
+    """An output whose reader may leave: what is said then goes nowhere, and the command does its work all the same."""
+
+    def write(self, data: Buffer, /) -> int:
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            return super().write(data)
+
+
+def _unread(stream: TextIO) -> TextIO:
+    """Return a stream that nobody has to read to its end; the same one if it is no file of the system's."""
+    try:
+        raw = _Pipe(stream.fileno(), "wb", closefd=False)
+    except (AttributeError, OSError, ValueError):  # closed, or made by Python
+        return stream
+    stream.flush()
+    return io.TextIOWrapper(
+        io.BufferedWriter(raw), stream.encoding, stream.errors, line_buffering=stream is sys.stderr or raw.isatty()
+    )
 
 
 def _leave(code: int) -> None:
