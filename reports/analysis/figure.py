@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -101,9 +103,9 @@ def _frequencies(panels: Panels, unit: str, column: int = 1) -> None:
 def map_figure(rows: pd.DataFrame) -> Figure:
     """Largest real part of the poles over the workspace, and the line where it is 0; z points down."""
     table = rows.pivot(index="z", columns="x", values="growth")
-    grid = {"x": table.columns.to_numpy(), "y": table.index.to_numpy(), "z": table.to_numpy()}
+    grid: dict[str, Any] = {"x": table.columns.to_numpy(), "y": table.index.to_numpy(), "z": table.to_numpy()}
     bound = float(np.nanmax(np.abs(grid["z"]))) if np.isfinite(grid["z"]).any() else 1.0
-    colours = {"colorscale": "RdBu", "reversescale": True, "zmin": -bound, "zmax": bound}
+    colours: dict[str, Any] = {"colorscale": "RdBu", "reversescale": True, "zmin": -bound, "zmax": bound}
     panels = Panels("Open-loop stability under constant torques", 620)
     panels.add(**grid, **colours, type="heatmap", colorbar={"title": {"text": "growth [1/s]"}})
     zero = {"start": 0, "end": 0, "size": 1, "coloring": "none"}

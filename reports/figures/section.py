@@ -18,8 +18,8 @@ class Written(Protocol):
         """Return data and layout."""
 
 
-Figure: TypeAlias = dict[str, Any] | Written
-"""Data and layout as plain values for plotly.js, of traces in x and y (its bundle `cartesian`); or such a figure."""
+Figure: TypeAlias = dict[str, Any]
+"""Data and layout as plain values for plotly.js, of traces in x and y (its bundle `cartesian`)."""
 
 
 class Kind(StrEnum):
@@ -77,7 +77,7 @@ class Plot:
     """
 
     name: str
-    figure: Figure
+    figure: Figure | Written
     time: bool = False
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from crossbody.reports.figures.section import Figure, Kind, Section
+from crossbody.reports.figures.section import Figure, Kind, Section, Written
 from crossbody.reports.pages.packing import packed_text, packed_value
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -153,7 +153,7 @@ def _script() -> str:
     return "\n".join(_text(name) for name in PARTS)
 
 
-def plot(figure: Figure) -> dict[str, Any]:
+def plot(figure: Figure | Written) -> dict[str, Any]:
     """A figure as plain values, with its title and height taken out of it; the page gives it its colours."""
     made: dict[str, Any] = figure if isinstance(figure, dict) else json.loads(figure.to_json(engine="json"))
     layout = {key: value for key, value in made["layout"].items() if key not in ("title", "template")}
