@@ -59,11 +59,13 @@ def show_time(clock: Sequence[float], times: Times) -> None:
         clock: when runs, verdicts and pages began, and when all ended, s.
         times: of every run; those of cases at once, or of an earlier attempt, are no parts of this time.
     """
-    spent = Counter[str]()
+    spent: dict[str, float] = {}
     for (_, who), (_, whole) in times.items():
-        spent[who.partition(":")[0]] += whole or 0.0
+        spent[who.partition(":")[0]] = spent.get(who.partition(":")[0], 0.0) + (whole or 0.0)
     runs, verdicts, pages = (later - earlier for earlier, later in pairwise(clock))
-    parts = [f"{who} {seconds:.1f}" for who, seconds in spent.most_common() if seconds >= 0.05]
+    parts = [
+        f"{who} {seconds:.1f}" for who, seconds in sorted(spent.items(), key=lambda one: -one[1]) if seconds >= 0.05
+    ]
     rest = runs - sum(spent.values())
     told = f" ({', '.join([*parts, f'truths {rest:.1f}'])})" if parts and rest >= 0.0 else ""
     total = clock[-1] - clock[0]

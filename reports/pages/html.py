@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from crossbody.reports.figures.section import Figure, Kind, Section, Written
+from crossbody.reports.figures.section import Column, Figure, Kind, Section, Table, Written
 from crossbody.reports.pages.packing import packed_text, packed_value
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -70,6 +70,7 @@ def environment() -> Environment:
         "number": number,
         "bounded": bounded,
         "slug": slug,
+        "told": told,
         "plot": plot,
         "text_packed": packed_text,
         "value_packed": packed_value,
@@ -183,6 +184,14 @@ def bounded(value: float | None, known: float | None) -> tuple[str, float]:
     """Return a sign and what a number is known to where it is below that, else nothing and the number."""
     number, limit = (math.nan if x is None else x for x in (value, known))
     return ("< ", limit) if abs(number) < limit else ("", number)
+
+
+def told(table: Table) -> list[Column]:
+    """Columns in which some row has a value; all where there are no rows."""
+    known = [row.get(column.key) for column in table.columns for row in table.rows]
+    empty = [all(v is None or v == "" or v != v for v in known[i * len(table.rows) : (i + 1) * len(table.rows)])
+             for i in range(len(table.columns))]  # fmt: skip
+    return [column for column, nothing in zip(table.columns, empty, strict=True) if not (nothing and table.rows)]
 
 
 def number(value: Any) -> str:

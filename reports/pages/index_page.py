@@ -111,7 +111,11 @@ def _tiles(found: Results) -> dict[str, Any]:
     failed = sum(row["metric"] == "audit" and row["verdict"] == Word.OUTSIDE for row in found.verdicts)
     tiles = [
         {"value": len(found.cases), "title": "cases", "word": ""},
-        {"value": len({row["who"] for row in found.verdicts}), "title": "engines with profile", "word": ""},
+        {
+            "value": len({row["who"] for row in found.verdicts if row["engine"] != TRUTH}),
+            "title": "engines with profile",
+            "word": "",
+        },
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if failed:

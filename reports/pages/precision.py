@@ -86,7 +86,8 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
     ]  # fmt: skip
     every = [one for mine in points.values() for one in mine]
     layout = {
-        "title": {"text": "Run time against error of position, a mark a case"}, "height": 460, "showlegend": True,
+        "title": {"text": "Run time against error of position, one mark for each case"}, "height": 460,
+        "showlegend": True,
         "xaxis": _decades("relative error of position", [error for _, error, _ in every]),
         "yaxis": _decades("run time [ms]", [ms for *_, ms in every]),
     }  # fmt: skip

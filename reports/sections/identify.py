@@ -13,7 +13,8 @@ from crossbody.reports.runs.study import read_json
 
 TITLE = "Identification"
 ESTIMATES = columns(
-    name="Parameter", value=("Estimate", Kind.NUMBER), low=("95 % from", Kind.NUMBER), high=("to", Kind.NUMBER),
+    name="Parameter", value=("Estimate", Kind.NUMBER),
+    half=("± (95 %)", Kind.NUMBER), low=("From", Kind.NUMBER), high=("to", Kind.NUMBER),
     unit="Unit", start=("Start", Kind.NUMBER), identifiable="Identifiable",
     first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
 )  # fmt: skip
@@ -36,6 +37,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     from crossbody.reports.replay import figure
 
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
+    estimates["half"] = (estimates["high"] - estimates["low"]) / 2.0
     told = read_json(out / "identify.json")["provenance"]["fit"]
     tables = (
         Table(title="Estimates", columns=ESTIMATES, rows=records(_only(estimates, ESTIMATES)), file="identify.csv"),
