@@ -6,13 +6,14 @@ import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 
 import click
 
 from crossbody.cases import Case, InvalidValue, installed
 from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports import voice
-from crossbody.reports.commands.run_shown import counted, show
+from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.reach import BUDGET
@@ -51,6 +52,7 @@ def run(
     output.check(out, "run")
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
+    clock = [perf_counter()]
     decides = identity("run", cases, names, picks=picks, rtol=rtol, settings=asked, budget=budget)
     with Parts(out, command, decides) as parts:
 
@@ -67,13 +69,17 @@ def run(
         with progress(len(cases) * (len(picks) + 1)) as tell:
             for i in _missing(cases, parts):
                 do(i, tell)
+        clock.append(perf_counter())
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
             # Pages take longer than all but the engines: what they show is told before them, and lost by nothing.
             untold = _tell(rows, made, controlled=any(case.control is not None for case in cases))
+            clock.append(perf_counter())
             site.write(made, against=against, others=others)
     if untold is not None:
         raise untold
+    if not voice.silent():
+        show_time([*clock, perf_counter()], results.times_of(out))
     where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
