@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mechanisms import ball
@@ -83,6 +85,23 @@ def test_every_kind_of_event(scene):
 
     fd = differences(end, x[moved], step)
     assert np.abs(found.by_start[:, moved] - fd).max() < 1e-6 * np.abs(fd).max()
+
+
+@pytest.mark.parametrize("scene", ["red body", "red body, frozen"])
+def test_every_kind_of_event_by_parameters(scene):
+    """Inertias are in every map by which velocities jump, and in no start; the wall is in a guard."""
+    name, changed, t_end, step = SCENES[scene]
+    case = cases.load(name, **changed)
+    system, rule = analyse.build(case), {"collisions": case.collisions}
+    which = ["mass", "inertia", "gravity", "wall"]
+    found = sensitivity(system, case.q0, case.v0, t_end, parameters=which, **rule)
+
+    def end(part):
+        given = {**system.parameters, **dict(zip(which, part.tolist(), strict=True))}
+        return ends(replace(system, parameters=given), case.q0, case.v0, t_end, **rule)
+
+    fd = differences(end, np.array([system.parameters[one] for one in which]), step)
+    assert np.abs(found.by_parameters - fd).max() < 1e-5 * np.abs(fd).max()
 
 
 def test_monodromy_of_a_bounce_without_loss():
