@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from unpacked import numbers
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome, SceneError, Trajectory, UnknownName
@@ -604,11 +605,11 @@ def test_a_map_of_engines_that_fail_has_crosses_without_a_colour(tmp_path: Path)
     )  # fmt: skip
     cells.to_json(tmp_path / "cells.json")
     for known in (cells, pd.read_json(tmp_path / "cells.json"), cells.astype(object).where(cells.notna(), None)):
-        field, failed = stress_map(known).data
-        assert list(field.x) == [1e2, 1e8]
-        np.testing.assert_allclose(np.asarray(field.marker.color, float), [-3.0, math.log10(2.0)])
-        assert list(failed.x) == [1e8, 1e10, 1e12]
-        assert "0 of 4 finished; diverged 2" in failed.text[1]
+        field, failed = stress_map(known)["data"]
+        assert list(numbers(field["x"])) == [1e2, 1e8]
+        np.testing.assert_allclose(numbers(field["marker"]["color"]), [-3.0, math.log10(2.0)])
+        assert list(numbers(failed["x"])) == [1e8, 1e10, 1e12]
+        assert "0 of 4 finished; diverged 2" in failed["text"][1]
 
 
 def test_the_colour_of_an_error_ends_where_the_scale_does() -> None:
@@ -619,8 +620,8 @@ def test_the_colour_of_an_error_ends_where_the_scale_does() -> None:
          for a0, error in ((1e2, 0.0), (1e4, 1e-6), (1e6, math.inf))],
         columns=list(MAP),
     )  # fmt: skip
-    field, _ = stress_map(cells).data
-    np.testing.assert_allclose(np.asarray(field.marker.color, float), [BEST, -6.0, WORST])
+    field, _ = stress_map(cells)["data"]
+    np.testing.assert_allclose(numbers(field["marker"]["color"]), [BEST, -6.0, WORST])
 
 
 @pytest.mark.parametrize("name", suites.names())
