@@ -24,7 +24,7 @@ from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import watch
-from crossbody.reports.runs.jobs import Pick, of_case
+from crossbody.reports.runs.choice import Pick, of_case
 
 COLUMNS = (
     "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "touches",
