@@ -19,7 +19,8 @@ from crossbody.reports.judging.reach import LEAST, MANY, SHORTEST, cut_short, fo
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.truth import Truth, from_run, shortened
-from crossbody.reports.runs.jobs import picks, run_case
+from crossbody.reports.runs.choice import picks
+from crossbody.reports.runs.jobs import run_case
 
 INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
 
