@@ -180,7 +180,7 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
         told.append(f"It must be trusted to {until:.4g} s.")
     if truth.part < 1.0:
         asked = case.t_end / truth.part
-        told.append(f"Followed to {case.t_end:.4g} s of {asked:.4g} s: more takes longer than --budget allows.")
+        told.append(f"Followed to {case.t_end:.4g} s of {asked:.4g} s: {truth.short}.")
     return [Verdict(
         case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",
         limit=truth.allowed, tier=truth.tier.value, why=" ".join(told), command=command,

@@ -22,6 +22,13 @@ LADDER = (1.0, 10.0)
 """Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
 FEW, FEWEST = 4, 200
 """Steps that tell what one of an engine costs, and how many a run takes at least, with those that choose its method."""
+SHORT = {
+    Outcome.TIME_LIMIT: "more takes longer than --budget allows",
+    Outcome.PAINLEVE: "rigid bodies with dry friction have no motion beyond (Painleve)",
+}
+"""Ends of the tightest run up to which a motion is compared all the same, and why not further."""
+BEFORE = 1e-6
+"""Part of the time that such a run got to by which its horizon is shorter at least."""
 SHORTEST = 1e-3
 """Part of its horizon to which a motion is cut at most: one that gets no further stands still at an instant."""
 
@@ -34,11 +41,13 @@ class Followed:
         case: with the tightest tolerance that rounding leaves it, and the horizon that was reached.
         motion: at that tolerance.
         part: of the horizon that was asked for.
+        why: no further; empty if to the horizon.
     """
 
     case: Case
     motion: Trajectory
     part: float = 1.0
+    why: str = ""
 
 
 def followed(case: Case, budget: float = BUDGET) -> Followed:
@@ -61,16 +70,16 @@ def followed(case: Case, budget: float = BUDGET) -> Followed:
         motion = tight(tried, time_limit=budget, **bound)
         if motion.outcome is not Outcome.STEP_LIMIT:
             break
-    last = cut_short(tried, motion)
+    last, ended = cut_short(tried, motion), coarse if cut is not case else motion
     if last is not tried:
-        motion = tight(last)
-    return Followed(last, motion, last.t_end / case.t_end)
+        motion, ended = tight(last), motion
+    return Followed(last, motion, last.t_end / case.t_end, SHORT[ended.outcome] if last.t_end < case.t_end else "")
 
 
 def cut_short(case: Case, run: Trajectory) -> Case:
-    """Return a case whose horizon ends where a run had to be ended, at two digits; as it is where it had not."""
-    reached = float(run.t[-1]) if len(run.t) else 0.0
-    if run.outcome is not Outcome.TIME_LIMIT or reached < SHORTEST * case.t_end:
+    """Return a case whose horizon, of two digits, ends before a run did for a reason in `SHORT`; else as it is."""
+    reached = (1.0 - BEFORE) * float(run.t[-1]) if len(run.t) else 0.0
+    if run.outcome not in SHORT or reached < SHORTEST * case.t_end:
         return case
     digit = 10.0 ** (math.floor(math.log10(reached)) - 1)
     t_end = float(f"{math.floor(reached / digit) * digit:.2g}")

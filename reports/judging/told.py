@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,8 @@ from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
+FOLLOWED = re.compile(r"Followed to .*?: (.*?)\.(?: |$)")
+"""What the row of a truth says of a horizon that is shorter than was asked for."""
 NAMED = 3
 """Runs that the sentence names."""
 
@@ -103,8 +106,8 @@ def sentence(runs: Sequence[EngineRun]) -> str:
 
 
 def _part(row: Row) -> str:
-    long = " (more takes longer than --budget allows)" if "--budget" in row["why"] else ""
-    return f"{row['compared']:.2g} of the horizon{long}"
+    short = FOLLOWED.search(row["why"])
+    return f"{row['compared']:.2g} of the horizon" + (f" ({short[1]})" if short else "")
 
 
 def _named(texts: Sequence[str]) -> str:

@@ -64,7 +64,7 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
         case, first = known.case, known.motion
         apart = case.fsm == "level" and engines.load("reference").why_not(case, "cvode") is None
         found = _integrated(case, first, "cvode" if apart else "compiled", budget=budget)
-        return replace(found, part=known.part)
+        return replace(found, part=known.part, short=known.why)
     motion = case.closed_form
     first = motion(np.zeros(1))
     truth = Truth(

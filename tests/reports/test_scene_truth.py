@@ -15,7 +15,7 @@ from crossbody.cases import Case, Outcome, Tier, Trajectory
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
-from crossbody.reports.judging.reach import LEAST, MANY, SHORTEST, cut_short, followed
+from crossbody.reports.judging.reach import BEFORE, LEAST, MANY, SHORT, SHORTEST, cut_short, followed
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.truth import Truth, from_run, shortened
@@ -177,16 +177,15 @@ def test_a_motion_that_takes_too_long_is_compared_as_far_as_it_is_followed() -> 
     np.testing.assert_array_equal(found.truth.trajectory.q[-1], own.q[-1])
 
 
-@pytest.mark.parametrize("outcome", [Outcome.TIME_LIMIT, Outcome.STEP_LIMIT, Outcome.FINISHED])
+@pytest.mark.parametrize("outcome", [*SHORT, Outcome.STEP_LIMIT, Outcome.MODE_CYCLE, Outcome.FINISHED])
 @given(reached=st.floats(0.0, 1.0), t_end=st.floats(1e-3, 1e3))
 def test_a_horizon_is_cut_at_two_digits_below_what_was_reached(outcome: Outcome, reached: float, t_end: float) -> None:
     case = pendulum(1.0, False, 1.0, t_end)
     run = engines.load("reference").prepare(replace(case, t_end=1e-6), "compiled").run()
     until = np.array([0.0, reached * t_end])
     found = cut_short(case, replace(run, t=until, outcome=outcome))
-    if outcome is not Outcome.TIME_LIMIT or reached * t_end < SHORTEST * t_end:
+    if outcome not in SHORT or (1.0 - BEFORE) * until[-1] < SHORTEST * t_end:
         assert found is case
         return
     assert found.t_end == float(f"{found.t_end:.2g}")
-    assert 0.9 * until[-1] < found.t_end * (1.0 + 1e-12)
-    assert found.t_end <= until[-1] * (1.0 + 1e-12)
+    assert 0.9 * until[-1] < found.t_end < until[-1]
