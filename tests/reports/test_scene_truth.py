@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from four_bars import four_bar
+from friction_scenes import rod_on_floor
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,6 +19,7 @@ from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
 from crossbody.reports.judging.reach import BEFORE, LEAST, MANY, SHORT, SHORTEST, cut_short, followed
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.truth import Truth, from_run, shortened
 from crossbody.reports.runs.choice import picks
 from crossbody.reports.runs.jobs import run_case
@@ -175,6 +177,20 @@ def test_a_motion_that_takes_too_long_is_compared_as_far_as_it_is_followed() -> 
     assert found.entries[0].run.t[-1] <= reached
     own = followed(replace(case, t_end=reached)).motion
     np.testing.assert_array_equal(found.truth.trajectory.q[-1], own.q[-1])
+
+
+def test_a_motion_is_compared_up_to_where_the_law_has_none_further() -> None:
+    """Painleve's rod, which no force holds open: what engines do before is judged."""
+    case = cases.from_scene(rod_on_floor(1.6), q0=[0.0, 0.5 * np.cos(0.5) + 0.05, -0.5], v0=[1.5, 0.0, 0.0], t_end=0.3)
+    whole = engines.load("reference").prepare(case, "compiled").run()
+    found = run_case(case, picks(("reference:compiled", "mujoco:default")), refine=False)
+    assert whole.outcome is Outcome.PAINLEVE
+    assert 0.9 * whole.t[-1] < found.case.t_end < whole.t[-1]
+    (row,) = truth_row(found.case, found.truth, "")
+    assert row.verdict == Word.WITHIN
+    assert "(rigid bodies with dry friction have no motion beyond (Painleve))" in sentence(runs_of([row.row()]))
+    ended = [entry.run.outcome for entry in found.entries if entry.run is not None]
+    assert ended[0] is Outcome.FINISHED
 
 
 @pytest.mark.parametrize("outcome", [*SHORT, Outcome.STEP_LIMIT, Outcome.MODE_CYCLE, Outcome.FINISHED])
