@@ -87,6 +87,10 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
     "--jobs", type=click.IntRange(0, 1024), default=1, show_default=True, metavar="J",
     help="Cases at once, in processes; 0: one per processor. Run times then include the mutual slowdown.",
 )  # fmt: skip
+@click.option(
+    "--budget", type=options.ABOVE_0, default=5.0, show_default=True, metavar="S",
+    help="Time of a scene's tightest run: its motion is compared as far as that gets; engines may take twelve of it.",
+)  # fmt: skip
 @options.engine_limit
 @options.against
 @options.others

@@ -16,6 +16,7 @@ from crossbody.reports import voice
 from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging.audit import SEED
+from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Row, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results, site
@@ -29,14 +30,14 @@ from crossbody.reports.voice import progress
 def run(
     cases: Sequence[Case], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str], out: Path,
     rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
-    limit: float = LIMIT, strict: bool = False, at_once: int = 1,
+    limit: float = LIMIT, strict: bool = False, at_once: int = 1, budget: float = BUDGET,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
     `cases` are those of `names`, with the parameters of `pairs`; `against` is the folder of an earlier run, which may
     be `out` itself; `others` those of studies beside this one; `limit` is the time that an engine may take for one
     case, s; `strict` makes a number wrong that left its regression band; `at_once` is how many cases are run at once,
-    in processes of their own.
+    in processes of their own; `budget` is how long the tightest run of a scene may take, s.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -51,12 +52,14 @@ def run(
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
     clock = [perf_counter()]
-    with Parts(out, command, identity("run", cases, names, picks=picks, rtol=rtol, settings=asked)) as parts:
+    decides = identity("run", cases, names, picks=picks, rtol=rtol, settings=asked, budget=budget)
+    with Parts(out, command, decides) as parts:
 
         def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
-            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit)
+            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit, budget=budget)
+            again = pairs if result.case.t_end == cases[i].t_end else (*pairs, f"t_end={result.case.t_end:g}")
             with parts.put(key(i, cases[i])) as made:
-                rows = study.write_case(made, result, repeat(cases[i], names, pairs, rtol, settings))
+                rows = study.write_case(made, result, repeat(cases[i], names, again, rtol, settings))
             if len(cases) > 1:
                 voice.note(f"{cases[i].label}: {counted(rows)}")
             return 0

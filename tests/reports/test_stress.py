@@ -31,7 +31,7 @@ from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
 from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, row
 from crossbody.reports.sweep.map import MAP, stability_map, summary
-from crossbody.reports.sweep.measure import Asked, Error, error, instants
+from crossbody.reports.sweep.measure import Asked, Error, error, instants, residual
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.together import together
@@ -642,3 +642,16 @@ def test_an_account_alone_is_a_word_of_its_own() -> None:
     ended = Tried(outcome=Outcome.FINISHED.value)
     words = {text: _verdict(spec, ended, error, 1e-6, 1e-9, [])[0] for text, error in errors.items()}
     assert words == {"truth": Word.WITHIN, "account": Word.LEDGER, "wrong": Word.OUTSIDE}
+
+
+@pytest.mark.parametrize("account", ["contact", "input", "dissipated"])
+@pytest.mark.parametrize("place", [1, 25, 49])
+def test_an_account_is_as_open_as_its_worst_sample(account: str, place: int) -> None:
+    run = exact()
+    assert run.ledger is not None
+    assert residual(run) < 1e-12
+    booked = getattr(run.ledger, account).copy()
+    turned = max(float(run.energy[:, 0].max()), float(np.ptp(run.energy[:, 1])), float(np.ptp(run.ledger.contact)))
+    booked[place] += 1e-3 * turned
+    wrong = replace(run, ledger=replace(run.ledger, **{account: booked}))
+    assert residual(wrong) == pytest.approx(1e-3, rel=2e-3)
