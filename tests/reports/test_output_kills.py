@@ -181,7 +181,7 @@ def test_what_a_killed_command_left_is_told(tmp_path: Path, capsys: pytest.Captu
     put(tmp_path / "out", "old")
     (tmp_path / "out" / ".crossbody-new.run.x").mkdir()
     check(tmp_path / "out", "run")
-    assert "half-written tables of an interrupted command are taken away" in capsys.readouterr().err
+    assert "half-written tables of an interrupted command are removed" in capsys.readouterr().err
     assert content(tmp_path / "out") == dict.fromkeys(FILES["old"], "old")
 
 
