@@ -205,7 +205,7 @@ def test_verdicts_of_another_command_are_not_replaced(tmp_path: Path) -> None:
 def test_a_file_of_the_users_is_not_written_over(tmp_path: Path) -> None:
     put(tmp_path / "out", "old")
     (tmp_path / "out" / "b.json").write_text("by hand")
-    with pytest.raises(OutputError, match="not crossbody's own; the results are in"):
+    with pytest.raises(OutputError, match="not written by crossbody; the results are in"):
         put(tmp_path / "out", "new")
     left = content(tmp_path / "out")
     assert left["b.json"] == "by hand"
