@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from crossbody import cases, engines
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Mode, Outcome, Tier, Trajectory, UnknownName, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports import metrics
+from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.parts import PARTS
 from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.measuring.truth import Truth
@@ -290,6 +294,27 @@ def test_a_shipped_run_stays_in_its_regression_bands(recorded: Recorded, scene: 
     rows = judged(case, [entries[who]], truth, "")
     assert sum(row.regression == Regression.KEPT for row in rows) > 8
     assert [row.metric for row in rows if row.regression == Regression.LOST] == []
+
+
+def test_every_number_of_a_run_has_a_band(recorded: Recorded) -> None:
+    """Also what nobody judges: it is seen to move."""
+    rows = [row for case, truth, entries in recorded.values() for row in judged(case, [*entries.values()], truth, "")]
+    parts = tuple(f"({part})" for part in PARTS)
+    told = [row for row in rows if not math.isnan(row.value) and not row.metric.endswith(parts)]
+    bare = {row.metric for row in told if math.isnan(row.band)}
+    assert bare == {"truth", "finished", "audit"}
+
+
+@pytest.mark.parametrize("label", [f"{name}:{variant}" for name in cases.names() for variant in cases.variants(name)])
+def test_every_run_of_a_shipped_case_is_stored(label: str) -> None:
+    case = load(*label.split(":"))
+    bare = [
+        f"{pick.engine}:{pick.profile}"
+        for pick in choice.picks(["reference", "mujoco", "pinocchio", "exudyn", "dart", "pymunk"])
+        if engines.load(pick.engine).why_not(case, pick.profile) is None
+        and not stored.differing(case, Entry(engine=pick.engine, profile=pick.profile))
+    ]
+    assert bare == []
 
 
 def test_a_number_that_left_its_band_is_wrong_if_that_is_asked_for(recorded: Recorded) -> None:
