@@ -309,13 +309,13 @@ def rig() -> None:
     figure, axes = plots(2, sharex=True, height_ratios=(2, 1))
     for name, parameters, dash in (("at the start", None, "--"), ("identified", fit.parameters, "-")):
         found = hw.replay(log, "single_pendulum", restart=2.0, parameters=parameters)
-        colour, at = ("C0" if parameters else "C1"), slice(None, None, 10)
+        colour, at = ("C0" if parameters else "C1"), slice(None, None, 16)
         for k, (window, y) in enumerate(zip(found.windows, found.predictions[0].y, strict=True)):
             axes[0, 0].plot(window.t[at], y[at, 0], dash, color=colour, label=name if k == 0 else None, lw=1.2)
             axes[1, 0].plot(window.t[at], (window.y[:, 0] - y[:, 0])[at], dash, color=colour, lw=0.8)
     for k, window in enumerate(found.windows):
         label = "measured" if k == 0 else None
-        axes[0, 0].plot(window.t[::20], window.y[::20, 0], ".", color="black", ms=3, label=label)
+        axes[0, 0].plot(window.t[::40], window.y[::40, 0], ".", color="black", ms=3, label=label)
     axes[0, 0].set(ylabel="th1 [rad]")
     axes[1, 0].set(ylabel="measured - predicted [rad]", xlabel="time [s]")
     axes[0, 0].legend(frameon=False, ncols=3)

@@ -80,7 +80,7 @@ class Budget:
             raise LogFormatError(self._path, text)
         self._spent += decoded
         if self._spent > self.most:
-            raise LogFormatError(self._path, f"unfolds to more than {_shown(self.most)}; {self._hint(self.most)}")
+            raise LogFormatError(self._path, f"decompresses to more than {_shown(self.most)}; {self._hint(self.most)}")
 
     @contextmanager
     def guard(self) -> Iterator[None]:

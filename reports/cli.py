@@ -60,7 +60,10 @@ def cli() -> None:
 @click.argument("name", metavar="[CASE or ENGINE]", required=False)
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
 def list_(name: str | None, plain: bool) -> None:
-    """List cases, engines, metrics, stress suites and models of logs; or the details of CASE or ENGINE."""
+    """List all names, or the details of CASE or ENGINE.
+
+    Names are those of cases, engines, metrics, stress suites and models of logs.
+    """
     from crossbody.reports import described
 
     told = described.everything() if name is None else described.one(name)
@@ -89,7 +92,7 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 )  # fmt: skip
 @click.option(
     "--budget", type=options.ABOVE_0, default=5.0, show_default=True, metavar="S",
-    help="Time of a scene's tightest run: its motion is compared as far as that gets; engines may take twelve of it.",
+    help="Time for the tightest run of a scene; motions are compared as far as it gets. Engines may take 12 times it.",
 )  # fmt: skip
 @options.engine_limit
 @options.against
@@ -121,7 +124,9 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
 @options.engine_limit
 @speaks
 def bench(what: str | None, **asked: Any) -> int:
-    """Time engines against their error over ladders of tolerances and steps.
+    """Measure run time against error.
+
+    Engines climb ladders of tolerances and steps.
 
     With --against the exit code is 1 if accuracy or a ratio of run times was lost.
     """
@@ -140,7 +145,10 @@ def bench(what: str | None, **asked: Any) -> int:
 @options.out()
 @speaks
 def gapmap(**asked: Any) -> int:
-    """Map the energy created in Newton's cradle, and its pattern, over the gap between the balls."""
+    """Map Newton's cradle over the gap between its balls.
+
+    The map shows the energy created and the distance from the ideal pattern.
+    """
     return _do("maps.gap_map", **asked, command=options.command())
 
 
@@ -149,7 +157,7 @@ def gapmap(**asked: Any) -> int:
 @options.out()
 @speaks
 def stability(**asked: Any) -> int:
-    """Map the starts from which the closed-loop ball maze reaches its centre."""
+    """Map when the closed-loop ball maze reaches its centre."""
     return _do("maps.stability_map", **asked, command=options.command())
 
 
@@ -170,7 +178,9 @@ def stability(**asked: Any) -> int:
 @options.parameters
 @speaks
 def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) -> int:
-    """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
+    """Run extreme scenes, and shrink every failure.
+
+    The pages map where each engine stays finite and accurate.
 
     A SUITE may be your own case or a robot file, whose laws, pushes and parameters are then varied.
     An interrupted sweep continues when the same command is repeated.
@@ -188,7 +198,10 @@ def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) ->
 @options.out()
 @speaks
 def bode(**asked: Any) -> int:
-    """Compute frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
+    """Compute frequency responses of a case.
+
+    The case soft_contact has them, about its equilibrium, with and without feedback.
+    """
     return _do("analyse.bode", **asked, command=options.command())
 
 
@@ -203,7 +216,10 @@ def bode(**asked: Any) -> int:
 @click.option("--out", type=options.PATH, metavar="DIR", help="Folder for tables and figures.")
 @speaks
 def analyse(**asked: Any) -> int:
-    """Find the equilibria of a case, and their linear models, poles, ranks, responses and maps."""
+    """Find equilibria of a case and their linear models.
+
+    For each: poles, ranks, responses, and maps over a parameter or the workspace.
+    """
     return _do("analyse.analyse", **asked, command=options.command())
 
 
@@ -241,7 +257,10 @@ def report(folder: Path, **asked: Any) -> int:
 )
 @speaks
 def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps: float, speed: float) -> int:
-    """Draw a motion of an earlier run: one instant (FILE.svg, FILE.png) or the whole motion (FILE.gif)."""
+    """Draw a motion of an earlier run.
+
+    FILE.svg or FILE.png shows one instant, FILE.gif the whole motion.
+    """
     from crossbody.reports.pages import picture as drawing
     from crossbody.reports.pages.results import motion
 
@@ -264,7 +283,10 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps
 @click.option("--markdown", type=options.PATH, metavar="F", help="Also write a summary in Markdown.")
 @speaks
 def audit(file: Path, limit: float, **asked: Any) -> int:
-    """Check whether every engine's own reader builds the same robot from FILE (MJCF or URDF); if not, where and why."""
+    """Check whether engines read the same robot from FILE.
+
+    FILE is MJCF or URDF, read by every engine's own reader; differences are listed with their place and cause.
+    """
     from crossbody.reports.commands.audit import Ask
 
     return _do("audit.audit", Ask(path=file, seconds=limit, **asked))
@@ -277,7 +299,10 @@ def audit(file: Path, limit: float, **asked: Any) -> int:
 @options.out()
 @speaks
 def conformance(engines: tuple[str, ...], feature: str, limit: float, out: Path) -> int:
-    """Show how every engine's own reader handles each feature of robot files, with a minimal file for each."""
+    """Show how engines read each feature of robot files.
+
+    Every engine's own reader reads a minimal file for each feature.
+    """
     return _do("conformance.conformance", engines, feature, limit, out, options.command())
 
 
@@ -288,7 +313,7 @@ def conformance(engines: tuple[str, ...], feature: str, limit: float, out: Path)
 @click.option("--closed-loop", is_flag=True, help="Feed the recorded references to the model's controller.")
 @speaks
 def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, **log: Any) -> int:
-    """Replay LOG on a model, and report how well the motions agree."""
+    """Replay LOG on a model, and compare the motions."""
     from crossbody.reports.commands.replay import Ask, run_replay
 
     kind = "closed_loop" if closed_loop else "forward"
@@ -312,7 +337,10 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 def identify(
     free: tuple[str, ...], hold: int, starts: str, stride: int, budget: float, limit: float, out: Path, **log: Any
 ) -> int:
-    """Identify parameters of a model from LOG, with intervals, judged on held-out windows."""
+    """Identify parameters of a model from LOG.
+
+    Estimates have intervals, and are judged on held-out windows.
+    """
     from crossbody.reports.commands.replay import Ask, run_identify
 
     return run_identify(Ask(**log), free, hold, starts, stride, budget, out, options.command(), limit)

@@ -32,7 +32,9 @@ def apart(spec: Any, without: str) -> Any:
         if kind == "pair":
             if len(names) != 2 or not bodies.issuperset(names):
                 known = ", ".join(sorted(filter(None, bodies)))
-                raise InvalidValue(f"without: {word!r} is no pair of bodies (pair:BODY:BODY); the file has: {known}.")
+                raise InvalidValue(
+                    f"without: {word!r} is not a pair of bodies (pair:BODY:BODY); the file has: {known}."
+                )
             spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
     model = spec.compile()
     return _without_overlaps(spec, model) if "overlaps" in words else model

@@ -197,7 +197,7 @@ class Flow:
         if self.gated is not None and self.gated.lost:
             return self._end(Outcome.LOST, t, y, self.gated.gates.lost)
         if settled.cycle:
-            self._end(Outcome.MODE_CYCLE, t, y, f"the rows come back to {settled.modes} at one instant")
+            self._end(Outcome.MODE_CYCLE, t, y, f"the rows return to {settled.modes} at one instant")
         return y
 
     def _record(self, t: float, q: Floats, v: Floats, lam: Floats) -> None:

@@ -192,7 +192,9 @@ def _unseen(
         for row in weak(spread.covariance[np.ix_(seen, seen)], sizes, quantile):
             words = in_words(row, [names[i] for i in at])
             if np.sum(np.abs(row) > WEIGHT * np.max(np.abs(row))) > 1:
-                found[f"The data hardly see one combination: {words} are not told from none. Fix one of them."] = words
+                found[
+                    f"The data hardly see one combination: {words} cannot be distinguished from zero. Fix one of them."
+                ] = words
     return found
 
 
@@ -251,7 +253,8 @@ def _about(e: Estimate, i: int, fit: Fit, active: bool, flat: Mapping[int, str])
     if i in flat:
         yield f"{e.name} is not identifiable: {flat[i]}."
     elif np.isfinite(e.std) and bound is not None:
-        yield f"{e.name} cannot be told from its bound {bound:g} {e.unit}: {e.value:.4g} [{e.low:.4g}, {e.high:.4g}]."
+        size = f"{e.value:.4g} [{e.low:.4g}, {e.high:.4g}]"
+        yield f"{e.name} cannot be distinguished from its bound {bound:g} {e.unit}: {size}."
     elif active:
         yield f"{e.name} stands at a bound, {e.value:.4g} {e.unit}."
     elif np.isfinite(e.std) and not e.identifiable:

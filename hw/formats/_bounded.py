@@ -171,7 +171,7 @@ class Chunks:
         if declared is None:
             self._budget.hold(2 * len(found), "a chunk and its messages")
         elif len(found) != declared:
-            text = f"has a chunk that unfolds to {'more' if len(found) > declared else 'less'} than it tells: damaged?"
+            text = f"has a chunk that holds {'more' if len(found) > declared else 'less'} than it declares: damaged?"
             raise LogFormatError(self._path, text)
         self._budget.spend(len(found))
         if len(found) <= self._left:

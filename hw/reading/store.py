@@ -126,7 +126,7 @@ def about(path: Path) -> _About:
         if found is not None:
             return found
     raise LogFormatError(
-        path, "needs a column map (`crossbody log info` drafts one): it is no log that crossbody stored."
+        path, "needs a column map (`crossbody log info` drafts one): it is not a log that crossbody stored."
     )
 
 

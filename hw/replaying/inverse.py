@@ -226,7 +226,7 @@ def conditions(t: Floats, B: Floats, rows: tuple[str, ...], names: tuple[str, ..
     """
     k, m = B.shape[1:]
     if not m:
-        raise SceneError(f"{model} has no inputs: nothing acts on {', '.join(rows)} that could be told.")
+        raise SceneError(f"{model} has no inputs: no force on {', '.join(rows)} can be estimated.")
     size = np.linalg.norm(B, axis=1, keepdims=True)
     U, s, Vt = np.linalg.svd(B / np.where(size > 0.0, size, 1.0))
     with np.errstate(divide="ignore"):

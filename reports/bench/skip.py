@@ -93,7 +93,7 @@ def _recording(repeats: int) -> Iterator[Row]:
     for name, wall in took.items():
         beside = _beside({"end alone": lean, name: wall}, 1e3, "ms")
         what = f"recording {name} over the end alone"
-        yield ratio(what, wall / lean, None, beside, "what nobody asked for is not kept")
+        yield ratio(what, wall / lean, None, beside, "what was not requested is not kept")
 
 
 def _counted(_repeats: int) -> Iterator[Row]:

@@ -71,7 +71,7 @@ def _part(path: Path) -> pd.DataFrame:
         with files.open_inside(path, "bench.parquet") as file:
             return pd.read_parquet(file)[list(measure.COLUMNS)]
     except (OSError, ValueError, KeyError, ArrowException):
-        raise OutputError(f"{path} is no part of a benchmark; remove {path.parent}.") from None
+        raise OutputError(f"{path} is not part of a benchmark; remove {path.parent}.") from None
 
 
 def show(tables: Mapping[str, pd.DataFrame], out: Path) -> None:

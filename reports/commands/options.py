@@ -52,7 +52,9 @@ def time_limit(text: str, seconds: float = 3660.0) -> Callable[[_Work], _Work]:
 
 def out(folder: str = "out") -> Callable[[_Work], _Work]:
     """--out, with the folder that is written if nothing is said."""
-    return click.option("--out", type=PATH, default=Path(folder), show_default=True, metavar="DIR")
+    return click.option(
+        "--out", type=PATH, default=Path(folder), show_default=True, metavar="DIR", help="Folder for the results."
+    )
 
 
 wanted = click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")

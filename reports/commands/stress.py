@@ -53,10 +53,10 @@ def stress(ask: Ask, out: Path, command: str) -> int:
     specs = plan(ask)
     chunk = min(max(len(specs) // CHUNKS, LEAST), MOST)
     if ask.resume and not (out / SWEEP).is_file():
-        raise OutputError(f"{out} holds no sweep to go on with; leave --resume out to begin one.")
+        raise OutputError(f"{out} contains no sweep to continue; omit --resume to start one.")
     with _client(ask.scheduler, ask.tls) as client:
         store = Store(out, identity(specs, chunk, {"seed": ask.seed}))
-        watch.resumable(f"What is complete is kept in {out}; the same command goes on with it.")
+        watch.resumable(f"What is complete is kept in {out}; the same command continues.")
         sweep(store, specs, chunk, Pool(count=ask.jobs, client=client))
     rows, times = store.table()
     with voice.progress(None, done=0) as tell:

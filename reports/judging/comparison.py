@@ -383,7 +383,7 @@ def _row(
     if name in judge_.claims:
         return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
     if wanted and _shown(metric, truth, judge_.case):
-        return judge_.missing(name, metric.UNIT, "The run has no such number, the truth has.", needs)
+        return judge_.missing(name, metric.UNIT, "The run lacks this number, which the truth has.", needs)
     return None
 
 

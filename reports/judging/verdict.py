@@ -153,7 +153,7 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
         return Word.OUTSIDE, (said + why).strip()
     sizes = explained(limit, stored)
     if sizes is None:
-        return Word.INFO, f"Known, but nobody has measured how far it goes here: {limit.known}"
+        return Word.INFO, f"Known, but its size has not been measured here: {limit.known}"
     least, most = sizes
     if least <= off <= most:
         return Word.EXPECTED, limit.known

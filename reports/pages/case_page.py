@@ -163,7 +163,11 @@ def _audit(found: Results, case: CaseFiles) -> Section:
     told.sort(key=lambda row: row["same"])
     failed = [row["who"] for row in told if not row["same"]]
     whose = f" ({', '.join(dict.fromkeys(failed))})" if failed else ""
-    text = f"{AUDIT_TEXT} {len(failed)} of {len(told)} quantities differ{whose}." if told else f"{AUDIT_TEXT} None was."
+    text = (
+        f"{AUDIT_TEXT} {len(failed)} of {len(told)} quantities differ{whose}."
+        if told
+        else f"{AUDIT_TEXT} Nothing was audited."
+    )
     table = Table(title="Parity audit", columns=AUDIT, rows=told, folded=not failed)
     return Section(name="audit", title="Parity audit", text=text, tables=(table,))
 

@@ -266,7 +266,7 @@ def write(film: Film, path: Path, t: float, fps: float, speed: float) -> None:
     """
     end = float(film.t[-1])
     if path.suffix not in SUFFIXES:
-        raise InvalidValue(f"{path.name} is no picture that is known; valid: {', '.join(SUFFIXES)}.")
+        raise InvalidValue(f"{path.name} is not a known kind of picture; valid: {', '.join(SUFFIXES)}.")
     if not 0.0 <= t <= end:
         raise InvalidValue(f"There is no instant {t:g} s; the motion lasts from 0 to {end:g} s.")
     if path.suffix == ".gif":

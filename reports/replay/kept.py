@@ -72,7 +72,7 @@ def _read(part: Path) -> Prediction:
         told = msgspec.json.decode(files.read_inside(part, ABOUT), type=_Told)
         whole = np.frombuffer(bytearray(files.read_inside(part, ARRAYS))).reshape(2, sum(told.rows), told.width)
     except (OSError, ValueError, msgspec.MsgspecError):
-        raise OutputError(f"{part} is no part of a replay; remove {part.parent}.") from None
+        raise OutputError(f"{part} is not part of a replay; remove {part.parent}.") from None
     y, yd = (tuple(np.split(one, np.cumsum(told.rows)[:-1])) for one in whole)
     return Prediction(
         engine=told.engine, profile=told.profile, settings=told.settings, outcomes=told.outcomes,

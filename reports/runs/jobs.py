@@ -104,7 +104,7 @@ def run_case(
     tell(label)
     watch.limited(label, TRUTHS * limit)
     if why := watch.lost(label):
-        raise CaseUnsupported(f"{label} cannot be had. {why}")
+        raise CaseUnsupported(f"{label} is not available. {why}")
     if truth is None and case.general and case.closed_form is None:
         reached = followed(_with_friction(case, budget), budget)
         case, truth = reached.case, truth_of(reached.case, reached, budget)
@@ -215,7 +215,7 @@ def _dear(case: Case, pick: Pick, asked: Mapping[str, Value], most: float) -> st
 
 def _too_dear(pick: Pick, cost: str) -> str:
     who = f"-e {pick.engine}:{pick.profile}"
-    return f"Too dear: it would take {cost}. {who} runs it all the same, as does a larger --budget."
+    return f"Too expensive: it would take {cost}. {who} runs it all the same, as does a larger --budget."
 
 
 def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:

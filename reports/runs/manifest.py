@@ -124,7 +124,7 @@ def _studies(path: Path, text: str) -> dict[str, dict[str, str]]:
         raise OutputError(f"{path} is not a manifest of crossbody: it has no table `studies` of tables.") from None
     for study, names in told.items():
         if wrong := [name for name in names if not files.is_plain(name)]:
-            raise OutputError(f"{path}: studies.{study} names {wrong[0]!r}, which is no file of this folder.")
+            raise OutputError(f"{path}: studies.{study} names {wrong[0]!r}, which is not a file of this folder.")
     return told
 
 

@@ -105,7 +105,7 @@ def _check_content(path: Path, study: str) -> None:
     fixed = ("index.html", "verdicts.json", "verdicts.csv", "verdicts.parquet", "provenance.json")
     for name in fixed if (path / MARKER).is_file() else ():
         if os.path.lexists(path / name) and name not in known.files:
-            raise OutputError(f"{path / name} is in the way and is not crossbody's own; move it, or name a new folder.")
+            raise OutputError(f"{path / name} exists and was not written by crossbody; move it, or name a new folder.")
 
 
 @contextmanager
@@ -213,7 +213,7 @@ def _commit(made: Path) -> None:
         own, known = _own(made), manifest.read(staged.home)
         if theirs := sorted(name for name in own - known.files if os.path.lexists(staged.home / name)):
             raise OutputError(
-                f"{staged.home / theirs[0]} is in the way and is not crossbody's own; "
+                f"{staged.home / theirs[0]} exists and was not written by crossbody; "
                 f"the results are in {_kept(made, staged.study)} instead."
             )
         replace_text(made / PLAN, json.dumps({"study": staged.study, "files": sorted(own), "adds": staged.adds}))
@@ -299,4 +299,4 @@ def _recover(home: Path, left: Path, tell: Callable[[str], None]) -> None:
         tell(f"{home}: results that an interrupted command had written are put in their place.")
         return
     shutil.rmtree(left, ignore_errors=True)
-    tell(f"{home}: half-written tables of an interrupted command are taken away.")
+    tell(f"{home}: half-written tables of an interrupted command are removed.")

@@ -71,13 +71,13 @@ class Parts:
         return len([name for name in files.listed(self.path) if name != ABOUT and not name.startswith(".")])
 
     def _kept(self) -> str:
-        return f"what is complete is kept in {self.out}, and the same command goes on."
+        return f"what is complete is kept in {self.out}, and the same command continues."
 
     def _tell(self) -> None:
         """Say what is there already, of this command and of others."""
         if self.found:
             voice.note(
-                f"{self.found} parts of an interrupted run of this command are in {self.out}: it goes on with them."
+                f"{self.found} parts of an interrupted run of this command are in {self.out}: it continues with them."
             )
         for name in files.listed(self.out):
             if name.startswith(PARTS) and name != self.path.name and not (self.out / name).is_symlink():
@@ -126,4 +126,6 @@ def _offer(left: Path) -> None:
     except (OSError, ValueError, KeyError, TypeError):
         command = "a command"
     count = len([name for name in files.listed(left) if name != ABOUT and not name.startswith(".")])
-    voice.note(f"{left} holds {count} parts of an interrupted `{command}`: repeat that to go on, or remove the folder.")
+    voice.note(
+        f"{left} holds {count} parts of an interrupted `{command}`: repeat it to continue, or remove the folder."
+    )

@@ -176,7 +176,9 @@ def load(path: Path) -> Trace:
     except OutputError:
         raise
     except LogFormatError:
-        raise OutputError(f"{path} is not a motion of crossbody: it unfolds to more than a motion needs.") from None
+        raise OutputError(
+            f"{path} is not a motion of crossbody: it decompresses to more than a motion needs."
+        ) from None
     except _BROKEN as error:
         raise OutputError(f"{path} is not a motion of crossbody: {type(error).__name__}: {error}.") from None
 

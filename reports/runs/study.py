@@ -87,7 +87,7 @@ def _read_case(part: Path) -> dict[str, list[dict[str, Any]]]:
         told: Any = files.decoded(files.read_inside(part, CASE))
         return {name: [dict(row) for row in told[name]] for name in ("verdicts", "audit")}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        raise OutputError(f"{part} is no part of a run; remove {part.parent}.") from None
+        raise OutputError(f"{part} is not part of a run; remove {part.parent}.") from None
 
 
 def _save_traces(out: Path, traces: Sequence[Trace]) -> None:

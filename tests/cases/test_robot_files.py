@@ -765,7 +765,7 @@ def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
     wanted = [next(iter(choice.picks([name]))) for name in ("pinocchio", "pinocchio:law")]
     every, asked = jobs.run_case(case, wanted).entries
     assert every.run is None
-    assert "Too dear: it would take about" in every.skipped
+    assert "Too expensive: it would take about" in every.skipped
     assert "-e pinocchio:law" in every.skipped
     assert asked.run is not None
     assert asked.run.outcome is Outcome.FINISHED
@@ -778,7 +778,7 @@ def test_a_run_that_seemed_cheap_and_is_not_is_ended(tmp_path: Path, monkeypatch
     ours, *others = jobs.run_case(cases.from_file(write(tmp_path), "raised"), wanted).entries
     assert ours.run is not None
     assert ours.run.outcome is Outcome.FINISHED
-    assert all("Too dear: it would take more than" in entry.skipped for entry in others)
+    assert all("Too expensive: it would take more than" in entry.skipped for entry in others)
 
 
 def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path) -> None:

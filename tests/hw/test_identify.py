@@ -261,4 +261,4 @@ def test_identified_friction_of_the_single_pendulum_halves_the_published_error()
     print(f"5 s: median {np.median(published):.4f} -> {np.median(errors):.4f} rad")
     assert np.median(errors) < 0.049
     assert np.median(errors) < 0.6 * np.median(published)
-    assert any("s1 cannot be told from its bound" in warning for warning in fit.warnings)
+    assert any("s1 cannot be distinguished from its bound" in warning for warning in fit.warnings)

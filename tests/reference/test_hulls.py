@@ -425,5 +425,5 @@ def test_a_pair_that_is_none_names_the_bodies(tmp_path: Path) -> None:
     path = tmp_path / "arm.xml"
     path.write_text(ARM, encoding="utf-8")
     for words in ("pair:base:arm", "pair:base", "pair:base:link:hand"):
-        with pytest.raises(InvalidValue, match=r"is no pair of bodies .* the file has: .*base, link"):
+        with pytest.raises(InvalidValue, match=r"is not a pair of bodies .* the file has: .*base, link"):
             cases.load(str(path), without=words)

@@ -104,7 +104,7 @@ def test_what_is_complete_is_kept_and_the_same_command_goes_on(tmp_path: Path) -
     code, said = interrupted(process)
     assert code == 130
     assert "what is complete is kept in" in said
-    assert "the same command goes on" in said
+    assert "the same command continues" in said
     assert content(out).items() >= before.items()
     kept = len(list(out.glob(PARTS)))
     code, said = finished(begun(*words, cwd=tmp_path))
@@ -126,7 +126,7 @@ def test_a_benchmark_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     code, said = interrupted(process)
     assert code == 130
     assert "what is complete is kept in" in said
-    assert "the same command goes on" in said
+    assert "the same command continues" in said
     (part,) = out.glob(PARTS)
     kept = pd.read_parquet(part / "bench.parquet")
     code, said = finished(begun(*BENCH, cwd=tmp_path))
@@ -149,7 +149,7 @@ def test_a_replay_goes_on_with_the_engines_that_were_complete(tmp_path: Path) ->
     wait_for(out, PARTS, process)
     code, said = interrupted(process)
     assert code == 130
-    assert "the same command goes on" in said
+    assert "the same command continues" in said
     (part,) = out.glob(PARTS)
     kept = part.stat().st_ino
     process = begun(*words, cwd=tmp_path)

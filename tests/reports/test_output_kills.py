@@ -181,7 +181,7 @@ def test_what_a_killed_command_left_is_told(tmp_path: Path, capsys: pytest.Captu
     put(tmp_path / "out", "old")
     (tmp_path / "out" / ".crossbody-new.run.x").mkdir()
     check(tmp_path / "out", "run")
-    assert "half-written tables of an interrupted command are taken away" in capsys.readouterr().err
+    assert "half-written tables of an interrupted command are removed" in capsys.readouterr().err
     assert content(tmp_path / "out") == dict.fromkeys(FILES["old"], "old")
 
 
@@ -205,7 +205,7 @@ def test_verdicts_of_another_command_are_not_replaced(tmp_path: Path) -> None:
 def test_a_file_of_the_users_is_not_written_over(tmp_path: Path) -> None:
     put(tmp_path / "out", "old")
     (tmp_path / "out" / "b.json").write_text("by hand")
-    with pytest.raises(OutputError, match="not crossbody's own; the results are in"):
+    with pytest.raises(OutputError, match="not written by crossbody; the results are in"):
         put(tmp_path / "out", "new")
     left = content(tmp_path / "out")
     assert left["b.json"] == "by hand"

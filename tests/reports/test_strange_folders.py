@@ -179,7 +179,7 @@ def test_a_manifest_that_lies_removes_nothing(out: Path, tmp_path: Path) -> None
     """Files are removed by the manifest: one that names the user's file inside the folder is all that it can reach."""
     (tmp_path / "notes.md").write_text("mine")
     (out / ".crossbody").write_text(json.dumps({"studies": {"run": ["../notes.md"]}}))
-    with pytest.raises(OutputError, match="no file of this folder"), folder(out, "run"):
+    with pytest.raises(OutputError, match="not a file of this folder"), folder(out, "run"):
         pytest.fail("must not start")
     assert (tmp_path / "notes.md").read_text() == "mine"
 

@@ -155,7 +155,7 @@ def test_another_version_and_foreign_folders_are_not_touched(whole: Path, tmp_pa
     report.mkdir()
     (report / ".crossbody").write_text("")
     (report / "verdicts.json").write_text("{}")
-    with pytest.raises(OutputError, match="in the way and is not crossbody's own"):
+    with pytest.raises(OutputError, match="exists and was not written by crossbody"):
         Store(report, about)
     (report / "verdicts.json").unlink()
     with folder(report, "run") as made:
