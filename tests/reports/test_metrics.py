@@ -18,7 +18,7 @@ from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.friction import cumulated
 from crossbody.reports.measuring.impulse import cumulative
 from crossbody.reports.measuring.scale import RESTS
-from crossbody.reports.measuring.truth import Truth, from_run, sample_times
+from crossbody.reports.measuring.truth import Truth, before, from_run, sample_times
 
 
 @pytest.fixture(scope="module")
@@ -325,3 +325,14 @@ def test_integrals_over_a_motion_are_exact_for_what_grows_steadily() -> None:
     wanted = np.column_stack([1.5 * (t**2 - t[0] ** 2) - (t - t[0]), 0.5 * (t - t[0]) - 0.5 * (t**2 - t[0] ** 2)])
     for found in (cumulated(run, lam), cumulative(run)):
         np.testing.assert_allclose(found, wanted, atol=1e-13)
+
+
+def test_what_is_cut_off_a_motion_leaves_what_a_run_to_that_horizon_is(truth: Truth, case: Case) -> None:
+    until = 0.55 * case.t_end
+    shorter = before(truth.trajectory, until)
+    whole = truth_of(replace(case, t_end=until, closed_form=load("bouncing_ball", "linear", t_end=until).closed_form))
+    assert [(e.t, e.before, e.after) for e in shorter.events] == [
+        (e.t, e.before, e.after) for e in whole.trajectory.events
+    ]
+    assert shorter.ledger is not None
+    assert len(shorter.ledger.input) == len(shorter.t) == np.sum(truth.trajectory.t <= until) > 100
