@@ -9,8 +9,10 @@ from joblib import Parallel, delayed
 
 from crossbody import cases, engines
 from crossbody.cases import Case
+from crossbody.cases.defaults import limits_of
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import Entry, measured
+from crossbody.reports.judging.verdict import limit_for
 from crossbody.reports.runs import choice, jobs
 
 NEAR = (0.7, 1.4)
@@ -34,13 +36,23 @@ def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviati
             beside = jobs.run_case(case, adaptive, near * float(own), print, truth=result.truth, refine=False)
             for one in (one for one in beside.entries if one.run):
                 key = (one.engine, one.profile)
-                found[key] = _largest(found[key], measured(case, one, result.truth))
+                found[key] = _largest(found[key], measured(case, one, result.truth), _known(case, one))
     return [(case, one, found[one.engine, one.profile]) for one in runs]
 
 
-def _largest(one: stored.Deviations, other: stored.Deviations) -> stored.Deviations:
-    """Metric by metric; a number that only one of them has stays as `one` has it."""
-    return {metric: _larger(value, other.get(metric, math.nan)) for metric, value in one.items()}
+def _known(case: Case, entry: Entry) -> frozenset[str]:
+    """Metrics that a known property explains, by half to twice what is stored: there the run's own number stands."""
+    limits = limits_of(case)
+    named = {limit.metric for limit in limits}
+    found = {name: limit_for(limits, name, entry.engine, entry.profile) for name in named}
+    return frozenset(name for name, limit in found.items() if limit is not None and limit.known)
+
+
+def _largest(one: stored.Deviations, other: stored.Deviations, own: frozenset[str]) -> stored.Deviations:
+    """Metric by metric; a number that only one of them has, and those of `own`, stay as `one` has them."""
+    return {
+        metric: value if metric in own else _larger(value, other.get(metric, math.nan)) for metric, value in one.items()
+    }
 
 
 def _larger(one: float, other: float) -> float:

@@ -17,6 +17,7 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction.creep import mixed, near_rigid, regularised
 from crossbody.cases.mechanisms.friction.limits import NEAR
 from crossbody.cases.scene import Body, Joint, Loop, Pair, Scene, Shape
+from crossbody.engines._rubbing import Push, Rubbing
 from crossbody.engines.equations import system_of
 
 STEPPED = (
@@ -161,3 +162,28 @@ def test_what_cannot_be_stepped_is_a_sentence() -> None:
         assert told is None if name == "drake" else "'hinge' has bounds" in told
     assert "discrete" in engine("drake").why_not(case_of(ball), "continuous")
     assert "restitution" in engine("dart").why_not(cases.load("bouncing_ball"), "default")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rows_of_a_pair_bear_all_that_an_engine_pushes_with(seed: int) -> None:
+    """Several at one place too, and whichever shape is named first."""
+    scene, rng = cases.load("tossed_cube", "slides").scene, np.random.default_rng(seed)
+    assert scene is not None
+    rubbing = Rubbing(scene)
+    (contact,) = rubbing.touching.all
+
+    def poses(body: str) -> tuple[np.ndarray, np.ndarray]:
+        return np.eye(3), np.array([0.0, 0.0, 0.1]) if body else np.zeros(3)
+
+    met, total, pushes = rubbing.touching.touches(poses), np.zeros(3), []
+    for point in met.point[rng.integers(0, contact.places, 6)]:
+        force, turned = rng.normal(size=3), bool(rng.random() < 0.5)
+        names = (contact.first.name, contact.second.name)
+        total += force
+        near = point + 1e-4 * rng.normal(size=3)
+        pushes.append(Push(*(names[::-1] if turned else names), near, -force if turned else force, False))
+    lam, _ = rubbing.rows(poses, pushes)
+    normal, along = lam[rubbing.before :][: contact.places], lam[rubbing.before + contact.places :].reshape(-1, 2)
+    up = float(total @ met.normal[0])
+    assert normal.sum() == pytest.approx(up)
+    assert np.linalg.norm(along.sum(axis=0)) == pytest.approx(np.linalg.norm(total - up * met.normal[0]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy import signal
+from scipy import signal, stats
 
 from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Layout, _lagged, scatter, whiteness
@@ -199,3 +199,18 @@ def test_a_smoothed_acceleration_feels_an_input_as_its_samples_are_late(half: in
     rows = np.arange(half + 4, n - half - 4)
     acceleration = derivatives(t, y, half, degree, rows)[2]
     assert felt(t, u, delay, half, degree, rows) == pytest.approx(acceleration, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 5])
+def test_halves_with_unlike_noise_are_told_apart_as_by_welch(seed: int) -> None:
+    """Of a mean alone that is his test, here by SciPy."""
+    random = np.random.default_rng(seed)
+    early, late = random.normal(0.0, 1.0, 10), random.normal(1.0, 1.5, 60)
+    residual = np.concatenate([early, late])
+    layout = Layout(samples=(len(early), len(late)), k=1)
+    (found,) = agreement(np.ones((len(residual), 1)), residual, layout, np.zeros(1), np.ones(1), ("mean",), ())
+    halves = [Layout(samples=(len(part),), k=1) for part in (early, late)]
+    ones = [np.full((len(part), 1), len(part) ** -0.5) for part in (early, late)]
+    white = [whiteness(Q, part - part.mean(), half) for Q, part, half in zip(ones, (early, late), halves, strict=True)]
+    assert min(white) >= 0.05, "another seed: this one asks for correlated noise"
+    assert found.probability == pytest.approx(stats.ttest_ind(early, late, equal_var=False).pvalue, rel=1e-9)

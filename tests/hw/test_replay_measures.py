@@ -165,3 +165,14 @@ def test_impacts_are_found_matched_and_measured() -> None:
     assert one.jump[0] == pytest.approx(2.0 + 9.81 * 0.4, abs=0.1)
     offsets, _ = matched(one, other)
     assert offsets[:2] == pytest.approx([0.006, 0.006], abs=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_instant_and_the_jump_of_an_impact_are_known_between_samples(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    t = np.linspace(0.0, 1.0, 101)
+    when, jumps = np.array([0.2, 0.5, 0.8]) + random.uniform(0.0, 0.05, 3), random.uniform(1.0, 3.0, 3)
+    y = 0.4 - t + sum(jump * np.maximum(t - at, 0.0) for at, jump in zip(when, jumps, strict=True))
+    found = impacts(t, y, least=1e-3)
+    np.testing.assert_allclose(found.t, when, atol=1e-12)
+    np.testing.assert_allclose(found.jump, jumps, atol=1e-12)

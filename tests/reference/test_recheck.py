@@ -110,3 +110,16 @@ def test_rows_that_let_go_right_behind_each_other_pull_nothing(apart: float) -> 
     case = cases.from_scene(Scene(bodies=bodies, joints=joints), q0=[-0.7, -0.7 * (1.0 + apart)], t_end=0.5)
     run = engines.load("reference").prepare(case, "compiled", rtol=1e-13).run()
     assert recheck(system_of(case), run, rtol=1e-12) == ()
+
+
+@pytest.mark.parametrize(("part", "told"), [(0.5, False), (2.0, True)])
+def test_a_pull_of_a_contact_with_friction_is_told_from_what_the_tolerance_leaves(part, told):
+    """It is a thousand times the relative tolerance, of the largest multiplier."""
+    case = load("sliding_block", "stops")
+    prepared = engines.load("reference").prepare(case, "compiled", rtol=1e-9)
+    run = prepared.run()
+    assert recheck(prepared.system, run, rtol=1e-9) == ()
+    lam, k = run.lam.copy(), int(np.flatnonzero(~np.isin(run.t, [event.t for event in run.events]))[1])
+    lam[k, 0] = -part * 1e3 * 1e-9 * np.abs(lam).max()
+    found = recheck(prepared.system, replace(run, lam=lam), rtol=1e-9)
+    assert [one.reason for one in found] == ["pulls"] * told

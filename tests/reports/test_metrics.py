@@ -15,8 +15,10 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring import scale
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.friction import cumulated
+from crossbody.reports.measuring.impulse import cumulative
 from crossbody.reports.measuring.scale import RESTS
-from crossbody.reports.measuring.truth import Truth, from_run, sample_times
+from crossbody.reports.measuring.truth import Truth, before, from_run, sample_times
 
 
 @pytest.fixture(scope="module")
@@ -297,3 +299,40 @@ def test_the_worst_sample_of_friction_counts(name: str, parts: tuple[float, floa
     right, worst = found({}), found({middle: parts[1]})
     assert worst > 1e3 * max(right, 1e-12)
     assert found({first: parts[0], middle: parts[1]}) == pytest.approx(worst)
+
+
+@pytest.mark.parametrize("part", [0.05, 0.5, 0.95])
+@pytest.mark.parametrize("name", ["lam_impulse", "lam_impulse_path"])
+def test_an_impulse_counts_whenever_it_acts(name: str, part: float, truth: Truth, case: Case) -> None:
+    run = coarse(truth)
+    pressed = np.flatnonzero(run.lam[:, 0] > 0.0)
+    k = int(pressed[int(part * len(pressed))])
+    total = float(np.sum(0.5 * np.diff(run.t) * (run.lam[1:, 0] + run.lam[:-1, 0])))
+    more = 0.02 * float(run.lam.max()) * 0.5 * float(run.t[k + 1] - run.t[k - 1])
+    right, wrong = (measure(name, truth, spoiled(run, "lam", at), case) for at in ({}, {k: 0.02}))
+    assert right < 1e-12
+    assert wrong == pytest.approx(more / total, rel=1e-3)
+
+
+def test_integrals_over_a_motion_are_exact_for_what_grows_steadily() -> None:
+    """Whatever the lengths of its steps."""
+    t = np.sort(np.random.default_rng(3).uniform(0.0, 2.0, 40))
+    lam = np.column_stack([3.0 * t - 1.0, 0.5 - t])
+    n = len(t)
+    run = Trajectory(
+        t=t, q=lam, v=lam, gap=lam, lam=lam, energy=lam, mode=np.zeros((n, 2), np.int8), events=(), steps=n
+    )  # fmt: skip
+    wanted = np.column_stack([1.5 * (t**2 - t[0] ** 2) - (t - t[0]), 0.5 * (t - t[0]) - 0.5 * (t**2 - t[0] ** 2)])
+    for found in (cumulated(run, lam), cumulative(run)):
+        np.testing.assert_allclose(found, wanted, atol=1e-13)
+
+
+def test_what_is_cut_off_a_motion_leaves_what_a_run_to_that_horizon_is(truth: Truth, case: Case) -> None:
+    until = 0.55 * case.t_end
+    shorter = before(truth.trajectory, until)
+    whole = truth_of(replace(case, t_end=until, closed_form=load("bouncing_ball", "linear", t_end=until).closed_form))
+    assert [(e.t, e.before, e.after) for e in shorter.events] == [
+        (e.t, e.before, e.after) for e in whole.trajectory.events
+    ]
+    assert shorter.ledger is not None
+    assert len(shorter.ledger.input) == len(shorter.t) == np.sum(truth.trajectory.t <= until) > 100

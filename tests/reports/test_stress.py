@@ -31,7 +31,7 @@ from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
 from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, row
 from crossbody.reports.sweep.map import MAP, stability_map, summary
-from crossbody.reports.sweep.measure import Asked, Error, error, instants, residual
+from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, residual
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.together import together
@@ -655,3 +655,13 @@ def test_an_account_is_as_open_as_its_worst_sample(account: str, place: int) -> 
     booked[place] += 1e-3 * turned
     wrong = replace(run, ledger=replace(run.ledger, **{account: booked}))
     assert residual(wrong) == pytest.approx(1e-3, rel=2e-3)
+
+
+@pytest.mark.parametrize(("q", "v"), [(0.0, 0.0), (1e-3, 0.0), (0.0, 1e-3), (2e-3, 1e-3), (1e-3, 2e-3)])
+def test_an_end_is_wrong_by_its_place_and_by_its_speed(q: float, v: float) -> None:
+    """Each over its largest, and the worse of both."""
+    case = cases.load("bouncing_ball", "linear", **{str(k): x for k, x in drawn()[0].parameters.items()})
+    assert case.closed_form is not None
+    run = case.closed_form(instants(case.t_end))
+    place, speed = run.q[-1] + q * np.abs(run.q).max(), run.v[-1] + v * np.abs(run.v).max()
+    assert at_the_end(case, place, speed).value == pytest.approx(max(q, v), abs=1e-12)

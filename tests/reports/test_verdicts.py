@@ -15,6 +15,7 @@ from crossbody.cases import Case, Claim, Limit, Outcome, Tier, Trajectory, load
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports import metrics
+from crossbody.reports.commands import bands
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
@@ -416,3 +417,12 @@ def test_a_file_as_it_stands_may_count_no_touches(profile: str, word: Word, case
     entry = Entry(engine="mujoco", profile=profile, run=silent)
     rows = judged(replace(case, limits=AS_IT_STANDS), [entry], truth_of(case), "")
     assert {row.metric: row.verdict for row in rows}["event_times"] == word
+
+
+def test_a_known_deviation_is_stored_as_the_run_has_it_and_anything_else_at_its_largest() -> None:
+    """By half to twice of it the run is judged: the largest of runs beside it would put that outside."""
+    known = bands._known(load("newtons_cradle", "sliders"), Entry(engine="pinocchio", profile="law"))
+    assert "touch_count" in known
+    assert "start_error" not in known
+    found = bands._largest({"a": 1.0, "b": 1.0, "c": 1.0}, {"a": 3.0, "b": 3.0}, frozenset({"a"}))
+    assert found == {"a": 1.0, "b": 3.0, "c": 1.0}
