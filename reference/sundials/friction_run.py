@@ -96,7 +96,9 @@ class SlidingArc(DenseStep):
         self.t0, self.y0, self._defect = self.t1, self.y1, None
         done = self.solver.step(stop, "onestep", stop)
         if done.status < 0:
-            raise Ended(Outcome.STEP_TOO_SMALL)
+            s = self.at(self.t0)
+            jamming = self.run.friction.jamming(s.t, s.q, s.v)
+            raise Ended(Outcome.PAINLEVE if jamming else Outcome.STEP_TOO_SMALL, jamming)
         size = float(done.y.dot(done.y))
         if not size < FAR**2:
             raise Ended(Outcome.DIVERGED if np.isfinite(done.y).all() else Outcome.NOT_FINITE)
@@ -105,6 +107,7 @@ class SlidingArc(DenseStep):
         state = self.at(end)
         if not fired:
             self.run.friction.renew(state.q, state.v, state.t)
+            fired = self.run.friction.stopped(state.t, state.q, state.v)
         rows: Any = [alarm for alarm in fired if alarm.tells != "WATCH"]
         return state, Fired(rows, [alarm.row for alarm in fired if alarm.tells == "WATCH"])
 
